@@ -4452,6 +4452,103 @@ static int mstmm_pass_laws_column_answered(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_inverse_dynamics_chain(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
+}
+static int mstmm_chain_inverse_dynamics(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code, law = 0;
+    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
+        const int end = mstmm_end_of_tile(model, first);
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_prescribed(state, i);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_inverse_dynamics_chain(state, i, MSTMM_TILE);
+            code = mstmm_at_forward(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_efforts(state, i);
+            if (code) return code;
+        }
+        for (; law < model->n_laws && model->laws[law].body < end; law++) {
+            const int i = law;
+            code = mstmm_at_laws(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_motion_chain(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
+static int mstmm_chain_motion(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code;
+    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
+        const int end = mstmm_end_of_tile(model, first);
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_prescribed(state, i);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_motion_chain(state, i, MSTMM_TILE);
+            code = mstmm_at_forward(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_poses(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_factorisation_chain(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+}
+static int mstmm_chain_factorisation(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code;
+    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
+        const int end = mstmm_end_of_tile(model, first);
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_prescribed(state, i);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_factorisation_chain(state, i, MSTMM_TILE);
+            code = mstmm_at_forward(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
 MSTMM_AT_ONCE void mstmm_fetch_column_carried_tile(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -4477,6 +4574,41 @@ static int mstmm_tiles_column_carried(mstmm_state *state)
         for (int i = end - 1; i >= first; i--) {
             if (mstmm_beyond_cache(model)) mstmm_fetch_column_carried_tile(state, i, -MSTMM_TILE);
             code = mstmm_at_column_carried(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_required_slope_chain(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(d_block + MSTMM_BLOCK_R, d_block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(d_block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
+static int mstmm_chain_required_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code;
+    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
+        const int end = mstmm_end_of_tile(model, first);
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_prescribed_slope(state, i);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_required_slope_chain(state, i, MSTMM_TILE);
+            code = mstmm_at_forward_slope(state, i);
             if (code) return code;
         }
     }
@@ -4524,6 +4656,41 @@ static int mstmm_tiles_required_slope(mstmm_state *state)
         for (int i = end - 1; i >= first; i--) {
             if (mstmm_beyond_cache(model)) mstmm_fetch_required_slope_tile(state, i, -MSTMM_TILE);
             code = mstmm_at_required_slope(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_applied_slope_chain(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(d_block + MSTMM_BLOCK_R, d_block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(d_block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
+static int mstmm_chain_applied_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code;
+    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
+        const int end = mstmm_end_of_tile(model, first);
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_prescribed_slope(state, i);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_applied_slope_chain(state, i, MSTMM_TILE);
+            code = mstmm_at_forward_slope(state, i);
             if (code) return code;
         }
     }
@@ -4878,26 +5045,31 @@ int mstmm_run_inverse_dynamics(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
-    code = mstmm_pass_prescribed(state);
-    if (code) return code;
-    if (model->n_drives) {
-        code = mstmm_hook_drive_values(state);
+    if (model->n_drives || model->n_values) {
+        code = mstmm_pass_prescribed(state);
+        if (code) return code;
+        if (model->n_drives) {
+            code = mstmm_hook_drive_values(state);
+            if (code) return code;
+        }
+        if (model->n_drives) {
+            code = mstmm_pass_drives(state);
+            if (code) return code;
+        }
+        if (model->n_values) {
+            code = mstmm_hook_expression_values(state);
+            if (code) return code;
+        }
+        code = mstmm_pass_forward(state);
+        if (code) return code;
+        code = mstmm_pass_efforts(state);
+        if (code) return code;
+        code = mstmm_pass_laws(state);
+        if (code) return code;
+    } else {
+        code = mstmm_chain_inverse_dynamics(state);
         if (code) return code;
     }
-    if (model->n_drives) {
-        code = mstmm_pass_drives(state);
-        if (code) return code;
-    }
-    if (model->n_values) {
-        code = mstmm_hook_expression_values(state);
-        if (code) return code;
-    }
-    code = mstmm_pass_forward(state);
-    if (code) return code;
-    code = mstmm_pass_efforts(state);
-    if (code) return code;
-    code = mstmm_pass_laws(state);
-    if (code) return code;
     if (state->balance && model->n_flexible) {
         code = mstmm_pass_strain(state);
         if (code) return code;
@@ -4928,24 +5100,29 @@ int mstmm_run_motion(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
-    code = mstmm_pass_prescribed(state);
-    if (code) return code;
-    if (model->n_drives) {
-        code = mstmm_hook_drive_values(state);
+    if (model->n_drives || model->n_values) {
+        code = mstmm_pass_prescribed(state);
+        if (code) return code;
+        if (model->n_drives) {
+            code = mstmm_hook_drive_values(state);
+            if (code) return code;
+        }
+        if (model->n_drives) {
+            code = mstmm_pass_drives(state);
+            if (code) return code;
+        }
+        if (model->n_values) {
+            code = mstmm_hook_expression_values(state);
+            if (code) return code;
+        }
+        code = mstmm_pass_forward(state);
+        if (code) return code;
+        code = mstmm_pass_poses(state);
+        if (code) return code;
+    } else {
+        code = mstmm_chain_motion(state);
         if (code) return code;
     }
-    if (model->n_drives) {
-        code = mstmm_pass_drives(state);
-        if (code) return code;
-    }
-    if (model->n_values) {
-        code = mstmm_hook_expression_values(state);
-        if (code) return code;
-    }
-    code = mstmm_pass_forward(state);
-    if (code) return code;
-    code = mstmm_pass_poses(state);
-    if (code) return code;
     return 0;
 }
 
@@ -4962,9 +5139,7 @@ int mstmm_run_posed(mstmm_state *state)
 int mstmm_run_factorisation(mstmm_state *state)
 {
     int code;
-    code = mstmm_pass_prescribed(state);
-    if (code) return code;
-    code = mstmm_pass_forward(state);
+    code = mstmm_chain_factorisation(state);
     if (code) return code;
     code = mstmm_pass_factorise(state);
     if (code) return code;
@@ -4987,22 +5162,27 @@ int mstmm_run_required_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
-    code = mstmm_pass_prescribed_slope(state);
-    if (code) return code;
-    if (model->n_drives) {
-        code = mstmm_hook_drive_slopes(state);
+    if (model->n_drives || model->n_values) {
+        code = mstmm_pass_prescribed_slope(state);
+        if (code) return code;
+        if (model->n_drives) {
+            code = mstmm_hook_drive_slopes(state);
+            if (code) return code;
+        }
+        if (model->n_drives) {
+            code = mstmm_pass_drives_slope(state);
+            if (code) return code;
+        }
+        if (model->n_values) {
+            code = mstmm_hook_expression_slopes(state);
+            if (code) return code;
+        }
+        code = mstmm_pass_forward_slope(state);
+        if (code) return code;
+    } else {
+        code = mstmm_chain_required_slope(state);
         if (code) return code;
     }
-    if (model->n_drives) {
-        code = mstmm_pass_drives_slope(state);
-        if (code) return code;
-    }
-    if (model->n_values) {
-        code = mstmm_hook_expression_slopes(state);
-        if (code) return code;
-    }
-    code = mstmm_pass_forward_slope(state);
-    if (code) return code;
     if ((model->needs_pose || model->product)) {
         code = mstmm_pass_efforts_slope(state);
         if (code) return code;
@@ -5038,22 +5218,27 @@ int mstmm_run_applied_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
-    code = mstmm_pass_prescribed_slope(state);
-    if (code) return code;
-    if (model->n_drives) {
-        code = mstmm_hook_drive_slopes(state);
+    if (model->n_drives || model->n_values) {
+        code = mstmm_pass_prescribed_slope(state);
+        if (code) return code;
+        if (model->n_drives) {
+            code = mstmm_hook_drive_slopes(state);
+            if (code) return code;
+        }
+        if (model->n_drives) {
+            code = mstmm_pass_drives_slope(state);
+            if (code) return code;
+        }
+        if (model->n_values) {
+            code = mstmm_hook_expression_slopes(state);
+            if (code) return code;
+        }
+        code = mstmm_pass_forward_slope(state);
+        if (code) return code;
+    } else {
+        code = mstmm_chain_applied_slope(state);
         if (code) return code;
     }
-    if (model->n_drives) {
-        code = mstmm_pass_drives_slope(state);
-        if (code) return code;
-    }
-    if (model->n_values) {
-        code = mstmm_hook_expression_slopes(state);
-        if (code) return code;
-    }
-    code = mstmm_pass_forward_slope(state);
-    if (code) return code;
     if ((model->needs_pose || model->product)) {
         code = mstmm_pass_poses_slope(state);
         if (code) return code;

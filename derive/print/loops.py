@@ -8,7 +8,7 @@ from ..schedule.steps import TIPS_TO_ROOT, Pass, Run, Sweep
 from ..schedule.sweeps import SWEEPS
 from .conditions import condition
 from .fetched import fetching
-from .tiles import Tiled, tiled
+from .tiles import Chained, Tiled, tiled
 
 #: How many subjects a scene has.
 _COUNTS = {
@@ -27,15 +27,15 @@ def loops() -> list[str]:
     groups = [tiled(sweep) for sweep in SWEEPS]
     runs = [run for parts in groups for part in parts for run in _singly(part)]
     singly = {run.whole.name: run.whole for run in runs if run.whole}
-    tiles = [part for parts in groups for part in parts if isinstance(part, Tiled)]
+    tiles = [part for parts in groups for part in parts if not isinstance(part, Run)]
     return [
         *(_loop(whole) for whole in singly.values()),
-        *(_tiles(group) for group in tiles),
+        *(_tiles(group) if isinstance(group, Tiled) else _chained(group) for group in tiles),
         *(_sweep(sweep, parts) for sweep, parts in zip(SWEEPS, groups, strict=True)),
     ]
 
 
-def _singly(part: Run | Tiled) -> Iterable[Run]:
+def _singly(part: Run | Tiled | Chained) -> Iterable[Run]:
     """Runs that have a loop of their own."""
     if isinstance(part, Run):
         return [part]
@@ -96,7 +96,7 @@ def _tiles(group: Tiled) -> str:
     at = _at(group.swept, "").format(indent=" " * 12)
     return (
         f"{fetching(name, [*begun, group.swept])}"
-        f"static int mstmm_tiles_{group.swept.name}(mstmm_state *state)\n{{\n"
+        f"static int {group.function}(mstmm_state *state)\n{{\n"
         "    const mstmm_model *model = state->model;\n"
         f"    int code, begun = model->n_bodies{laws};\n"
         "    for (int end = begun; end > 0; end -= MSTMM_TILE) {\n"
@@ -107,6 +107,34 @@ def _tiles(group: Tiled) -> str:
         "        for (int i = end - 1; i >= first; i--) {\n"
         f"            {fetched}            {at}"
         "        }\n    }\n    return 0;\n}\n"
+    )
+
+
+def _chained(group: Chained) -> str:
+    """Tiles of bodies met by one pass after the other, root to tips."""
+    of_laws = any(whole.subject == "law" for whole in group.passes)
+    name = f"{group.sweep}_chain"
+    lines = []
+    for whole in group.passes:
+        at = _at(whole, "").format(indent=" " * 12)
+        if whole.subject == "law":
+            lines.append(
+                "        for (; law < model->n_laws && model->laws[law].body < end; law++) {\n"
+                f"            const int i = law;\n            {at}        }}\n"
+            )
+            continue
+        fetched = f"            {_fetched(name, 'MSTMM_TILE')}" if whole is group.main else ""
+        lines.append(
+            f"        for (int i = first; i < end; i++) {{\n{fetched}            {at}        }}\n"
+        )
+    return (
+        f"{fetching(name, group.passes)}"
+        f"static int {group.function}(mstmm_state *state)\n{{\n"
+        "    const mstmm_model *model = state->model;\n"
+        f"    int code{', law = 0' if of_laws else ''};\n"
+        "    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {\n"
+        "        const int end = mstmm_end_of_tile(model, first);\n"
+        f"{''.join(lines)}    }}\n    return 0;\n}}\n"
     )
 
 
@@ -126,14 +154,14 @@ def _begun(run: Run) -> str:
     return f"{opened}{text}{indent}    {at}{indent}}}\n{closed}"
 
 
-def _sweep(sweep: Sweep, parts: list[Run | Tiled]) -> str:
+def _sweep(sweep: Sweep, parts: list[Run | Tiled | Chained]) -> str:
     """The passes of a sweep one after the other."""
     lines = ["    int code;"]
     for part in parts:
         if isinstance(part, Run):
             lines += _called(part, "    ")
             continue
-        tiles = [f"code = mstmm_tiles_{part.swept.name}(state);", "if (code) return code;"]
+        tiles = [f"code = {part.function}(state);", "if (code) return code;"]
         if not part.hindrances:
             lines += [f"    {line}" for line in tiles]
             continue

@@ -18,6 +18,11 @@ static inline int mstmm_least_parent(const mstmm_model *model, int first, int en
     return least < 0 ? 0 : least;
 }
 
+static inline int mstmm_end_of_tile(const mstmm_model *model, int first)
+{
+    return first + MSTMM_TILE < model->n_bodies ? first + MSTMM_TILE : model->n_bodies;
+}
+
 /* So many bodies are some 10 MB; numbers of fewer are not asked for, which would only take time. */
 static inline int mstmm_beyond_cache(const mstmm_model *model) { return model->n_bodies >= 4000; }
 
