@@ -20,7 +20,7 @@ from .conditions import condition
 
 #: Owners of numbers that belong to other bodies, to expressions or to the whole scene.
 _OTHERS = (*ROLES, "inboard", "sums", "outer", "inner")
-#: Those that stand already where bodies are met from root to tips, and sums, which keep their order.
+#: Those that stand already where bodies are met from root to tips; sums keep their order.
 _KNOWN = ("parent", "inboard", "sums")
 
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
 from mstmm.cli import stored
 from mstmm.derive.print.fetched import fetching
 from mstmm.derive.print.sweep import sweep_files
-from mstmm.derive.print.tiles import Tiled, tiled
+from mstmm.derive.print.tiles import Chained, Tiled, tiled
 from mstmm.derive.schedule.laws_alone import LAWS_ALONE, LAWS_FACTORISE, LAWS_OWN
 from mstmm.derive.schedule.solve import COLUMN
-from mstmm.derive.schedule.steps import TIPS_TO_ROOT, Copy, Pass, Run, Sweep
+from mstmm.derive.schedule.steps import ROOT_TO_TIPS, TIPS_TO_ROOT, Copy, Pass, Run, Sweep
 from mstmm.derive.schedule.sweeps import ACCELERATIONS
 from mstmm.derive.schedule.tangent import TANGENT_SOLUTION
 
@@ -41,6 +42,31 @@ def test_accelerations_have_nothing_to_begin() -> None:
     assert tiled(ACCELERATIONS) == list(ACCELERATIONS.runs)
 
 
+@pytest.mark.parametrize("slot", ["body.e", "parent.e", "inboard.S", "sums.power"])
+def test_passes_from_root_to_tips_follow_one_another(slot: str) -> None:
+    one = Pass("one", "body", "", (Copy(to="body.e", source="parent.e"),), order=ROOT_TO_TIPS)
+    other = replace(one, name="other", steps=(Copy(to="body.S", source=slot),))
+    (group,) = tiled(Sweep("sweep", "", (Run(whole=one), Run(whole=other))))
+    assert isinstance(group, Chained)
+    assert group.passes == (one, other) and group.main is one and not group.singly
+
+
+def test_what_cannot_follow_parts_a_chain() -> None:
+    one = Pass("one", "body", "", (Copy(to="body.e", source="parent.e"),), order=ROOT_TO_TIPS)
+    runs = Run(whole=one), Run(whole=replace(one, name="two"))
+    reads_others = replace(one, name="three", steps=(Copy(to="body.e", source="on.e"),))
+    spares = Run(whole=replace(one, name="four", spares_links="posed"))
+    for between in Run(whole=reads_others), Run(hook="drive_values"), Run(whole=SWEPT):
+        parted = (runs[0], between, runs[1])
+        assert tiled(Sweep("sweep", "", parted)) == list(parted)
+    assert tiled(Sweep("sweep", "", (spares, spares))) == [spares, spares]
+    posed = Run(hook="drive_values", when="posed")
+    first, group, last = tiled(Sweep("sweep", "", (posed, runs[0], posed, runs[1], posed)))
+    assert isinstance(group, Chained)
+    assert first == last == posed and group.runs == (runs[0], posed, runs[1])
+    assert "needs_pose" in group.singly
+
+
 @pytest.mark.parametrize(
     "slot", ["parent.e", "on.e", "inboard.S", "sums.power", "d:parent.motion"]
 )  # fmt: skip
@@ -66,5 +92,6 @@ def test_what_is_asked_for_is_what_is_used() -> None:
 
 def test_every_tile_is_printed_once() -> None:
     text = sweep_files(stored.specs())["sweep_steps.c"]
-    made = re.findall(r"static int (mstmm_tiles_\w+)\(", text)
+    made = re.findall(r"static int (mstmm_(?:tiles|chain)_\w+)\(", text)
+    assert {name.split("_")[1] for name in made} == {"tiles", "chain"}
     assert len(made) == len(set(made)) and all(f"code = {name}(state)" in text for name in made)

@@ -43,8 +43,9 @@ def test_a_model_follows_its_constants(engine: str) -> None:
 
 def test_trajectories_side_by_side_end_steps_at_their_own_times() -> None:
     """Where a constant says when a motor gives a short blow."""
-    shown = {"gravity": [0, 0, 0], "body": [body()], "constants": {"on": 0.2},
-             "hinge": [hinge(law={"effort": "where(t < on, 0, where(t < on + 0.001, 50, 0))"})]}  # fmt: skip
+    blow = "where(t < on, 0, where(t < on + 0.001, 50, 0))"
+    shown = {"gravity": [0, 0, 0], "body": [body()], "hinge": [hinge(law={"effort": blow})],
+             "constants": {"on": 0.2}}  # fmt: skip
     model = mstmm.compile(Scene.from_data(shown), engine="fused")
     on = np.array([0.2, 0.31, 0.44, 0.2])
     states = np.full((4, 1), 0.3), np.zeros((4, 1))
