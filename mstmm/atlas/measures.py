@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -30,16 +30,21 @@ def simulated(model: Model, *args: Any, **options: Any) -> Result:
     return finished(model.simulate(*args, **options))
 
 
-def correction(model: Model, states: Iterable[tuple[Array, Array]]) -> float:
+def correction(
+    model: Model,
+    states: Iterable[tuple[Array, Array]],
+    accelerations: Callable[[Array, Array], Array] | None = None,
+) -> float:
     """What a step of iterative refinement changes of the accelerations, as a part of the largest:
-    to its leading digits their error.  The worst of some states (q, u).
+    to its leading digits their error.  The worst of some states (q, u).  They are the model's own,
+    or those that a function of (q, u) gives for it.
 
     Their residual comes from inverse dynamics, which eliminates nothing, and is solved for by the
     Riccati sweep (Higham, Accuracy and Stability of Numerical Algorithms, 2002, ch. 12).
     """
     worst = 0.0
     for q, u in states:
-        udot = model.accelerations(q, u)
+        udot = (accelerations or model.accelerations)(q, u)
         change = model.solve(q, model.inverse_dynamics(q, u, udot))
         worst = max(worst, float(np.abs(change).max() / np.abs(udot - change).max()))
     return worst

@@ -22,6 +22,8 @@ EXPECTED = {
     "product-masses": ((0.02, 0.2), 1e-6),
     # errors of (0.4 to 4) 1e-16 times the ratio: tests/stability/test_mass_ratios.py
     "heavy-tip": ((1e6, 1e9), 1e20),
+    # across its plane a chain resists with the cube of its length, and rounding of that leaks
+    "inertial-axes": ((100, 2000), 1e5),
     # docs/theory/classical-steps.md: 4 welded beams of three shapes at h = 0.001
     "product-beams": ((3, 4), 40),
     # h omega = sqrt 8, omega = sqrt(3 k) of a rod
@@ -57,6 +59,12 @@ EXPECTED = {
     "friction-steps": ((1e-5, 3e-4), 5e-6),
     "gimbal-passage": ((1e-3, 3e-2), 1e-8),
     "narrow-pulse": ((3e-3, 0.3), 1e-8),
+    # order 0: twice what second order leaves after a step shorter by sqrt 2
+    "predictor-order": ((4, 8), 4096),
+    # of first order, and less than half a step late
+    "time-slope": ((2e-3, 0.1), 1.0),
+    # omega^2 = 13.7 k: 500 steps in half a second are 8 to 40 in every period
+    "usual-norm": ((1.8e3, 4.5e4), 1e16),
     # the first frequency of the clamped beam: 3.516 sqrt(EI / (rho A L^4)) = 3.798 rad/s
     "linear-beam": ((0.8 * 3.798, 3.798), 16.0),
 }
@@ -114,13 +122,15 @@ POWERS = {
     "wilson-overshoot": (2.0, 9.0, 2e3),
     "genalpha-overshoot": (1.0, 900.0, 2e5),
     "numerical-damping": (3.0, 0.03, 0.4),
+    "predictor-order": (2.0, 25.0, 1024.0),
 }
 
 
 @pytest.mark.parametrize("name", POWERS)
 def test_failures_grow_by_the_power_that_is_known(name: str) -> None:
     """Overshoot of displacements by the square of step times frequency, of speeds by the first
-    power; the loss of a second-order method by the third."""
+    power; the loss of a second-order method by the third; what stalls, beside second order, by the
+    square of the steps."""
     power, low, high = POWERS[name]
     inside = [(at, m) for at, m in measured(name).points if low <= at <= high]
     (first, least), (last, most) = inside[0], inside[-1]

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+import math
+
 import grimp
 import numpy as np
 import pytest
 
 import mstmm
-from mstmm.atlas.scenes import spinning_top
-from mstmm.atlas.variants import raw_quaternions, textbook_shapes
+from mstmm.arrays import Array
+from mstmm.atlas.scenes import (
+    ROD,
+    THIN,
+    chain,
+    double_pendulum,
+    drawn_pins,
+    model,
+    rod,
+    spinning_top,
+)
+from mstmm.atlas.variants import held_places, inertial_axes, raw_quaternions, textbook_shapes
+from mstmm.atlas.variants.plain_rosenbrock import Steps
 from mstmm.runtime.flexible.beam.shapes import Eigenfunction
 
 
@@ -21,6 +34,9 @@ def test_only_cases_reach_the_variants() -> None:
     } | graph.find_modules_that_directly_import("mstmm.atlas.variants")
     assert users
     assert all(user.startswith("mstmm.atlas.cases.") for user in users)
+
+
+# --- rotations and shapes -----------------------------------------------------------------------
 
 
 def test_a_raw_quaternion_turns_as_the_good_one_does() -> None:
@@ -43,3 +59,85 @@ def test_low_shapes_are_those_of_the_textbook(number: int) -> None:
 def test_a_run_offers_none_of_them() -> None:
     with pytest.raises(mstmm.SceneError, match="raw-quaternions"):
         spinning_top("ball").simulate(1.0, "raw-quaternions")
+
+
+# --- the sweep in inertial axes -----------------------------------------------------------------
+
+
+def test_the_sweep_in_inertial_axes_keeps_its_digits_in_a_plane_along_them() -> None:
+    """It is the sweep; what it loses elsewhere is due to the axes alone."""
+    count, pin, weight = 800, np.array([0.0, 0.0, 1.0]), np.array([0.0, -9.81, 0.0])
+    row = model(chain(count))
+    body = np.array([1.0, 0.5, 0, 0, THIN, 0, 0, ROD + 0.25, 0, ROD + 0.25])
+    for q, u in drawn_pins(count):
+        angle = np.cumsum(q)
+        cos, sin = np.cos(angle), np.sin(angle)
+        axes = np.zeros((count, 3, 3))
+        axes[:, 0, 0], axes[:, 0, 1], axes[:, 1, 0], axes[:, 1, 1] = cos, -sin, sin, cos
+        axes[:, 2, 2] = 1.0
+        points = np.cumsum(axes[:, :, 0], axis=0) - axes[:, :, 0]
+        found = inertial_axes.accelerations(axes, points, pin, body, u, weight)
+        own = row.accelerations(q, u)
+        assert np.abs(found - own).max() < 1e-12 * np.abs(own).max()
+
+
+# --- steps --------------------------------------------------------------------------------------
+
+
+def test_iterated_steps_forget_where_they_were_expanded() -> None:
+    """Only the predictor of the steps that stall is another one."""
+    rods, h, steps = double_pendulum(), 0.01, 20
+    good = rods.simulate(
+        steps * h, "dttmm-classical", h, scheme="newmark", iterations=20, output_times=[steps * h]
+    )
+    held = held_places.end_of(rods, h, steps, iterations=20)
+    assert np.abs(held - good.q[-1]).max() < 1e-8
+    assert np.abs(held_places.end_of(rods, h, steps) - good.q[-1]).max() > 1e-3
+
+
+def driven_rod() -> mstmm.Model:
+    """A rod on a spring that is pulled by a torque of time."""
+    law = {"effort": "sin(3*t) - 20*q - 2*u"}
+    pin = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod", "law": law}
+    return model({"gravity": [0, -9.81, 0], "body": [rod("rod")], "hinge": [pin]})
+
+
+@pytest.mark.parametrize("method, order", [("rodas4", 1), ("rodas5p", 2), ("ros34pw2", 3)])
+def test_without_the_slope_in_time_the_order_falls(method: str, order: int) -> None:
+    """Of the conditions of order that hold for an autonomous system fewer do for this one: those of
+    W-methods stay."""
+    pulled = driven_rod()
+    exact = pulled.simulate(1.0, rtol=1e-12, atol=1e-14, output_times=[1.0]).q[-1]
+    errors = [
+        np.abs(Steps(pulled, method, time_slope=False).fixed(1 / n, n)[-1, 0] - exact).max()
+        for n in (40, 80)
+    ]
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
+
+
+@pytest.mark.parametrize("method", ["rodas4", "rodas4p2", "rodas5p"])
+def test_whole_steps_are_those_of_a_run(method: str) -> None:
+    pulled, n = driven_rod(), 80
+    run = pulled.simulate(1.0, method, 1 / n, output_times=[1.0])
+    assert np.abs(Steps(pulled, method).fixed(1 / n, n)[-1, 0] - run.q[-1]).max() < 1e-10
+
+
+class ByWay(Steps):
+    """Steps in which speeds weigh by what they move, with the tolerances of coordinates."""
+
+    def size(self, h: float, error: Array) -> float:
+        return float(max(np.sqrt(np.mean(error[0] ** 2)), h * np.sqrt(np.mean(error[1] ** 2))))
+
+
+def test_only_the_norm_makes_steps_short() -> None:
+    """A spring that swings for nobody to see."""
+    hinges = [
+        {"name": "shoulder", "type": "pin", "inboard": "ground", "outboard": "upper"},
+        {"name": "elbow", "type": "pin", "inboard": "upper.tip", "outboard": "lower",
+         "law": {"stiffness": 1e8}},
+    ]  # fmt: skip
+    bodies = [rod("upper"), rod("lower")]
+    arm = model({"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges})
+    assert ByWay(arm, "rodas4p2").needed(0.5, 1e-4, 1e-6, 100) < 50
+    with pytest.raises(mstmm.NumericalFailure, match="more than 1000 steps"):
+        Steps(arm, "rodas4p2").needed(0.5, 1e-4, 1e-6, 1000)

@@ -1,0 +1,57 @@
+"""Rosenbrock steps over a road that pass over how the equations change in time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....arrays import Array
+from ...definition import Definition, Method
+from ...measures import simulated
+from ...scale import LOG
+from ...scenes import model
+from ...variants.plain_rosenbrock import Steps
+
+STEP, STEPS = 0.01, 200
+#: Of the waves, m.
+HEIGHT = 0.01
+
+TIMES = STEP * np.arange(STEPS + 1)
+
+
+def _road(rate: float) -> dict[str, object]:
+    """1 kg on a spring of 400 N/m and a damper of 12 N s/m over waves, which pass with an angular
+    frequency of `rate` over the step."""
+    wave = f"{rate / STEP!r}"
+    effort = f"400*({HEIGHT}*sin({wave}*t) - q) + 12*({HEIGHT}*{wave}*cos({wave}*t) - u)"
+    slide = {
+        "name": "slide", "type": "prismatic", "axis": [0, 1, 0], "inboard": "ground",
+        "outboard": "mass", "law": {"effort": effort},
+    }  # fmt: skip
+    return {"gravity": [0, 0, 0], "body": [{"name": "mass", "mass": 1.0}], "hinge": [slide]}
+
+
+def _error(rate: float, time_slope: bool) -> float:
+    car = model(_road(rate))
+    exact = simulated(car, TIMES[-1], rtol=1e-11, atol=1e-15, output_times=TIMES).q[:, 0]
+    found: Array
+    if time_slope:
+        found = simulated(car, TIMES[-1], "rodas4", STEP, output_times=TIMES).q[:, 0]
+    else:
+        found = Steps(car, "rodas4", time_slope=False).fixed(STEP, STEPS)[:, 0, 0]
+    return float(np.abs(found - exact).max() / HEIGHT)
+
+
+CASE = Definition(
+    name="time-slope",
+    title="Rosenbrock steps without the slope in time: a road",
+    why="A linearised step looks ahead in time by the slope of the equations there, as it does in "
+    "the coordinates by the tangent. Where drives, roads or loads go by time and that slope is "
+    "left out, the table is of first order. Runs keep it; tables of W-methods, such as "
+    "ROS34PW2, do without.",
+    parameter="step times angular frequency of the road", unit="", low=1e-4, high=1.0, scale=LOG,
+    measured="error of the way, of the waves' height", limit=1e-3,
+    method=Method("rodas4 without the slope, h = 10 ms", lambda rate: _error(rate, False)),
+    remedy=Method("rodas4, h = 10 ms", lambda rate: _error(rate, True)), reach=10.0,
+    source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.7; Rang, "
+    "Angermann, BIT 45, 2005 (W-methods)",
+)  # fmt: skip

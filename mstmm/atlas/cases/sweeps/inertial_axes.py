@@ -1,0 +1,70 @@
+"""The Riccati sweep of an oblique chain in inertial axes, in ever longer chains."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from ....arrays import Array
+from ...definition import Definition, Method
+from ...measures import correction
+from ...scale import COUNT
+from ...scenes import ROD, THIN, drawn_pins, model
+from ...variants import inertial_axes
+
+#: Along the rods at rest, across them in their plane, and along the pins.
+ALONG, PIN = np.array([5.0, -4.0, 1.0]) / np.sqrt(42.0), np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
+PLANE = np.stack([ALONG, np.cross(PIN, ALONG), PIN], axis=1)
+WEIGHT = -9.81 * PLANE[:, 1]
+
+#: Moments of inertia about the mass centre, and mass, first moments and moments about the pin.
+MOMENTS = np.diag([THIN, ROD, ROD])
+NUMBERS = np.array([1.0, 0.5, 0.0, 0.0, THIN, 0.0, 0.0, ROD + 0.25, 0.0, ROD + 0.25])
+
+
+def _scene(rods: int) -> dict[str, object]:
+    """Rods along ALONG, written in inertial axes."""
+    tensor = PLANE @ MOMENTS @ PLANE.T
+    body = {
+        "mass": 1.0, "center_of_mass": (ALONG / 2).tolist(),
+        "inertia": [*np.diag(tensor).tolist(), *tensor[np.triu_indices(3, 1)].tolist()],
+        "ends": {"tip": ALONG.tolist()},
+    }  # fmt: skip
+    hinge = {"type": "pin", "axis": PIN.tolist()}
+    chain = {"name": "c", "count": rods, "inboard": "ground", "body": body, "hinge": hinge}
+    return {"gravity": WEIGHT.tolist(), "chain": [chain]}
+
+
+def _in_inertial_axes(q: Array, u: Array) -> Array:
+    angle = np.cumsum(q)
+    axes = np.zeros((len(q), 3, 3))
+    axes[:, 0, 0] = axes[:, 1, 1] = np.cos(angle)
+    axes[:, 1, 0], axes[:, 2, 2] = np.sin(angle), 1.0
+    axes[:, 0, 1] = -axes[:, 1, 0]
+    axes = PLANE @ axes
+    points = np.cumsum(axes[:, :, 0], axis=0) - axes[:, :, 0]
+    return inertial_axes.accelerations(axes, points, PIN, NUMBERS, u, WEIGHT)
+
+
+def _error(rods: float, inertial: bool) -> float:
+    count = int(rods)
+    given = _in_inertial_axes if inertial else None
+    return correction(model(_scene(count)), drawn_pins(count), given)
+
+
+CASE = Definition(
+    name="inertial-axes",
+    title="Sweep in inertial axes: length of an oblique chain",
+    why="What a chain in a plane resists with across that plane grows with the cube of its length. "
+    "In axes to which the plane is oblique every entry of its inertia is a mixture of that with "
+    "the small one that moves, and rounding of the large part falls into the small. In axes along "
+    "the hinges, which the engines choose whatever a scene is written in, the two never meet.",
+    parameter="rods on parallel pins", unit="", low=2, high=3000, scale=COUNT,
+    measured="error of the accelerations, relative", limit=1e-10,
+    method=Method("Riccati sweep, inertial axes", partial(_error, inertial=True)),
+    remedy=Method("Riccati sweep, axes of the hinges", partial(_error, inertial=False)),
+    reach=100_000,
+    source="Higham, Accuracy and Stability of Numerical Algorithms, 2002, ch. 3; sweep: Rui et "
+    "al., Multibody System Dynamics 49, 2020",
+)  # fmt: skip

@@ -1,0 +1,79 @@
+"""Rosenbrock steps without what the steps of a run take care of besides.
+
+Their stages are those of a run: its table, its residual and tangent, accelerations as unknowns.
+What may be left out is the slope of the equations in time (Hairer, Wanner, Solving Ordinary
+Differential Equations II, 1996, IV.7); and errors are judged by the usual norm (IV.8), in which
+those of speeds weigh by themselves and not by what they move within the step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Array
+from ...errors import NumericalFailure
+from ...runtime.engine.tangent import Tangent
+from ...runtime.integrate.steppers import get
+from ...runtime.integrate.steppers.implicit import Rosenbrock
+from ...runtime.model.model import Model
+
+#: How far a step goes towards the one that the error allows, and how much it changes at once.
+_SAFETY, _LEAST, _MOST = 0.9, 0.2, 6.0
+
+
+class Steps:
+    """Steps on states (3, n) of coordinates, of speeds that are their rates, and accelerations."""
+
+    def __init__(self, model: Model, method: str, time_slope: bool = True) -> None:
+        table = get(method)
+        assert isinstance(table, Rosenbrock) and table.E is not None
+        self._table, self._estimate = table, table.E[:-1]
+        self._base, self._stage = Tangent(model.looped), Tangent(model.looped)
+        self._late = table.d if time_slope else np.zeros_like(table.d)
+        q, u = model.initial_state()
+        self._start = np.array([q, u, model.accelerations(q, u)])
+
+    def fixed(self, step: float, steps: int) -> Array:
+        """States (steps + 1, 3, n) of steps of one length (s)."""
+        found = [self._start]
+        for number in range(steps):
+            found.append(self._step(number * step, step, found[-1])[0])
+        return np.array(found)
+
+    def needed(self, t_end: float, rtol: float, atol: float, most: int) -> int:
+        """How many steps it takes to t_end (s), rejected ones with them.
+
+        Raises NumericalFailure where it takes more than `most`.
+        """
+        t, y, h, power = 0.0, self._start, rtol * t_end, 1.0 / (self._table.error_order + 1)
+        for number in range(1, most + 1):
+            h = min(h, t_end - t)
+            after, error = self._step(t, h, y)
+            size = self.size(h, error / (atol + rtol * np.maximum(np.abs(y), np.abs(after))))
+            if size < 1.0:
+                t, y = t + h, after
+            if t >= t_end:
+                return number
+            h *= min(_MOST, max(_LEAST, _SAFETY * size**-power)) if size > 0.0 else _MOST
+        raise NumericalFailure(f"more than {most} steps")
+
+    def size(self, h: float, error: Array) -> float:
+        """Of errors (3, n) of a step of h (s) in units of their tolerances; it passes below 1."""
+        return float(np.sqrt(np.mean(error[:2] ** 2)))
+
+    def _step(self, t: float, h: float, y: Array) -> tuple[Array, Array]:
+        """The state at t + h and the estimate of its error."""
+        table, base, still = self._table, self._base, np.zeros_like(y[0])
+        s = 1.0 / (table.gamma * h)
+        base.residual(t, *y)
+        by_time = base.slope(1.0, still, still, still)
+        base.factor(s, s)
+        stages = np.zeros((table.n_stages, *y.shape))
+        for i in range(1, table.n_stages):
+            place = y + np.tensordot(table.A[i], stages, 1)
+            right = -self._stage.residual(t + table.C[i] * h, *place) - self._late[i] * h * by_time
+            q, u = place[1:] + np.tensordot(table.second[i], stages[:, :2], 1) / h
+            x = base.solve(right, q / s, -u)
+            stages[i] = (x + q) / s, x, s * x - u
+        end = y + np.tensordot(table.B, stages, 1)
+        return end, np.tensordot(self._estimate, stages, 1)
