@@ -82,6 +82,31 @@ class Tangent:
         self._call("tangent_solve", np.ascontiguousarray(r, float), known, x)
         return x
 
+    def count_negative(self) -> int | None:
+        """How many eigenvalues of the last factorisation of a symmetric tangent are negative: as
+        many as of all its pivots, by Sylvester's law.  None where loads reach across the tree,
+        which the pivots do not see.
+
+        Factorisations with negative pivots are refused unless `allow_negative` is called before.
+        """
+        if self.coupled:
+            return None
+        sizes = [body.n for body in self.engine.packed.flexible.values()]
+        block = np.zeros(max([6, *sizes]) ** 2)
+        pivot, pointer, found = self.engine.lib.mstmm_tangent_pivot, self.engine.pointer(block), 0
+        for body in range(self.engine.packed.system.count):
+            for shapes in (0, 1):
+                n = pivot(self.record, body, shapes, pointer)
+                if n == 1:
+                    found += bool(block[0] < 0)
+                elif n:
+                    found += int((np.linalg.eigvalsh(block[: n * n].reshape(n, n)) < 0).sum())
+        return found
+
+    def allow_negative(self) -> None:
+        """From now on negative pivots are no failure: somebody counts them."""
+        self.record.counts = 1
+
     def rates(self, q: Array, u: Array) -> Array:
         """N(q) u (nq,), zero on coordinates that somebody imposes; spoils the residual's state."""
         dq = np.zeros(self.nq)

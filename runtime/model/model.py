@@ -25,6 +25,8 @@ from ..pack.packed import Packed
 
 if TYPE_CHECKING:
     from ..engine.solver import Solver
+    from ..linear.linear import Linear
+    from ..linear.modes import Modes
     from ..result.result import Result
     from ..run.batch import BatchResult
     from .derivatives import Derivatives, Differentiation
@@ -162,6 +164,52 @@ class Model(Compiled):
         instead = "call equilibrium for each of several"
         start = self.initial_state()[0] if q is None else one("q", q, self.nq, instead)
         return equilibrium(self, start, real("t", t, "a time in s"), real("tolerance", tolerance))
+
+    def linearize(
+        self,
+        q: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        t: float = 0.0,
+        *,
+        inputs: Sequence[str] = (),
+        disturbances: Sequence[str] | None = None,
+    ) -> Linear:
+        """M x'' + C x' + K x = V v + W w near a state: at rest where nothing is given, else near
+        `q` (nq,) and `u` (nu,; 0, or the scene's start q where only u is given) at time t (s).
+
+        `inputs` name v and `disturbances` w: efforts of hinges ("shoulder.effort"), forces and
+        moments at ends in inertial axes ("boom.tip.force.x", "boom.tip.mz"), accelerations of the
+        ground ("ground.acceleration.y"; all three are w where nothing is named).  Coordinates that
+        a drive imposes are left out; the others move along with it.  Exact, no differences.
+
+        Raises SceneError for a name or shape that does not fit, NumericalFailure where there is no
+        equilibrium near the scene's start or the state has no accelerations.
+        """
+        from .linearize import linearize
+
+        instead = "call linearize for each of several"
+        return linearize(
+            self,
+            None if q is None else one("q", q, self.nq, instead),
+            None if u is None else one("u", u, self.nu, instead),
+            real("t", t, "a time in s"), inputs, disturbances,
+        )  # fmt: skip
+
+    def modes(
+        self,
+        count: int | None = None,
+        q: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        t: float = 0.0,
+        *,
+        damped: bool | None = None,
+    ) -> Modes:
+        """Natural motions near a state, as `linearize` takes it: all, or the `count` slowest.
+
+        With damping and gyroscopic loads where there are any; `damped` False leaves them out.  See
+        `Linear.modes`.
+        """
+        return self.linearize(q, u, t).modes(count, damped)
 
     def derivatives(
         self,

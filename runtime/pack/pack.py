@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 
 from mstmm.scene import Scene
 
@@ -10,9 +11,11 @@ from ..flexible.modal_body import ModalBody
 from ..kernels import prebuilt
 from . import product, qr
 from .elements import Known
+from .frames import Frames
 from .internal import system_of
 from .packed import Packed, resize
 from .records.model import write
+from .system import System
 
 
 def pack(
@@ -30,15 +33,23 @@ def pack(
     may deviate from the Riccati sweep by that much; with `least_squares` from the QR sweep.
     """
     system, frames = system_of(scene, known, align=align, flexible=flexible)
-    ffi, lib = prebuilt.module()
-    written = write(system, frames.elements)
-    packed = Packed(
-        **vars(frames), system=system, ffi=ffi, lib=lib, model=written.model, written=written,
-        scratch=written.scratch,
-    )  # fmt: skip
+    packed = packed_system(system, frames)
     if product_accuracy is not None:
         product.attach(packed, product_accuracy)
     if least_squares:
         qr.attach(packed)
+    resize(packed, packed.written.slots)
+    return packed
+
+
+def packed_system(system: System, frames: Frames) -> Packed:
+    """Engine arrays of a system, such as one whose forces are others than the scene's."""
+    ffi, lib = prebuilt.module()
+    written = write(system, frames.elements)
+    about = {field.name: getattr(frames, field.name) for field in fields(Frames)}
+    packed = Packed(
+        **about, system=system, ffi=ffi, lib=lib, model=written.model, written=written,
+        scratch=written.scratch,
+    )  # fmt: skip
     resize(packed, written.slots)  # tapes of events are laid out later and may need more
     return packed

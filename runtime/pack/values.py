@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 from mstmm.errors import SceneError
 from mstmm.expression.drive import motion
@@ -13,6 +14,9 @@ from mstmm.ir.tape import Tape, compile_tape
 from mstmm.scene import Hinge
 
 from .layout import Layout
+
+if TYPE_CHECKING:
+    from .system import System
 
 Resolver = Callable[[Name], Node]
 
@@ -112,6 +116,14 @@ def effort_kernel(effort: Expression, layout: Layout, moving: Moving = ()) -> Ke
     node = effort.build(graph, resolver(graph, layout, length=True))
     inputs = [*state_ports(layout), Port("length", (2,)), *moving]
     return _kernel(graph, "effort", inputs, [node])
+
+
+def constant_kernel(name: str, system: System, numbers: Sequence[float]) -> KernelIR:
+    """(t, q, u, [length, rate]) -> the same numbers always."""
+    graph = Graph()
+    ports = [Port("t", (1,)), Port("q", (system.nq,)), Port("u", (system.nu,))]
+    ports += [Port("length", (2,))] if name == "effort" else []
+    return _kernel(graph, name, ports, [graph.constant(float(value)) for value in numbers])
 
 
 def event_tape(

@@ -330,7 +330,7 @@ static int close_couplings(mstmm_tangent *at, int negative)
     real *work = at->closure + m * m, *none = work + m * m;
     memset(none, 0, (size_t)m * sizeof(real));
     const int code = mstmm_solve_lu(m, 1, at->closure, none, none + m, work, 1e-13);
-    if (code != 1 && (code == 2) == negative) return 0;
+    if (code != 1 && (at->counts || (code == 2) == negative)) return 0;
     return mstmm_fail(&(mstmm_state){.failure = &at->failure}, MSTMM_FAILED_TANGENT, -1,
                       code == 1 ? 1 : MSTMM_NEGATIVE);
 }
@@ -359,9 +359,27 @@ int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kap
     memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real)); /* the ground's */
     /* With couplings left out a body may topple that they hold. */
     int negative = 0;
-    if (at->n_coupled) step.negative = &negative;
+    if (at->n_coupled || at->counts) step.negative = &negative;
     const int code = mstmm_run_tangent(&state);
     return code || !at->n_coupled ? code : close_couplings(at, negative);
+}
+
+int mstmm_tangent_pivot(const mstmm_tangent *at, int body, int shapes, real *pivot)
+{
+    const mstmm_body *one = &at->model->bodies[body];
+    int columns[6];
+    const mstmm_state state = {.model = at->model, .memory = at->memory};
+    if (one->idle) return 0;
+    if (shapes) {
+        const mstmm_modal *modal = mstmm_modal_of(one);
+        const int n = one->modal ? mstmm_modes_of(modal) : 0;
+        if (n) memcpy(pivot, at->numbers + modal->tangent + MSTMM_BEND_D(n), sizeof(real) * (size_t)(n * n));
+        return n;
+    }
+    const int n = one->section ? 0 : mstmm_free_speeds(&state, one, columns);
+    const real *tangent = at->numbers + one->tangent;
+    memcpy(pivot, tangent + MSTMM_TANGENT_INVERSE(one->nu, one->nq), sizeof(real) * (size_t)(n * n));
+    return n;
 }
 
 /* Unknown are accelerations: of the increments they are what carries the others along. */

@@ -26,6 +26,7 @@ typedef struct {
     real *closure;        /* n_coupled x (2 n_coupled + 3) */
     int known;            /* there has been a residual since the memory changed */
     int laws_alone;       /* the last tangent was that of mstmm_laws_factor */
+    int counts;           /* pivots may be negative: somebody counts them */
     real t, rate, s, sq, kappa; /* of the last residual and tangent */
     mstmm_failure failure;
 } mstmm_tangent;
@@ -52,6 +53,9 @@ void mstmm_rates_slope(const mstmm_tangent *at, real *d_rates);
 /* Factors dR along unknowns x: du = rate x, da = s x, dq = (sq - kappa g_q)^-1 N x, where g_q are the
  * slopes of the coordinates' rates N u by the coordinates. */
 int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa);
+/* What the last factorisation divided by: the pivot (n, n) of a body's shapes, or the inverse of
+ * that of its hinge; returns n. */
+int mstmm_tangent_pivot(const mstmm_tangent *at, int body, int shapes, real *pivot);
 /* Increments that are there before any x: of coordinates (nq) and accelerations (nu). */
 typedef struct {
     const real *q, *a;

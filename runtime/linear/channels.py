@@ -1,0 +1,145 @@
+"""Where a linear model is pushed: efforts, forces and moments at ends, accelerations of the ground.
+
+The residual is linear in whatever acts, so that a column is the difference of two residuals of the
+tree at rest under nothing else, without error.  By duality the column of a force at a point along n
+is also how far the point goes along n with each coordinate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+from mstmm.ir.facts import effort_unit
+from mstmm.scene.rules.messages import near
+
+from ..engine.engine import Engine
+from ..pack.pack import packed_system
+from ..pack.system import LoadNumbers
+from ..pack.values import constant_kernel
+from ..result.observed import References
+from .matrices import State
+from .standing import INERTIAL
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+
+_AXES = "xyz"
+#: What pushes at an end, by the letter of its short name.
+_KINDS = {"f": ("force", "N"), "m": ("moment", "N*m")}
+GROUND = tuple(f"ground.acceleration.{axis}" for axis in _AXES)
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One push: its name, unit, and which place pushes (`speed`, or `end` with `kind` and `axis`);
+    an acceleration of the ground where there is neither."""
+
+    name: str
+    unit: str
+    speed: int = -1
+    end: str = ""
+    kind: str = ""
+    axis: int = 0
+
+
+def channel(model: Compiled, name: str) -> Channel:
+    """The push of a name: "shoulder.effort" (of hinges with several speeds "ball.effort_wx"),
+    "boom.tip.force.x" or short "boom.tip.fx", "boom.tip.moment.z" or "boom.tip.mz" (inertial axes),
+    "ground.acceleration.y".
+
+    Raises SceneError for a name that is none of these.
+    """
+    owner, _, last = name.rpartition(".")
+    ends = References(model.scene.skeleton)
+    if name in GROUND:
+        return Channel(name, "m/s2", axis=_AXES.index(last))
+    if last.startswith("effort") and owner in model.layout.hinges:
+        return _effort(model, name, owner, last)
+    for letter, (kind, unit) in _KINDS.items():
+        for axis, component in enumerate(_AXES):
+            end = owner.removesuffix(f".{kind}")
+            long = end != owner and last == component
+            if (long or last == letter + component) and end in ends:
+                return Channel(f"{end}.{kind}.{component}", unit, end=end, kind=kind, axis=axis)
+    known = [*_efforts(model), *(f"{end}.force.{axis}" for end in ends for axis in _AXES), *GROUND]
+    raise SceneError(
+        f'"{name}": expected an effort of a hinge such as "shoulder.effort", a force or moment at '
+        'an end such as "boom.tip.force.x", or an acceleration of the ground such as '
+        f'"ground.acceleration.x"{near(name, known)}'
+    )
+
+
+def _effort(model: Compiled, name: str, hinge: str, last: str) -> Channel:
+    slots = model.layout.hinges[hinge]
+    names = efforts_of(slots.u_names)
+    if last not in names:
+        raise SceneError(f'"{name}": hinge "{hinge}" has {", ".join(names) or "no speeds"}')
+    k = names.index(last)
+    return Channel(name, effort_unit(slots.u_units[k]), speed=slots.u + k)
+
+
+def efforts_of(speeds: Sequence[str]) -> list[str]:
+    """Names of the efforts along the speeds of a hinge."""
+    if len(speeds) == 1:
+        return ["effort"]
+    return [f"effort_{name.removesuffix('_rate')}" for name in speeds]
+
+
+def _efforts(model: Compiled) -> list[str]:
+    hinges = model.layout.hinges
+    return [f"{name}.{effort}" for name in hinges for effort in efforts_of(hinges[name].u_names)]
+
+
+def columns(engine: Engine, state: State, channels: Sequence[Channel], free: list[int]) -> Array:
+    """(free, channels): efforts in the free speeds of a unit of each push."""
+    if not channels:
+        return np.zeros((len(free), 0))
+    bare = _under(engine, (0.0, 0.0, 0.0))
+    still = np.zeros(engine.nu)
+
+    def residual(of: Engine) -> Array:
+        return of.inverse_dynamics(state.t, state.q, still, still, of.start_memory())
+
+    nothing = residual(bare)
+    found = []
+    for one in channels:
+        unit = [0.0, 0.0, 0.0]
+        unit[one.axis] = 1.0
+        if one.speed >= 0:
+            found.append(np.eye(engine.nu)[one.speed])
+        elif one.end:
+            found.append(nothing - residual(_under(engine, (0.0, 0.0, 0.0), one, unit)))
+        else:
+            found.append(residual(_under(engine, unit)) - nothing)
+    return np.array(found).T[free]
+
+
+def _under(
+    engine: Engine,
+    gravity: Sequence[float],
+    push: Channel | None = None,
+    unit: Sequence[float] = (),
+) -> Engine:
+    """The tree under gravity and one push alone."""
+    packed = engine.packed
+    loads: tuple[LoadNumbers, ...] = ()
+    if push is not None:
+        body, _, offset = packed.end(push.end)
+        nothing, own = (-1, -1, -1), (0, 1, 2)
+        force = push.kind == "force"
+        load = LoadNumbers(
+            body, -1, INERTIAL, offset, own if force else nothing, nothing if force else own
+        )
+        loads = (load,)
+    values = constant_kernel("values", packed.system, list(unit)) if loads else None
+    system = replace(
+        packed.system, gravity=tuple(gravity), laws=(), forces=(), loads=loads, values=values,
+        drives=None, driven=(), moving={},
+    )  # fmt: skip
+    return Engine(packed_system(system, packed))

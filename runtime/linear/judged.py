@@ -1,0 +1,89 @@
+"""What a linear model cannot say of its scene: states that do not last, and what nothing holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+from ..run.system import SceneSystem
+from .matrices import State, matrices
+
+if TYPE_CHECKING:
+    from .linear import Linear
+
+#: Accelerations in parts of those that stiffness and damping give to motions of order one, and
+#: matrices in parts of themselves, that still count as none and as the same.
+_STILL, _SAME = 1e-7, 1e-6
+#: How far matrices are compared along the motion, in rad or sizes.
+_AHEAD = 0.1
+#: Coordinates that a sentence names.
+_NAMED = 4
+
+
+def warnings_of(linear: Linear) -> Iterator[str]:
+    """Sentences, the gravest first."""
+    accelerating = _accelerating(linear)
+    if accelerating:
+        yield (
+            f"the state does not last: {_some(accelerating)} accelerate there, so that the model "
+            "holds beside the motion through it, and only for a moment"
+        )
+    elif linear.state.u.any() and _changes(linear):
+        yield (
+            "the matrices change along the motion of this state: frequencies and growth of one "
+            "moment are not those of the motion"
+        )
+    found = linear.modes()
+    growing = found.eigenvalues.real.max(initial=0)
+    if growing > 0:
+        k = int(found.eigenvalues.real.argmax())
+        moving = _some(_moving(linear, found.shapes[:, k]))
+        yield f"unstable: a motion of {moving} grows with {growing:.4g} 1/s"
+    free = np.flatnonzero(found.omega == 0)
+    if len(free):
+        moved = np.abs(found.shapes[:, free]).max(axis=1)
+        yield f"nothing pushes back {_some(_moving(linear, moved))}: motions of frequency 0"
+
+
+def _accelerating(linear: Linear) -> list[str]:
+    """Coordinates whose acceleration is more than rounding beside what holds them."""
+    free = list(linear.free)
+    a = linear.state.a[free]
+    scale = np.abs(linear.A).max(initial=0)
+    return [linear.coordinates[k] for k in np.flatnonzero(np.abs(a) > _STILL * max(scale, _STILL))]
+
+
+def _changes(linear: Linear) -> bool:
+    """Whether the matrices are others a little further along the motion."""
+    model, state = linear.model, linear.state
+    engine, memory = model.looped, model.looped.start_memory()
+    dt = _AHEAD / float(np.abs(state.u).max())
+    q = state.q + dt * engine.rates(state.t, state.q, state.u, memory)
+    whole = SceneSystem(engine).start(state.t + dt, q, state.u)
+    q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]
+    _, a = engine.accelerations(state.t + dt, q[None].copy(), u[None].copy(), memory[None])
+    ahead = State(state.t + dt, q, u, a[0])
+    here = matrices(engine, state, list(linear.free))
+    there = matrices(engine, ahead, list(linear.free))
+    return any(_apart(getattr(here, x), getattr(there, x)) > _SAME for x in "MCK")
+
+
+def _apart(one: Array, other: Array) -> float:
+    scale = float(np.abs(one).max(initial=0))
+    return float(np.abs(one - other).max(initial=0)) / scale if scale else 0.0
+
+
+def _moving(linear: Linear, shape: Array) -> list[str]:
+    """Coordinates that move most in a shape."""
+    size = np.abs(shape)
+    places = np.flatnonzero(size > 0.1 * size.max(initial=0))
+    return [linear.coordinates[k] for k in places[np.argsort(-size[places], kind="stable")]]
+
+
+def _some(names: list[str]) -> str:
+    more = len(names) - _NAMED
+    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")

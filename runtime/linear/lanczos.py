@@ -1,0 +1,148 @@
+"""The slowest motions of many bodies, by shift and invert over the O(bodies) solution.
+
+    (K - sigma M)^-1 M x = x / (omega^2 - sigma)
+
+has the motions with omega^2 next to sigma first (Ericsson and Ruhe, Math. Comp. 35 (1980)
+1251-1268), and the pivots of one more factorisation count how many there are, so that none of an
+undamped scene is missed.  Damped motions come from the inverse of the first-order problem,
+uncounted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs, eigsh
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
+
+from .pencil import Pencil
+
+#: Motions looked for beyond those asked for, so that the count has a gap behind the last one.
+_BEYOND = 4
+#: Parts of the fastest omega^2 by which a scene that nothing holds is shifted.
+_SHIFT = 1e-12
+_TRIALS = 4
+#: omega^2 that are told apart by a count, in parts of the larger.
+_GAP = 1e-9
+
+
+@dataclass(frozen=True)
+class Slowest:
+    """omega^2 (k,) or eigenvalues, shapes (n, k), and whether none is missing below the last (None:
+    not counted)."""
+
+    values: NDArray[Any]
+    shapes: NDArray[Any]
+    complete: bool | None
+
+
+def undamped(pencil: Pencil, count: int) -> Slowest:
+    """The `count` motions of least omega^2 of M and a symmetric K."""
+    n, sigma = len(pencil), _shift(pencil)
+    wanted = min(count + _BEYOND, n - 1)
+    for trial in range(_TRIALS):
+        values, shapes = _lanczos(pencil, wanted, sigma, trial)
+        kept, edge = _gap(values, count)
+        pencil_count = pencil.count_below(edge)
+        if pencil_count is None or pencil_count == kept:
+            complete = None if pencil_count is None else True
+            return Slowest(values[:count], shapes[:, :count], complete)
+        sigma = min(sigma, edge - abs(edge)) if pencil_count < kept else sigma
+        wanted = min(max(wanted, pencil_count + _BEYOND), n - 1)
+    return Slowest(values[:count], shapes[:, :count], False)
+
+
+def _gap(values: Array, count: int) -> tuple[int, float]:
+    """How many of the values found are below a number between two of them, from the last that was
+    asked for on, and that number."""
+    for k in range(min(count, len(values) - 1), len(values)):
+        below, above = float(values[k - 1]), float(values[k])
+        if above - below > _GAP * max(abs(above), abs(below)):
+            return k, (above + below) / 2
+    last = float(values[-1])
+    return len(values), last + _GAP * abs(last)
+
+
+def _shift(pencil: Pencil) -> float:
+    """0 where something holds the scene, else a little below: by the pivots, where they count."""
+    try:
+        pencil.factor(0.0)
+    except NumericalFailure:
+        return -_SHIFT * _fastest(pencil)
+    x = np.random.default_rng(0).standard_normal(len(pencil))
+    once = pencil.solve(pencil.mass(x))
+    twice = pencil.solve(pencil.mass(once))
+    slowest = float(np.linalg.norm(once)) / max(float(np.linalg.norm(twice)), 1e-300)
+    fastest = _fastest(pencil)
+    return -_SHIFT * fastest if slowest < _SHIFT * fastest else 0.0
+
+
+def _fastest(pencil: Pencil) -> float:
+    """About the largest omega^2: a few powers of M^-1 K."""
+    x = np.random.default_rng(0).standard_normal(len(pencil))
+    size = 0.0
+    for _ in range(12):
+        pressed = pencil.stiffness(x / np.linalg.norm(x))
+        pencil.factor(1e30)  # the mass alone
+        x = 1e30 * pencil.solve(pressed)
+        size = float(np.linalg.norm(x))
+    return size
+
+
+def _lanczos(pencil: Pencil, k: int, sigma: float, trial: int) -> tuple[Array, Array]:
+    n = len(pencil)
+    pencil.factor(-sigma)
+    start = np.random.default_rng(trial).standard_normal(n)
+    mass = LinearOperator((n, n), matvec=pencil.mass, dtype=np.float64)
+    inverse = LinearOperator((n, n), matvec=pencil.solve, dtype=np.float64)
+    try:
+        values, shapes = eigsh(
+            mass, k=k, M=mass, sigma=sigma, OPinv=inverse, v0=start,
+            ncv=min(n, (2 + trial) * k + 20),
+        )  # fmt: skip
+    except ArpackNoConvergence as error:
+        raise NumericalFailure(
+            f"modes: {len(error.eigenvalues)} of {k} motions found before the iterations were "
+            "exhausted; ask for fewer"
+        ) from None
+    except ArpackError as error:
+        raise NumericalFailure(f"modes: the iteration broke down ({error})") from None
+    order = np.argsort(values)
+    return values[order], shapes[:, order]
+
+
+def damped(pencil: Pencil, count: int, with_c: bool) -> Slowest:
+    """The `count` eigenvalues (pairs count as one) next to 0 of M, C (or none) and K."""
+    n, c = len(pencil), pencil.damping if with_c else np.zeros_like
+    try:
+        pencil.factor(0.0)
+        sigma = 0.0
+    except NumericalFailure:
+        sigma = np.sqrt(_SHIFT * _fastest(pencil))
+        pencil.factor(sigma**2, sigma if with_c else 0.0)
+
+    def inverse(b: Array) -> Array:
+        b = np.ravel(b)
+        first, second = b[:n], b[n:]
+        pressed = sigma * pencil.mass(first) + c(first) + pencil.mass(second)
+        x = -pencil.solve(pressed)
+        return np.concatenate([x, sigma * x + first])
+
+    operator = LinearOperator((2 * n, 2 * n), matvec=inverse, dtype=np.float64)
+    k = min(2 * count + 2 * _BEYOND, 2 * n - 2)
+    start = np.random.default_rng(0).standard_normal(2 * n)
+    try:
+        inverses, vectors = eigs(operator, k=k, v0=start, ncv=min(2 * n, 2 * k + 20))
+    except ArpackError as error:
+        raise NumericalFailure(f"modes: the iteration broke down ({error})") from None
+    values = sigma + 1 / inverses
+    kept = np.flatnonzero(values.imag >= -1e-9 * np.abs(values))
+    kept = kept[np.argsort(np.abs(values[kept]), kind="stable")][:count]
+    shapes = vectors[:n, kept]
+    places = np.abs(shapes).argmax(axis=0)
+    return Slowest(values[kept], shapes / shapes[places, np.arange(len(kept))], None)

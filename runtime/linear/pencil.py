@@ -1,0 +1,69 @@
+"""M, C and K of a scene as operators: products and solutions in O(bodies), no matrix.
+
+    Z(s) = s^2 M + s C + K
+
+is the tangent of an implicit step whose acceleration is s^2 x and whose speed is s x, so that the
+sweep that factors the one factors the other.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+from ..engine.engine import Engine
+from ..engine.tangent import Tangent
+from .matrices import State
+
+
+class Pencil:
+    """The operators on the n free speeds of one scene at rest at a state.  One thread."""
+
+    def __init__(self, engine: Engine, state: State, free: list[int]) -> None:
+        self.tangent, self.free = Tangent(engine), np.array(free, dtype=np.int64)
+        self.state, self._nothing = state, np.zeros(engine.nu)
+        self.tangent.allow_negative()
+        self._no_q = np.zeros(engine.nq)
+        self._begin()
+
+    def __len__(self) -> int:
+        return len(self.free)
+
+    def _begin(self) -> None:
+        state = self.state
+        self.tangent.residual(state.t, state.q, state.u, state.a)
+
+    def _full(self, x: Array) -> Array:
+        whole = self._nothing.copy()
+        whole[self.free] = np.ravel(x)
+        return whole
+
+    def mass(self, x: Array) -> Array:
+        """M x."""
+        return self.tangent.slope(0.0, self._no_q, self._nothing, self._full(x))[self.free]
+
+    def damping(self, x: Array) -> Array:
+        """C x."""
+        return self.tangent.slope(0.0, self._no_q, self._full(x), self._nothing)[self.free]
+
+    def stiffness(self, x: Array) -> Array:
+        """K x."""
+        moved = self.tangent.rates(self.state.q, self._full(x))
+        self._begin()
+        return self.tangent.slope(0.0, moved, self._nothing, self._nothing)[self.free]
+
+    def factor(self, square: float, rate: float = 0.0) -> None:
+        """Factor square M + rate C + K.  NumericalFailure where that is singular."""
+        self._begin()
+        self.tangent.factor(square, 1.0, 0.0, rate)
+
+    def solve(self, r: Array) -> Array:
+        """x of the last factorisation: (square M + rate C + K) x = r."""
+        return self.tangent.solve(self._full(r))[self.free]
+
+    def count_below(self, square: float) -> int | None:
+        """How many omega^2 of an undamped scene are below `square`: negative pivots of K - square M
+        (Sylvester; Wittrick and Williams, Q. J. Mech. Appl. Math. 24 (1971) 263-284)."""
+        self.factor(-square)
+        return self.tangent.count_negative()

@@ -1,0 +1,92 @@
+"""Forces that stand still: the same tree under forces that no motion changes.
+
+Beside the whole scene, a tree whose loads and tensions are those of one state, with fixed
+components in inertial axes, lacks what laws and loads do when they are moved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+from ..engine.calls import Probe
+from ..engine.engine import Engine
+from ..kernels.tape import TapeKernel
+from ..pack.pack import packed_system
+from ..pack.system import ForceNumbers, LoadNumbers, System
+from ..pack.values import constant_kernel
+from .matrices import State
+
+INERTIAL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def with_held_springs(engine: Engine, state: State) -> Engine:
+    """The same with springs that keep their tension and no laws of hinges: their efforts act along
+    the hinges' own speeds, so that standing ones change nothing.
+
+    A force element of a user's own type is left out with all that it does.
+    """
+    system = engine.packed.system
+    springs = (force for force in system.forces if force.element == ("force", "spring"))
+    held = tuple(_held(engine, spring, state) for spring in springs)
+    return Engine(packed_system(replace(system, laws=(), forces=held), engine.packed))
+
+
+def standing(engine: Engine, state: State) -> Engine:
+    """The same with loads too that keep the components in inertial axes that they have there."""
+    held = with_held_springs(engine, state)
+    system = held.packed.system
+    values = _values(system, state).tolist()
+    loads = tuple(_dead(engine, load, values, state) for load in system.loads)
+    made = replace(system, loads=loads, values=constant_kernel("values", system, values))
+    return Engine(packed_system(made, engine.packed))
+
+
+def _values(system: System, state: State) -> Array:
+    """What the expressions of a scene give at a state."""
+    if system.values is None:
+        return np.zeros(0)
+    given = {"t": np.array([state.t]), "q": state.q, "u": state.u}
+    return TapeKernel(system.values).run(given)[1]["values"][: system.n_values].copy()
+
+
+def _dead(engine: Engine, load: LoadNumbers, values: list[float], state: State) -> LoadNumbers:
+    """A load with components in inertial axes; their values join the others."""
+    if load.axes < 0:
+        return load
+    turned = _seen(engine, [Probe(load.axes, load.axes_own, (0.0, 0.0, 0.0))], state)
+    rotation = turned[0, 15:24].reshape(3, 3)
+    places = []
+    for entries in (load.force, load.moment):
+        components = [0.0 if place < 0 else values[place] for place in entries]
+        places.append(tuple(range(len(values), len(values) + 3)))
+        values += (rotation @ components).tolist()
+    return replace(load, axes=-1, axes_own=INERTIAL, force=places[0], moment=places[1])
+
+
+def _held(engine: Engine, spring: ForceNumbers, state: State) -> ForceNumbers:
+    """A spring whose tension is that of the state."""
+    seen = _seen(engine, [Probe(*end) for end in spring.ends], state)
+    apart, moving = seen[1, 0:3] - seen[0, 0:3], seen[1, 3:6] - seen[0, 3:6]
+    length = float(np.linalg.norm(apart))
+    rate = float(apart @ moving) / length
+    stiffness, rest, damping = spring.p
+    effort = -stiffness * (length - rest) - damping * rate
+    if spring.effort is not None:
+        given = {"t": np.array([state.t]), "q": state.q, "u": state.u}
+        kernel = TapeKernel(spring.effort)
+        effort += float(kernel.run({**given, "length": np.array([length, rate])})[1]["values"][0])
+    constant = constant_kernel("effort", engine.packed.system, [effort])
+    return replace(spring, p=(0.0, 0.0, 0.0), effort=constant)
+
+
+def _seen(engine: Engine, probes: list[Probe], state: State) -> Array:
+    """(probes, 24) numbers of `Observation.points` at a state."""
+    found = engine.observe(
+        np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None], probes,
+        parts=("points",),
+    )  # fmt: skip
+    return found.points[0]
