@@ -13,7 +13,8 @@ from ..run.system import SceneSystem
 from .matrices import State, matrices
 
 if TYPE_CHECKING:
-    from .linear import Linear
+    from .equations import Equations
+    from .modes import Modes
 
 #: Accelerations in parts of those that stiffness and damping give to motions of order one, and
 #: matrices in parts of themselves, that still count as none and as the same.
@@ -24,9 +25,9 @@ _AHEAD = 0.1
 _NAMED = 4
 
 
-def warnings_of(linear: Linear) -> Iterator[str]:
+def warnings_of(linear: Equations, found: Modes) -> Iterator[str]:
     """Sentences, the gravest first."""
-    accelerating = _accelerating(linear)
+    accelerating = _accelerating(linear, found)
     if accelerating:
         yield (
             f"the state does not last: {_some(accelerating)} accelerate there, so that the model "
@@ -37,7 +38,6 @@ def warnings_of(linear: Linear) -> Iterator[str]:
             "the matrices change along the motion of this state: frequencies and growth of one "
             "moment are not those of the motion"
         )
-    found = linear.modes()
     growing = found.eigenvalues.real.max(initial=0)
     if growing > 0:
         k = int(found.eigenvalues.real.argmax())
@@ -49,15 +49,15 @@ def warnings_of(linear: Linear) -> Iterator[str]:
         yield f"nothing pushes back {_some(_moving(linear, moved))}: motions of frequency 0"
 
 
-def _accelerating(linear: Linear) -> list[str]:
+def _accelerating(linear: Equations, found: Modes) -> list[str]:
     """Coordinates whose acceleration is more than rounding beside what holds them."""
     free = list(linear.free)
     a = linear.state.a[free]
-    scale = np.abs(linear.A).max(initial=0)
+    scale = found.omega.max(initial=0) ** 2
     return [linear.coordinates[k] for k in np.flatnonzero(np.abs(a) > _STILL * max(scale, _STILL))]
 
 
-def _changes(linear: Linear) -> bool:
+def _changes(linear: Equations) -> bool:
     """Whether the matrices are others a little further along the motion."""
     model, state = linear.model, linear.state
     engine, memory = model.looped, model.looped.start_memory()
@@ -77,7 +77,7 @@ def _apart(one: Array, other: Array) -> float:
     return float(np.abs(one - other).max(initial=0)) / scale if scale else 0.0
 
 
-def _moving(linear: Linear, shape: Array) -> list[str]:
+def _moving(linear: Equations, shape: Array) -> list[str]:
     """Coordinates that move most in a shape."""
     size = np.abs(shape)
     places = np.flatnonzero(size > 0.1 * size.max(initial=0))

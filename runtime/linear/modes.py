@@ -15,7 +15,7 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
 if TYPE_CHECKING:
-    from .linear import Linear
+    from .equations import Equations
     from .pencil import Pencil
 
 Complex = NDArray[np.complex128]
@@ -40,7 +40,7 @@ class Modes:
         complete: whether no mode below the last one is missing; None where that is not counted.
     """
 
-    linear: Linear = field(repr=False)
+    linear: Equations = field(repr=False)
     eigenvalues: Complex
     shapes: NDArray[Any] = field(repr=False)
     complete: bool | None
@@ -126,7 +126,7 @@ class Modes:
         return not np.iscomplexobj(self.shapes)
 
 
-def modes(linear: Linear, count: int | None, damped: bool | None) -> Modes:
+def modes(linear: Equations, count: int | None, damped: bool | None) -> Modes:
     """See `Linear.modes`."""
     few = count is not None and len(linear) > _DENSE and 4 * count <= len(linear)
     if count is None or not few or linear.turning is not None:
@@ -135,7 +135,7 @@ def modes(linear: Linear, count: int | None, damped: bool | None) -> Modes:
     return _few(linear, count, damped)
 
 
-def _few(linear: Linear, count: int, damped: bool | None) -> Modes:
+def _few(linear: Equations, count: int, damped: bool | None) -> Modes:
     from . import lanczos
 
     pencil = linear.pencil
@@ -151,7 +151,7 @@ def _few(linear: Linear, count: int, damped: bool | None) -> Modes:
     return _ordered(linear, slowest.values, slowest.shapes, slowest.complete)
 
 
-def _dense(linear: Linear, damped: bool | None) -> Modes:
+def _dense(linear: Equations, damped: bool | None) -> Modes:
     """All motions, from the matrices."""
     with_c = linear.C.any() if damped is None else damped
     if with_c or not _from_potential(linear.K):
@@ -159,7 +159,7 @@ def _dense(linear: Linear, damped: bool | None) -> Modes:
     return _ordered(linear, *_symmetric(linear), True)
 
 
-def _ordered(linear: Linear, squares: Array, shapes: Array, complete: bool | None) -> Modes:
+def _ordered(linear: Equations, squares: Array, shapes: Array, complete: bool | None) -> Modes:
     """Of omega^2; below 0 a motion grows and another decays, and the growing one is told."""
     rates = np.sqrt(np.abs(squares))
     values = np.where(squares < 0, rates + 0j, 1j * rates)
@@ -172,7 +172,7 @@ def _from_potential(stiffness: Array) -> bool:
     return bool(np.abs(stiffness - stiffness.T).max(initial=0) <= _SYMMETRIC * scale)
 
 
-def _symmetric(linear: Linear) -> tuple[Array, Array]:
+def _symmetric(linear: Equations) -> tuple[Array, Array]:
     stiffness, mass = (linear.K + linear.K.T) / 2, (linear.M + linear.M.T) / 2
     try:
         squares, shapes = eigh(stiffness, mass)
@@ -182,7 +182,7 @@ def _symmetric(linear: Linear) -> tuple[Array, Array]:
     return np.where(np.abs(squares) <= rounding, 0.0, squares), shapes
 
 
-def _general(linear: Linear, c: Array) -> Modes:
+def _general(linear: Equations, c: Array) -> Modes:
     """The quadratic problem, made linear."""
     n = len(linear)
     zero, one = np.zeros((n, n)), np.eye(n)
@@ -202,7 +202,7 @@ def _general(linear: Linear, c: Array) -> Modes:
     return Modes(linear, values[kept].astype(np.complex128), shapes, True)
 
 
-def _no_inertia(linear: Linear) -> NumericalFailure:
+def _no_inertia(linear: Equations) -> NumericalFailure:
     names = ", ".join(linear.coordinates[:3])
     return NumericalFailure(
         f"modes: the mass matrix of {names}, ... is not positive, so that some motion has no "

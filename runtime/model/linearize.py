@@ -13,19 +13,23 @@ from mstmm.errors import NumericalFailure
 from ..linear.channels import GROUND, channel
 from ..linear.linear import Linear
 from ..linear.matrices import State, matrices
+from ..run.start import initial_state
 from ..run.system import SceneSystem
-from .equilibrium import free_speeds
+from .derivatives import Differentiation
+from .equilibrium import equilibrium, free_speeds
 from .sizes import speed_sizes
 
 if TYPE_CHECKING:
-    from .model import Model
+    from ..engine.compiled import Compiled
 
 #: A start this near to rest, in sizes of its coordinates, is one though nothing holds it there.
 _AT_REST = 1e-9
+#: How far coordinates of the equilibrium may be off, in sizes; see `Model.equilibrium`.
+_TOLERANCE = 1e-10
 
 
 def linearize(
-    model: Model,
+    model: Compiled,
     q: Array | None,
     u: Array | None,
     t: float,
@@ -44,28 +48,31 @@ def linearize(
     )  # fmt: skip
 
 
-def _state(model: Model, q: Array | None, u: Array | None, t: float) -> State:
+def _state(model: Compiled, q: Array | None, u: Array | None, t: float) -> State:
     """The state that is given with its drives, or rest; `accelerations` refuses what has none."""
     speeds = np.zeros(model.nu) if u is None else u
     if q is None:
-        q = _rest(model, t) if u is None else model.initial_state()[0]
+        q = _rest(model, t) if u is None else initial_state(model)[0]
     whole = SceneSystem(model.looped).start(t, q, speeds)
     q, speeds = whole[: model.nq], whole[model.nq : model.nq + model.nu]
-    return State(t, q, speeds, model.accelerations(q, speeds, t))
+    engine, memory = model.looped, model.looped.start_memory()
+    _, a = engine.accelerations(t, q[None].copy(), speeds[None].copy(), memory[None])
+    return State(t, q, speeds, a[0])
 
 
-def _rest(model: Model, t: float) -> Array:
+def _rest(model: Compiled, t: float) -> Array:
     """The equilibrium, or the start where it is at rest though nothing holds it there."""
+    start = initial_state(model)[0]
     try:
-        return np.asarray(model.equilibrium(t=t))
+        return np.asarray(equilibrium(model, start, t, _TOLERANCE))
     except NumericalFailure:
-        q = SceneSystem(model.looped).start(t, model.initial_state()[0], np.zeros(model.nu))
+        q = SceneSystem(model.looped).start(t, start, np.zeros(model.nu))
         if not _at_rest(model, q[: model.nq], t):
             raise
         return q[: model.nq]
 
 
-def _at_rest(model: Model, q: Array, t: float) -> bool:
+def _at_rest(model: Compiled, q: Array, t: float) -> bool:
     """Whether what is missing at a state is rounding beside the stiffness that there is."""
     free, still = free_speeds(model), np.zeros(model.nu)
     sizes = speed_sizes(model)[free]
@@ -76,7 +83,7 @@ def _at_rest(model: Model, q: Array, t: float) -> bool:
     return float(np.abs(missing).max(initial=0)) <= _AT_REST * scale
 
 
-def _increment(model: Model, speed: int) -> tuple[str, str]:
+def _increment(model: Compiled, speed: int) -> tuple[str, str]:
     """Name and unit of a tangent increment: of the coordinate, where its rate is the speed."""
     slots = model.layout.hinge_of_speed(speed)
     k = speed - slots.u
@@ -85,10 +92,11 @@ def _increment(model: Model, speed: int) -> tuple[str, str]:
     return f"{slots.name}.{slots.u_names[k]}_increment", slots.u_units[k].removesuffix("/s")
 
 
-def _turning(model: Model, state: State, free: list[int]) -> Array | None:
+def _turning(model: Compiled, state: State, free: list[int]) -> Array | None:
     """See `Linear.turning`; exact."""
     curved = any(not slots.straight for slots in model.layout.hinges.values() if slots.nu)
     if not curved or not state.u.any():
         return None
-    found = model.derivatives(state.q, state.u, state.t).rate_q
+    of = np.array([[state.t]]), state.q[None], state.u[None], np.zeros((1, model.nu))
+    found = Differentiation(model, ()).at(*of)["rate_q"][0]
     return np.asarray(found[np.ix_(free, free)])

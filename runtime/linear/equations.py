@@ -1,0 +1,162 @@
+"""The linear equations of a scene about a state: matrices in parts, and pushes, with names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+from ..pack.layout import refuse_dense
+from ..run.system import SceneSystem
+from .channels import Channel, columns
+from .matrices import Matrices, State, matrices
+from .pencil import Pencil
+from .standing import standing, with_held_springs
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """M x'' + C x' + K x = V v + W w of motions x near a state of a scene, SI units.
+
+    x (n,) are tangent increments of the coordinates that nobody imposes: dq = N(q) x where
+    qdot = N(q) u, which of most hinges and of shapes are the coordinates themselves and of balls
+    rotation vectors in outboard axes.  Rows are N, N*m; v and w are efforts, forces and moments
+    beyond those of the state, and accelerations of the ground.
+
+    Attributes:
+        model: whose motion it is.
+        state: t (s), q (nq,), u (nu,) and a (nu,), the accelerations there.
+        free: places of x among the speeds.
+        coordinates, units: names of x, and their units.
+        controls, others: where v and w push.
+        turning: (n, n) G of x' = G x + du, how increments of coordinates that are no integrals of
+            speeds go along with the motion; None where they do not.
+    """
+
+    model: Compiled
+    state: State
+    free: tuple[int, ...]
+    coordinates: tuple[str, ...] = field(repr=False)
+    units: tuple[str, ...] = field(repr=False)
+    controls: tuple[Channel, ...] = ()
+    others: tuple[Channel, ...] = ()
+    turning: Array | None = field(default=None, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.free)
+
+    # --- matrices ---------------------------------------------------------------------------------
+
+    @cached_property
+    def _whole(self) -> Matrices:
+        refuse_dense(len(self), "the matrix of a linear model")
+        return self._second_order(matrices(self.model.looped, self.state, list(self.free)))
+
+    @cached_property
+    def _held(self) -> Matrices:
+        engine = with_held_springs(self.model.looped, self.state)
+        return self._second_order(matrices(engine, self.state, list(self.free)))
+
+    @cached_property
+    def _standing(self) -> Matrices:
+        engine = standing(self.model.looped, self.state)
+        return self._second_order(matrices(engine, self.state, list(self.free)))
+
+    def _second_order(self, found: Matrices) -> Matrices:
+        """From speeds to x': where x' = G x + du, C du = C x' - C G x and M da = M x'' - M G x'."""
+        g = self.turning
+        if g is None:
+            return found
+        return Matrices(found.M, found.C - found.M @ g, found.K - found.C @ g)
+
+    @property
+    def M(self) -> Array:
+        """(n, n) mass matrix."""
+        return self._whole.M
+
+    @property
+    def C(self) -> Array:
+        """(n, n): `damping` and `gyroscopic`."""
+        return self._whole.C
+
+    @property
+    def K(self) -> Array:
+        """(n, n): `elastic`, `geometric` and `load`."""
+        return self._whole.K
+
+    @cached_property
+    def damping(self) -> Array:
+        """(n, n) of C: what laws, shapes and loads resist to speeds."""
+        return self.C - self._standing.C + self._of_shapes(lambda body: body.D)
+
+    @property
+    def gyroscopic(self) -> Array:
+        """(n, n) of C: inertia forces of the motion that there is; zero at rest."""
+        return self.C - self.damping
+
+    @cached_property
+    def elastic(self) -> Array:
+        """(n, n) of K: slopes of the laws of hinges and springs, and the stiffness of shapes."""
+        return self.K - self._held.K + self._of_shapes(lambda body: body.K)
+
+    @property
+    def load(self) -> Array:
+        """(n, n) of K: what loads do that go along with a body or follow an expression."""
+        return self._held.K - self._standing.K
+
+    @property
+    def geometric(self) -> Array:
+        """(n, n) of K: gravity, inertia forces, and standing loads and tensions, on a scene that
+        is displaced."""
+        return self._standing.K - self._of_shapes(lambda body: body.K)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of v."""
+        return tuple(one.name for one in self.controls)
+
+    @property
+    def disturbances(self) -> tuple[str, ...]:
+        """Names of w."""
+        return tuple(one.name for one in self.others)
+
+    @cached_property
+    def V(self) -> Array:
+        """(n, inputs): what a unit of each input does."""
+        return self._pushed(self.controls)
+
+    @cached_property
+    def W(self) -> Array:
+        """(n, disturbances): what a unit of each disturbance does."""
+        return self._pushed(self.others)
+
+    def _pushed(self, channels: Sequence[Channel]) -> Array:
+        return columns(self.model.looped, self.state, channels, list(self.free))
+
+    def _of_shapes(self, matrix: Callable[..., Array]) -> Array:
+        """A matrix of the flexible bodies in its place among all."""
+        found = np.zeros((self.model.nu, self.model.nu))
+        for name, slots in self.model.layout.modal.items():
+            found[slots.u_slice, slots.u_slice] = matrix(self.model.flexible[name])
+        return found[np.ix_(self.free, self.free)]
+
+    @cached_property
+    def pencil(self) -> Pencil:
+        """M, C and K as operators, O(bodies), without the matrices; of states at rest."""
+        return Pencil(self.model.looped, self.state, list(self.free))
+
+    def displaced(self, x: Array) -> Array:
+        """q (nq,) of the state after increments x (n,)."""
+        model, speeds = self.model, np.zeros(self.model.nu)
+        speeds[list(self.free)] = x
+        engine, state = model.looped, self.state
+        moved = state.q + engine.rates(state.t, state.q, speeds, engine.start_memory())
+        return SceneSystem(engine).start(state.t, moved, state.u)[: model.nq]
