@@ -38,6 +38,8 @@ def warnings_of(linear: Equations, found: Modes) -> Iterator[str]:
             "the matrices change along the motion of this state: frequencies and growth of one "
             "moment are not those of the motion"
         )
+    if linear.model.packed.system.timed:
+        yield f"what acts goes by time: the model is that of t = {linear.state.t:g} s"
     growing = found.eigenvalues.real.max(initial=0)
     if growing > 0:
         k = int(found.eigenvalues.real.argmax())

@@ -243,10 +243,14 @@ class System:
     @property
     def steady(self) -> bool:
         """Whether nothing goes by time: neither drive nor expression, nor an element that may."""
-        kernels = [self.values, *(force.effort for force in self.forces)]
-        timed = any(kernel is not None and reads(kernel, "t") for kernel in kernels)
         own = any(force.element != ("force", "spring") for force in self.forces)
-        return not (self.driven or timed or own)
+        return not (self.driven or self.timed or own)
+
+    @property
+    def timed(self) -> bool:
+        """Whether an expression of an effort or load reads the time."""
+        kernels = [self.values, *(force.effort for force in self.forces)]
+        return any(kernel is not None and reads(kernel, "t") for kernel in kernels)
 
     @property
     def n_values(self) -> int:

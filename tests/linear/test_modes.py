@@ -1,0 +1,178 @@
+"""Natural motions: closed forms, published numbers, and counts that miss none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from linear.scenes import column, hanging, hanging_beam, masses, pendulum
+from scipy.special import jn_zeros
+
+import mstmm
+from mstmm.errors import NumericalFailure, SceneError
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def of(scene: mstmm.Scene) -> mstmm.Model:
+    return mstmm.compile(scene, engine="looped")
+
+
+@pytest.mark.parametrize("count", [5, 50, 500])
+def test_masses_in_a_row(count: int) -> None:
+    """2 sqrt(k/m) sin((2 j - 1) pi / (4 N + 2)): all of few, the first ten of many."""
+    modes = of(masses(count, 0.5, 200.0)).modes(min(count, 10))
+    j = np.arange(1, 1 + min(count, 10))
+    expected = 2 * np.sqrt(200 / 0.5) * np.sin((2 * j - 1) * np.pi / (4 * count + 2))
+    np.testing.assert_allclose(modes.omega, expected, rtol=1e-8)
+    assert modes.complete and modes.undamped and not modes.damping.any()
+    np.testing.assert_allclose(modes.frequency * 2 * np.pi, modes.omega)
+
+
+def test_few_of_many_are_those_of_the_matrices() -> None:
+    linear = of(hanging(450)).linearize()
+    few, every = linear.modes(12), linear.modes()
+    np.testing.assert_allclose(few.omega, every.omega[:12], rtol=1e-9)
+    signs = np.sign(np.sum(few.shapes * every.shapes[:, :12], axis=0))
+    np.testing.assert_allclose(few.shapes * signs, every.shapes[:, :12], atol=1e-6)
+    np.testing.assert_allclose(few.effective_mass, every.effective_mass[:12], atol=1e-8)
+
+
+def test_none_is_missed_of_ten_thousand() -> None:
+    """The heavy chain of D. Bernoulli: zeros of J0 times sqrt(g/l)/2, from which rods deviate with
+    the square of their number in a wave; and the count agrees."""
+    modes = of(hanging(10_000)).modes(20)
+    np.testing.assert_allclose(modes.omega, jn_zeros(0, 20) / 2 * np.sqrt(9.81), rtol=7e-5)
+    assert modes.complete
+
+
+def test_equal_frequencies_are_all_found() -> None:
+    """Two hundred pendulums on one beam of their own: each frequency three times."""
+    chains = [
+        {"name": name, "count": 150, "inboard": "ground", "end": "on",
+         "body": {"mass": 1.0, "center_of_mass": [0, 0, 0], "inertia": [1, 1, 1],
+                  "ends": {"on": [0, 0, 0]}},
+         "hinge": {"type": "prismatic", "axis": [1, 0, 0], "law": {"stiffness": 100.0}}}
+        for name in ("one", "two", "three")
+    ]  # fmt: skip
+    modes = of(mstmm.Scene(gravity=(0, 0, 0), chain=chains)).modes(7)
+    j = np.repeat(np.arange(1, 4), 3)[:7]
+    np.testing.assert_allclose(modes.omega, 20 * np.sin((2 * j - 1) * np.pi / 602), rtol=1e-8)
+    assert modes.complete
+
+
+#: Frequencies of a beam of length and mass per length 1 that hangs on a pin under 9.81 m/s2, by
+#: stiffness: 60 Hermite elements with their geometric stiffness.
+HANGING = {1.0: (3.81917, 18.09284, 52.48919), 0.05: (3.77647, 9.72380, 19.13301)}
+
+
+@pytest.mark.parametrize("stiffness", list(HANGING))
+def test_a_beam_that_hangs(stiffness: float) -> None:
+    modes = of(hanging_beam(stiffness)).modes(3)
+    np.testing.assert_allclose(modes.omega, HANGING[stiffness], rtol=3e-6)
+    assert modes.complete
+
+
+def test_a_free_body_has_motions_of_frequency_zero() -> None:
+    model = mstmm.compile(mstmm.load_scene(EXAMPLES / "satellite_panels" / "scene.toml"))
+    linear = model.linearize()
+    modes = linear.modes()
+    assert not modes.omega[:6].any() and modes.omega[6] > 1 and not modes.growing.any()
+    assert any("nothing pushes back space.w" in text for text in linear.warnings)
+    np.testing.assert_allclose(modes.effective_mass.sum(axis=0), 136.0)  # both panels and the hub
+    strain = modes.strain()
+    assert np.isnan(strain["space"][:6]).all()
+    np.testing.assert_allclose(strain["east"][6:] + strain["west"][6:], 1.0)
+
+
+def test_effective_masses_add_up() -> None:
+    modes = of(hanging(30)).modes()
+    linear = modes.linear
+    rigid = linear.W[:, 0] @ np.linalg.solve(linear.M, linear.W[:, 0])
+    assert modes.effective_mass[:, 0].sum() == pytest.approx(rigid) and rigid < 1.0
+
+
+@pytest.mark.parametrize(("damping", "ratio"), [(0.5, 0.25), (2.0, 1.0), (4.0, 2.0)])
+def test_damping_in_parts_of_the_critical_one(damping: float, ratio: float) -> None:
+    scene = masses(1, 1.0, 1.0)
+    chain = scene.model_dump(by_alias=True)["chain"][0]
+    chain["hinge"][0]["law"] = {"stiffness": 1.0, "damping": damping}
+    modes = of(mstmm.Scene(gravity=(0, 0, 0), chain=[chain])).modes()
+    expected = np.roots([1, damping, 1])
+    kept = expected[expected.imag >= 0]
+    np.testing.assert_allclose(np.sort(modes.eigenvalues), np.sort(kept), atol=3e-8)
+    if ratio < 1:
+        assert modes.damping[0] == pytest.approx(ratio) and modes.omega[0] == pytest.approx(1.0)
+    assert of(mstmm.Scene(gravity=(0, 0, 0), chain=[chain])).modes(damped=False).undamped
+
+
+def test_damped_motions_of_many() -> None:
+    """Stiffness and damping of one kind: s^2 + d s + 1 times each omega^2."""
+    chain = masses(500, 0.5, 200.0).model_dump(by_alias=True)["chain"][0]
+    chain["hinge"][0]["law"] = {"stiffness": 200.0, "damping": 0.02}
+    modes = of(mstmm.Scene(gravity=(0, 0, 0), chain=[chain])).modes(6)
+    omega = 40 * np.sin((2 * np.arange(1, 7) - 1) * np.pi / 2002)
+    np.testing.assert_allclose(modes.omega, omega, rtol=1e-8)
+    np.testing.assert_allclose(modes.damping, omega * 0.02 / 200 / 2, rtol=1e-6)
+    assert modes.complete is None
+
+
+def test_shapes_are_states() -> None:
+    model = of(hanging(3))
+    modes = model.modes()
+    moved = modes.displaced(0, 0.1)
+    np.testing.assert_allclose(moved, 0.1 * modes.shapes[:, 0])
+    run = model.simulate(2 * np.pi / modes.omega[0], initial=(1e-4 * moved, np.zeros(3)))
+    np.testing.assert_allclose(run.q[-1], 1e-4 * moved, atol=1e-9)  # there again a period later
+
+
+def test_a_pendulum_that_stands_is_unstable_and_linear_all_the_same() -> None:
+    linear = of(pendulum()).linearize([np.pi])
+    (text,) = linear.warnings
+    assert "unstable: a motion of pivot.angle grows with 4.302 1/s" in text
+    assert linear.modes().growing.all() and linear.modes().eigenvalues[0] > 0
+
+
+def test_states_that_do_not_last_are_told() -> None:
+    model = of(pendulum())
+    assert "does not last: pivot.angle" in model.linearize([0.3]).warnings[0]
+    assert not model.linearize().warnings
+    turning = of(hanging(2)).linearize([0, 0], [1.0, 0.0])
+    assert turning.warnings
+    timed = pendulum(law={"effort": "sin(t)"})
+    assert "goes by time" in of(timed).linearize([0.0]).warnings[0]
+
+
+def test_what_makes_no_sense() -> None:
+    model = of(pendulum())
+    linear = model.linearize()
+    for count in (0, 2, True, 1.5):
+        with pytest.raises(SceneError, match="expected a number of motions from 1 to 1"):
+            linear.modes(count)  # type: ignore[arg-type]
+    with pytest.raises(SceneError, match=r'"pivot.efort".*did you mean "?pivot.effort'):
+        model.linearize(inputs=["pivot.efort"])
+    with pytest.raises(SceneError, match=r"bob\.tip\.force\.w"):
+        model.linearize(inputs=["bob.tip.force.w"])
+    with pytest.raises(SceneError, match="q"):
+        model.linearize([0.0, 1.0])
+    with pytest.raises(NumericalFailure, match="no equilibrium"):
+        of(pendulum(law={"effort": 100.0})).linearize()
+    with pytest.raises(NumericalFailure, match="no equilibrium"):
+        of(pendulum(law={"effort": 100.0})).modes()
+
+
+def test_the_names_of_a_ball() -> None:
+    linear = mstmm.compile(mstmm.load_scene(EXAMPLES / "heavy_top" / "scene.toml")).linearize(
+        [1, 0, 0, 0]
+    )
+    assert linear.coordinates[0] == "point.wx_increment" and linear.units == ("rad",) * 3
+
+
+def test_a_buckled_column_is_found_where_its_frequency_vanishes() -> None:
+    squares = [
+        float(np.min(np.linalg.eigvals(np.linalg.solve(x.M, x.K)).real))
+        for x in (of(column(load, "inertial", 6)).linearize() for load in (2.0, 2.4))
+    ]
+    load = 2.0 + 0.4 * squares[0] / (squares[0] - squares[1])
+    assert load == pytest.approx(np.pi**2 / 4, rel=1e-3)
