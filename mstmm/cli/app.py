@@ -9,9 +9,7 @@ from typer.core import TyperGroup
 
 from mstmm.errors import Interrupted
 
-from .advise import advise
 from .cache import cache
-from .chart import chart
 from .check import check
 from .demo import demo
 from .doctor import doctor
@@ -19,7 +17,10 @@ from .generate import generate
 from .listing import list_elements
 from .show import show
 from .simulate import simulate
-from .stability import stability
+from .studies.advise import advise
+from .studies.chart import chart
+from .studies.linear import linearize, modes
+from .studies.stability import stability
 
 
 class Commands(TyperGroup):
@@ -73,6 +74,8 @@ app.command("demo")(demo)
 app.command("simulate")(simulate)
 app.command("chart")(chart)
 app.command("advise")(advise)
+app.command("linearize")(linearize)
+app.command("modes")(modes)
 app.command("check")(check)
 app.command("list")(list_elements)
 app.command("show")(show)

@@ -11,7 +11,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 
-from ..model.sizes import scene_length
+from ..engine.sizes import scene_length
 from ..result.measure import Coordinates, Measure, Quantities
 
 if TYPE_CHECKING:

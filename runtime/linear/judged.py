@@ -9,16 +9,17 @@ import numpy as np
 
 from mstmm.arrays import Array
 
+from ..engine.sizes import speed_sizes
 from ..run.system import SceneSystem
 from .matrices import State, matrices
 
 if TYPE_CHECKING:
     from .equations import Equations
-    from .modes import Modes
+    from .motions import Modes
 
-#: Accelerations in parts of those that stiffness and damping give to motions of order one, and
-#: matrices in parts of themselves, that still count as none and as the same.
-_STILL, _SAME = 1e-7, 1e-6
+#: Distance from rest, and acceleration per s^2 of what nothing holds, in sizes of coordinates;
+#: stiffness that counts as none, in parts; matrices that still count as the same, in parts.
+_STILL, _SOFT, _SAME = 1e-6, 1e-13, 1e-6
 #: How far matrices are compared along the motion, in rad or sizes.
 _AHEAD = 0.1
 #: Coordinates that a sentence names.
@@ -27,7 +28,7 @@ _NAMED = 4
 
 def warnings_of(linear: Equations, found: Modes) -> Iterator[str]:
     """Sentences, the gravest first."""
-    accelerating = _accelerating(linear, found)
+    accelerating = _accelerating(linear)
     if accelerating:
         yield (
             f"the state does not last: {_some(accelerating)} accelerate there, so that the model "
@@ -43,20 +44,27 @@ def warnings_of(linear: Equations, found: Modes) -> Iterator[str]:
     growing = found.eigenvalues.real.max(initial=0)
     if growing > 0:
         k = int(found.eigenvalues.real.argmax())
-        moving = _some(_moving(linear, found.shapes[:, k]))
+        moving = _some(found.moving(k))
         yield f"unstable: a motion of {moving} grows with {growing:.4g} 1/s"
     free = np.flatnonzero(found.omega == 0)
     if len(free):
-        moved = np.abs(found.shapes[:, free]).max(axis=1)
-        yield f"nothing pushes back {_some(_moving(linear, moved))}: motions of frequency 0"
+        moved = dict.fromkeys(name for k in free for name in found.moving(int(k)))
+        yield f"nothing pushes back {_some(list(moved))}: motions of frequency 0"
 
 
-def _accelerating(linear: Equations, found: Modes) -> list[str]:
-    """Coordinates whose acceleration is more than rounding beside what holds them."""
+def _accelerating(linear: Equations) -> list[str]:
+    """Coordinates that leave the state: those further from rest than a small part of their sizes,
+    and those that accelerate though nothing holds them."""
     free = list(linear.free)
-    a = linear.state.a[free]
-    scale = found.omega.max(initial=0) ** 2
-    return [linear.coordinates[k] for k in np.flatnonzero(np.abs(a) > _STILL * max(scale, _STILL))]
+    a, sizes = linear.state.a[free], speed_sizes(linear.model)[free]
+    if not a.any():
+        return []
+    stiffness = linear.K * np.outer(sizes, sizes)
+    pushed = (linear.M @ a) * sizes
+    away = np.linalg.lstsq(stiffness, pushed, rcond=_SOFT)[0]
+    left = np.linalg.solve(linear.M, (pushed - stiffness @ away) / sizes) / sizes
+    leaves = (np.abs(away) > _STILL) | (np.abs(left) > _STILL)
+    return [linear.coordinates[k] for k in np.flatnonzero(leaves)]
 
 
 def _changes(linear: Equations) -> bool:
@@ -77,13 +85,6 @@ def _changes(linear: Equations) -> bool:
 def _apart(one: Array, other: Array) -> float:
     scale = float(np.abs(one).max(initial=0))
     return float(np.abs(one - other).max(initial=0)) / scale if scale else 0.0
-
-
-def _moving(linear: Equations, shape: Array) -> list[str]:
-    """Coordinates that move most in a shape."""
-    size = np.abs(shape)
-    places = np.flatnonzero(size > 0.1 * size.max(initial=0))
-    return [linear.coordinates[k] for k in places[np.argsort(-size[places], kind="stable")]]
 
 
 def _some(names: list[str]) -> str:

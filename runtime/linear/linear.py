@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
-import numpy as np
-
-from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
 from ..pack.layout import refuse_dense
-from .equations import Equations
 from .judged import warnings_of
-from .modes import Modes, modes
+from .modes import modes
+from .motions import Modes
+from .state_space import StateSpace
 
 
-class Linear(Equations):
-    """Linear equations of motion with their state space and natural motions; see `Equations`."""
+class Linear(StateSpace):
+    """Linear equations of motion with their natural motions; see `Equations`."""
 
     def modes(self, count: int | None = None, damped: bool | None = None) -> Modes:
         """Natural motions: all, or the `count` slowest ones; with C where there is any, `damped`
@@ -41,26 +41,18 @@ class Linear(Equations):
         """What speaks against taking the model for the scene, in sentences."""
         return tuple(warnings_of(self, self.modes()))
 
-    # --- state space ------------------------------------------------------------------------------
+    def to_dict(self) -> dict[str, Any]:
+        """Names, state and matrices, for JSON."""
+        from .files import dictionary
 
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names of the state (x, x')."""
-        return (*self.coordinates, *(f"{name}'" for name in self.coordinates))
+        return dictionary(self) | {"warnings": list(self.warnings)}
 
-    @cached_property
-    def A(self) -> Array:
-        """(2 n, 2 n): d/dt (x, x') = A (x, x') + B v."""
-        n = len(self)
-        below = -np.linalg.solve(self.M, np.hstack([self.K, self.C]))
-        return np.vstack([np.hstack([np.zeros((n, n)), np.eye(n)]), below])
+    def save(self, path: str | Path) -> Path:
+        """Matrices by the names of their rows and columns: .nc (extra io), or .csv with a row for
+        every entry that is not zero.
 
-    @cached_property
-    def B(self) -> Array:
-        """(2 n, inputs)."""
-        return np.vstack([np.zeros_like(self.V), np.linalg.solve(self.M, self.V)])
+        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        """
+        from .files import dataset, entries, save
 
-    @cached_property
-    def B_disturbances(self) -> Array:
-        """(2 n, disturbances): what w adds."""
-        return np.vstack([np.zeros_like(self.W), np.linalg.solve(self.M, self.W)])
+        return save(Path(path), lambda: dataset(self), entries(self))

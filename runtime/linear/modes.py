@@ -1,24 +1,19 @@
-"""Natural motions of a linear model: frequencies, damping, shapes, and what carries them."""
+"""The motions of a linear model, from its matrices or, of many, by its operators."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eig, eigh
 
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
+from .motions import Modes
+
 if TYPE_CHECKING:
     from .equations import Equations
-    from .pencil import Pencil
-
-Complex = NDArray[np.complex128]
 
 #: More coordinates than this have their slowest motions found without a matrix.
 _DENSE = 400
@@ -26,104 +21,6 @@ _DENSE = 400
 _SYMMETRIC = 1e-9
 #: Rates in parts of the fastest that are rounding: eigenvalues are found to its square.
 _ROUNDING = 1e-7
-
-
-@dataclass(frozen=True, eq=False)
-class Modes:
-    """k motions x(t) = Re(shape exp(eigenvalue t)) near a state, by rising omega.
-
-    Attributes:
-        linear: the linear model.
-        eigenvalues: (k,) complex, 1/s; of a pair the one with positive imaginary part.
-        shapes: (n, k), real with unit modal mass where there is neither damping nor gyroscopic
-            load, else complex with the largest entry 1.
-        complete: whether no mode below the last one is missing; None where that is not counted.
-    """
-
-    linear: Equations = field(repr=False)
-    eigenvalues: Complex
-    shapes: NDArray[Any] = field(repr=False)
-    complete: bool | None
-
-    def __len__(self) -> int:
-        return len(self.eigenvalues)
-
-    @property
-    def omega(self) -> Array:
-        """(k,) |eigenvalue|, rad/s: of undamped motion its angular frequency."""
-        return np.abs(self.eigenvalues)
-
-    @property
-    def frequency(self) -> Array:
-        """(k,) frequency of the oscillation in Hz, 0 of what does not oscillate."""
-        return np.abs(self.eigenvalues.imag) / (2 * np.pi)
-
-    @property
-    def damping(self) -> Array:
-        """(k,) in parts of the critical one; negative of what grows, 0 of what moves freely."""
-        omega = self.omega
-        rates = 0.0 - self.eigenvalues.real
-        return np.divide(rates, omega, out=np.zeros_like(omega), where=omega > 0)
-
-    def first(self, count: int) -> Modes:
-        """The first of them."""
-        return replace(self, eigenvalues=self.eigenvalues[:count], shapes=self.shapes[:, :count])
-
-    @cached_property
-    def _units(self) -> Array:
-        """(k,) modal masses x* M x of the shapes."""
-        moved = self._weighed(lambda pencil: pencil.mass)
-        return np.real(np.einsum("ik,ik->k", np.conj(self.shapes), moved))
-
-    def _weighed(self, product: Callable[[Pencil], Callable[[Array], Array]]) -> NDArray[Any]:
-        """(n, k): an operator times every shape."""
-        times = product(self.linear.pencil)
-        columns = [times(x.real) + (1j * times(x.imag) if np.iscomplexobj(x) else 0.0)
-                   for x in self.shapes.T]  # fmt: skip
-        return np.array(columns).reshape(len(columns), len(self.linear)).T
-
-    @cached_property
-    def participation(self) -> NDArray[Any]:
-        """(k, disturbances): how much of each shape a unit of each disturbance excites, x* W over
-        the modal mass; of accelerations of the ground the participation factors, with their sign
-        turned."""
-        pushed = np.conj(self.shapes).T @ self.linear.W
-        return np.asarray(pushed / self._units[:, None])
-
-    @property
-    def effective_mass(self) -> Array:
-        """(k, disturbances) in kg for accelerations of the ground: |x* W|^2 over the modal mass.
-        Over all undamped modes of a scene it adds up to the mass that moves."""
-        return np.asarray(np.abs(self.participation) ** 2 * self._units[:, None])
-
-    def strain(self) -> dict[str, Array]:
-        """Owner of coordinates -> (k,): its part of the elastic energy of each shape, which laws
-        of hinges and flexible bodies store; that of springs goes by the coordinates that strain
-        them.  nan where a shape strains nothing."""
-        linear = self.linear
-        works = np.real(np.conj(self.shapes) * (linear.elastic @ self.shapes))
-        total = works.sum(axis=0)
-        with np.errstate(all="ignore"):
-            shares = np.where(np.abs(total) > 0, works / total, np.nan)
-        found: dict[str, Array] = {}
-        for name, row in zip(linear.coordinates, shares, strict=True):
-            owner = name.rpartition(".")[0]
-            found[owner] = found.get(owner, 0.0) + row
-        return found
-
-    def displaced(self, k: int, amplitude: float) -> Array:
-        """q (nq,) of the state moved by `amplitude` times the real part of shape k."""
-        return self.linear.displaced(amplitude * np.real(self.shapes[:, k]))
-
-    @property
-    def growing(self) -> NDArray[np.bool_]:
-        """(k,) which of them grow by themselves."""
-        return self.eigenvalues.real > 0
-
-    @property
-    def undamped(self) -> bool:
-        """Whether there is neither damping nor gyroscopic load in them."""
-        return not np.iscomplexobj(self.shapes)
 
 
 def modes(linear: Equations, count: int | None, damped: bool | None) -> Modes:

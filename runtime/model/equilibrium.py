@@ -12,9 +12,9 @@ from mstmm.errors import NumericalFailure
 
 from ..engine.rest import Rest, Undetermined, Unsettled, at_rest
 from ..engine.rest_by_sweep import RestBySweep
+from ..engine.sizes import speed_sizes
 from ..engine.tangent import Tangent
 from ..run.system import SceneSystem
-from .sizes import speed_sizes
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled

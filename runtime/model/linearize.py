@@ -10,6 +10,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
+from ..engine.sizes import speed_sizes
 from ..linear.channels import GROUND, channel
 from ..linear.linear import Linear
 from ..linear.matrices import State, matrices
@@ -17,7 +18,6 @@ from ..run.start import initial_state
 from ..run.system import SceneSystem
 from .derivatives import Differentiation
 from .equilibrium import equilibrium, free_speeds
-from .sizes import speed_sizes
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arrays import Array, batch, one, pair, real
+from mstmm.arrays import Array, batch, numbers, one, pair, real
 from mstmm.arrays import columns as columns_of
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import NumericalFailure
@@ -26,7 +26,8 @@ from ..pack.packed import Packed
 if TYPE_CHECKING:
     from ..engine.solver import Solver
     from ..linear.linear import Linear
-    from ..linear.modes import Modes
+    from ..linear.locus import Critical, Locus
+    from ..linear.motions import Modes
     from ..result.result import Result
     from ..run.batch import BatchResult
     from .derivatives import Derivatives, Differentiation
@@ -210,6 +211,40 @@ class Model(Compiled):
         `Linear.modes`.
         """
         return self.linearize(q, u, t).modes(count, damped)
+
+    def locus(
+        self,
+        parameter: str,
+        values: ArrayLike,
+        count: int | None = None,
+        *,
+        damped: bool | None = None,
+    ) -> Locus:
+        """Natural motions at rest over a number of the scene, named as in `with_parameters`: its
+        root locus, or Campbell's diagram where it is a spin ("constants.spin" in a drive).
+
+        Raises SceneError for an unknown name or values (m,) that make no sense, NumericalFailure
+        where there is no equilibrium.
+        """
+        from ..linear.locus import traced
+
+        return traced(
+            self._linear_at(parameter), parameter, numbers("values", values), count, damped
+        )
+
+    def critical(self, parameter: str, stable: float, unstable: float) -> Critical:
+        """Where between two values of a number of the scene a motion near rest begins to grow: the
+        buckling load, the speed of flutter.  By bisection; of several places one is found.
+
+        Raises SceneError for an unknown name, or ends that are not stable and unstable.
+        """
+        from ..linear.locus import critical
+
+        ends = real("stable", stable), real("unstable", unstable)
+        return critical(self._linear_at(parameter), parameter, *ends)
+
+    def _linear_at(self, parameter: str) -> Callable[[float], Linear]:
+        return lambda value: self.with_parameters({parameter: value}).linearize(disturbances=())
 
     def derivatives(
         self,

@@ -10,10 +10,10 @@ import typer
 from mstmm.defaults import ADVICE_SAMPLES, CHART_BUDGET, CHART_ERROR, CHART_ROUNDS
 from mstmm.errors import SceneError
 
+from ..options import Budget, Elements, Json, Rounds, at_least, finite, output_file, positive
+from ..progress import bar
+from ..simulate import compiled, use_files
 from .chart import follow
-from .options import Budget, Elements, Json, Rounds, at_least, finite, output_file, positive
-from .progress import bar
-from .simulate import compiled, use_files
 
 if TYPE_CHECKING:
     from mstmm.runtime.advice.record import Advice
@@ -52,7 +52,7 @@ def advise(
     json: Json = False,
 ) -> None:  # fmt: skip
     """Advise the smallest model that suffices: what may be rigid, how many shapes, which method."""
-    from . import output
+    from .. import output
 
     file = None if write is None else output_file(write, (".toml",), "--write")
     if file is not None and file.exists() and Path(scene).exists() and file.samefile(scene):
@@ -76,7 +76,7 @@ def advise(
 def _say(made: Advice, files: list[str]) -> None:
     from mstmm.runtime.advice.tables import bodies, summary, tried
 
-    from . import output
+    from .. import output
 
     for line in summary(made):
         output.say(line)

@@ -10,10 +10,10 @@ import typer
 
 from mstmm.defaults import CHART_BUDGET, CHART_ERROR, CHART_ROUNDS, CHART_SAMPLES
 
-from .extras import install, missing
-from .options import Budget, Elements, Json, Rounds, at_least, output_folder, positive
-from .progress import Bar, bar
-from .simulate import compiled, use_files
+from ..extras import install, missing
+from ..options import Budget, Elements, Json, Rounds, at_least, output_folder, positive
+from ..progress import Bar, bar
+from ..simulate import compiled, use_files
 
 if TYPE_CHECKING:
     from mstmm.runtime.chart.chart import Chart
@@ -67,7 +67,7 @@ def chart(
     json: Json = False,
 ) -> None:  # fmt: skip
     """Chart cost against accuracy: every method over its settings, and which one to take."""
-    from . import output
+    from .. import output
 
     folder = output_folder(out, "chart.json")
     use_files(hinge or [])
@@ -108,7 +108,7 @@ def follow(shown: Bar, budget: float) -> Callable[[str], None]:
 def _say(made: Chart, files: list[str]) -> None:
     from mstmm.runtime.chart.tables import advice, levels, recommendation, told
 
-    from . import output
+    from .. import output
 
     console = output.console()
     output.say(recommendation(made))

@@ -11,7 +11,7 @@ from mstmm.arrays import Array
 from ..flexible.sizes import modal_sizes, radius_of_gyration
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
+    from .compiled import Compiled
 
 
 def speed_sizes(model: Compiled) -> Array:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import Json, output_folder
+from ..options import Json, output_folder
 
 if TYPE_CHECKING:
     from mstmm.atlas.atlas import Atlas
@@ -34,8 +34,8 @@ def stability(
         raise typer.BadParameter("give the folder of the pictures, --out DIR, or --list")
     from mstmm.atlas import cases
 
-    from . import output
-    from .extras import install, missing
+    from .. import output
+    from ..extras import install, missing
 
     cases.chosen(case)  # before a folder is made
     folder, lacking = output_folder(out, "atlas.json"), missing("plot")
@@ -53,7 +53,7 @@ def stability(
 def _list(wanted: list[str] | None, json: bool) -> None:
     from mstmm.atlas import cases
 
-    from . import output
+    from .. import output
 
     found = cases.chosen(wanted)
     if json:
@@ -72,7 +72,7 @@ def _list(wanted: list[str] | None, json: bool) -> None:
 def _found(wanted: list[str] | None) -> Atlas:
     from mstmm.atlas.atlas import stability as measured
 
-    from .progress import bar
+    from ..progress import bar
 
     with bar() as shown:
 
@@ -86,7 +86,7 @@ def _found(wanted: list[str] | None) -> Atlas:
 def _tell(atlas: Atlas) -> None:
     from mstmm.atlas.page import frontier, held_to, in_unit, limit
 
-    from . import output
+    from .. import output
 
     columns = ("case", "parameter", "fails", "limit>", "remedy", "holds to>")
     rows = [

@@ -1,0 +1,1 @@
+"""Commands that ask more of a scene than one run."""

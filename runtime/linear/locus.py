@@ -1,0 +1,146 @@
+"""Natural motions along a parameter of a scene, and the value at which a scene loses its stability.
+
+The motions are paired from one to the next by their eigenvalues and
+shapes, so that curves may cross: with the spin of a shaft they are Campbell's diagram, with any
+other number of the scene its root locus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from mstmm.arrays import Array, Integers
+from mstmm.errors import NumericalFailure, SceneError
+
+from .motions import Complex, Modes
+
+if TYPE_CHECKING:
+    from .linear import Linear
+
+#: A scene made linear at a value of its parameter.
+At = Callable[[float], "Linear"]
+
+#: How near a critical value is found, in parts of the range that is searched.
+_NEAR = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Locus:
+    """Motions over a parameter: `values` (m,), `eigenvalues` (m, k), a column for each motion; nan
+    where it is not among those of its value."""
+
+    parameter: str
+    values: Array
+    eigenvalues: Complex = field(repr=False)
+
+    @property
+    def frequency(self) -> Array:
+        """(m, k), Hz."""
+        return np.abs(self.eigenvalues.imag) / (2 * np.pi)
+
+    @property
+    def growth(self) -> Array:
+        """(m, k), 1/s; negative of what decays."""
+        return np.asarray(self.eigenvalues.real)
+
+    def plot(self, path: str | Path | None = None, orders: Sequence[float] = ()) -> Any:
+        """`matplotlib.figure.Figure`: frequencies and growth over the parameter, with lines at
+        `orders` times a parameter that is a spin in rad/s; written to `path` where it is given.
+
+        Raises EnvironmentFailure without the extra `plot`.
+        """
+        from .pictures import locus
+
+        to = None if path is None else Path(path)
+        return locus(self.parameter, self.values, self.eigenvalues, to, orders)
+
+
+def traced(at: At, parameter: str, values: Array, count: int | None, damped: bool | None) -> Locus:
+    """Motions at each value, those that go on in one column."""
+    if values.ndim != 1 or not values.size or not np.isfinite(values).all():
+        raise SceneError(f"values: expected one finite number or more, found shape {values.shape}")
+    found: list[Modes] = []
+    for value in values.tolist():
+        found.append(at(value).modes(count, damped))
+    width = max(len(one) for one in found)
+    rows = np.full((len(found), width), np.nan + 0j)
+    order: Integers = np.arange(len(found[0]))
+    rows[0, order] = found[0].eigenvalues
+    for row, (before, now) in enumerate(pairwise(found), start=1):
+        order = _paired(before, now, order, width)
+        rows[row, order] = now.eigenvalues
+    return Locus(parameter, values, rows)
+
+
+def _paired(before: Modes, now: Modes, order: Integers, width: int) -> Integers:
+    """The column of each motion: of the one before that it is most like."""
+    apart = np.abs(before.eigenvalues[:, None] - now.eigenvalues[None, :])
+    apart /= np.maximum(1e-300, np.maximum(before.omega[:, None], now.omega[None, :]))
+    unit = [x / np.linalg.norm(x, axis=0) for x in (before.shapes, now.shapes)]
+    unlike = 1 - np.abs(np.conj(unit[0]).T @ unit[1])
+    rows, columns = linear_sum_assignment(apart + unlike)
+    places = np.full(len(now), -1)
+    places[columns] = order[rows]
+    spare = iter(sorted(set(range(width)) - set(places.tolist())))
+    return np.array([next(spare) if place < 0 else place for place in places])
+
+
+@dataclass(frozen=True)
+class Critical:
+    """The value of a parameter beyond which a motion grows; `kind` is "divergence" (a stiffness is
+    lost, as in buckling) or "flutter", `frequency` in Hz."""
+
+    parameter: str
+    value: float
+    kind: str
+    frequency: float
+    moving: tuple[str, ...]
+
+
+def critical(at: At, parameter: str, low: float, high: float) -> Critical:
+    """An edge between `low`, where no motion grows, and `high`, where one does, by
+    bisection; of several edges between them one is found.
+
+    Raises SceneError where the ends are not so.
+    """
+    growing = [_growing(at, value) for value in (low, high)]
+    if growing[0] is not None:
+        raise SceneError(
+            f"{parameter} = {low:g}: a motion grows there already; expected a value at which the "
+            "scene is stable"
+        )
+    if growing[1] is None:
+        raise SceneError(
+            f"{parameter} = {high:g}: no motion grows there; expected a value beyond the critical"
+        )
+    last, span = growing[1], high - low
+    while abs(high - low) > _NEAR * abs(span):
+        middle = (low + high) / 2
+        if middle in (low, high):
+            break
+        found = _growing(at, middle)
+        low, high, last = (middle, high, last) if found is None else (low, middle, found)
+    value, names = last
+    kind = "divergence" if value.imag == 0 else "flutter"
+    return Critical(parameter, (low + high) / 2, kind, abs(value.imag) / (2 * np.pi), names)
+
+
+def _growing(at: At, value: float) -> tuple[complex, tuple[str, ...]] | None:
+    """The motion that grows most and what it moves; a scene without rest counts as one that does
+    not stand."""
+    try:
+        linear = at(value)
+    except NumericalFailure:
+        return 0j, ()
+    modes = linear.modes()
+    k = int(modes.eigenvalues.real.argmax())
+    if modes.eigenvalues[k].real <= 0:
+        return None
+    return complex(modes.eigenvalues[k]), tuple(modes.moving(k))

@@ -1,0 +1,73 @@
+"""Pictures of linear models: motions over a parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+from mstmm.extras import missing
+
+from ..host.files import replacing
+
+_FORMATS = (".png", ".svg", ".pdf")
+
+
+def figure(height: float = 4.5) -> Any:
+    """An empty figure.  EnvironmentFailure without the extra."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise missing("plot", "a picture", error) from None
+    return Figure(figsize=(7.5, height), layout="constrained")
+
+
+def write(made: Any, path: Path | None) -> None:
+    """The figure into a file; its ending says how.  SceneError for another ending."""
+    if path is None:
+        return
+    if path.suffix.lower() not in _FORMATS:
+        raise SceneError(f'picture "{path}": expected a name ending in {", ".join(_FORMATS)}')
+    with replacing(path) as temporary:
+        made.savefig(temporary, dpi=150, format=path.suffix[1:].lower())
+
+
+def locus(
+    parameter: str, x: Array, eigenvalues: NDArray[Any], path: Path | None, orders: Sequence[float]
+) -> Any:
+    """Frequencies above, growth below; what grows is red."""
+    made = figure(6.0)
+    above, below = made.subplots(2, 1, sharex=True, height_ratios=[2, 1])
+    frequencies = np.abs(eigenvalues.imag) / (2 * np.pi)
+    for frequency, growth in zip(frequencies.T, eigenvalues.real.T, strict=True):
+        (line,) = above.plot(x, frequency, color="0.25", lw=1.2)
+        below.plot(x, growth, color=line.get_color(), lw=1.2)
+        unstable = growth > 0
+        above.plot(x[unstable], frequency[unstable], ".", color="tab:red", ms=4)
+        below.plot(x[unstable], growth[unstable], ".", color="tab:red", ms=4)
+    top = np.nanmax(frequencies, initial=0.0)
+    for order in orders:
+        above.plot(x, order * x / (2 * np.pi), color="tab:blue", lw=0.8, ls="--")
+        inside = x[order * x / (2 * np.pi) <= 1.02 * top]
+        if len(inside):
+            above.annotate(
+                f"{order:g}x", (inside[-1], order * inside[-1] / (2 * np.pi)), color="tab:blue",
+                fontsize=8, ha="left", va="center", xytext=(4, 0), textcoords="offset points",
+            )  # fmt: skip
+    above.set_ylim(0, 1.05 * top if top > 0 else None)
+    above.set_ylabel("frequency in Hz")
+    below.axhline(0, color="0.7", lw=0.8)
+    if not eigenvalues.real.any():
+        below.set_ylim(-1, 1)
+    below.set_ylabel("growth in 1/s")
+    below.set_xlabel(parameter)
+    for axis in (above, below):
+        axis.grid(alpha=0.3)
+        axis.spines[["top", "right"]].set_visible(False)
+    write(made, path)
+    return made
