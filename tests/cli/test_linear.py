@@ -1,0 +1,78 @@
+"""`mstmm linearize` and `mstmm modes`."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from cli.commands import Command
+
+#: Of the rod that hangs: half its weight over its inertia.
+OMEGA = math.sqrt(9.81 * 0.5 / 0.334)
+
+
+def test_modes_are_told_and_written(mstmm: Command, folder: Path) -> None:
+    done = mstmm("modes", "pendulum.toml", "--set", "pivot.law.damping[0]=0", "-o", "modes.csv")
+    assert done.code == 0, done.err
+    assert f"{OMEGA:.6g}" in done.out and "pivot.angle" in done.out
+    assert "none is missing" in done.out and "written: modes.csv" in done.out
+    head, row = (folder / "modes.csv").read_text().splitlines()
+    assert head.split(",")[:2] == ["mode", "omega [rad/s]"] and head.endswith("pivot.angle")
+    assert float(row.split(",")[1]) == pytest.approx(OMEGA)
+
+
+def test_matrices_are_told_and_written(mstmm: Command, folder: Path) -> None:
+    done = mstmm("linearize", "pendulum.toml", "-i", "pivot.effort", "-o", "linear.csv")
+    assert done.code == 0, done.err
+    assert "coordinates 1, inputs 1, disturbances 3" in done.out
+    rows = [line.split(",") for line in (folder / "linear.csv").read_text().splitlines()]
+    numbers = {(m, row, column): float(value) for m, row, column, value in rows[1:]}
+    assert numbers["M", "pivot.angle", "pivot.angle"] == pytest.approx(0.334)
+    assert numbers["V", "pivot.angle", "pivot.effort"] == 1.0
+    assert ("elastic", "pivot.angle", "pivot.angle") not in numbers
+
+
+def test_json_of_both(mstmm: Command) -> None:
+    modes = json.loads(mstmm("modes", "pendulum.toml", "--json", "--count", "5").out)
+    assert modes["omega"] == [pytest.approx(OMEGA)] and modes["complete"] is True
+    linear = json.loads(mstmm("linearize", "pendulum.toml", "--json", "--at-start").out)
+    assert linear["K"][0][0] == pytest.approx(-9.81 * 0.5 * math.sin(0.3))
+    assert "does not last" in linear["warnings"][0]
+
+
+def test_netcdf_of_both(mstmm: Command) -> None:
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    assert mstmm("modes", "pendulum.toml", "-o", "modes.nc").code == 0
+    assert mstmm("linearize", "pendulum.toml", "-o", "linear.nc").code == 0
+    with xarray.open_dataset("modes.nc", engine="h5netcdf") as data:
+        assert float(data.omega[0]) == pytest.approx(OMEGA)
+    with xarray.open_dataset("linear.nc", engine="h5netcdf") as data:
+        found = data.W.sel(coordinate="pivot.angle", disturbance="ground.acceleration.x")
+        assert float(found) == pytest.approx(-0.5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["linearize", "pendulum.toml", "-i", "pivot.efort"], 'did you mean "pivot.effort"'),
+        (["modes", "pendulum.toml", "--set", "pivot.law"], "expected NAME=VALUE"),
+        (["modes", "pendulum.toml", "--set", "rod.mas=2"], "rod.mass"),
+        (["modes", "pendulum.toml", "--count", "0"], "--count"),
+        (["modes", "pendulum.toml", "-o", "modes.txt"], ".nc or .csv"),
+        (["modes", "none.toml"], "none.toml"),
+    ],
+)
+def test_bad_input_is_told_in_a_line(mstmm: Command, arguments: list[str], expected: str) -> None:
+    done = mstmm(*arguments)
+    assert done.code == 2 and expected in done.err and "Traceback" not in done.err
+
+
+def test_no_rest_is_a_numerical_failure(mstmm: Command, folder: Path) -> None:
+    text = (folder / "pendulum.toml").read_text() + "law = { effort = 100.0 }\n"
+    (folder / "driven.toml").write_text(text)
+    done = mstmm("modes", "driven.toml")
+    assert done.code == 4 and "no equilibrium" in done.err
