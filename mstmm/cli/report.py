@@ -18,10 +18,9 @@ _STRETCHES = 6
 
 def sizes(result: Result) -> str:
     """3 bodies on 3 hinges, 7 degrees of freedom, 2 driven."""
-    from mstmm.runtime.model.equilibrium import free_speeds
 
     model, bodies = result.model, len(result.model.scene.skeleton.bodies)
-    free, driven = len(free_speeds(model)), len(model.packed.system.driven)
+    free, driven = len(model.free_speeds), len(model.packed.system.driven)
     held = model.nu - free - driven
     parts = [
         f"{count(bodies, 'body', 'bodies')} on {count(len(model.scene.hinges), 'hinge')}",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import Any, Self
 
 from mstmm.scene import Scene
@@ -75,6 +76,34 @@ class Compiled:
     def flexible(self) -> Mapping[str, ModalBody]:
         """Numbers of the flexible bodies by their names: modes, moments, stiffness, ports."""
         return self.packed.flexible
+
+    @cached_property
+    def free_speeds(self) -> tuple[int, ...]:
+        """Places in u of the speeds that no drive imposes."""
+        free = list[int]()
+        for number, hinge in enumerate(self.packed.scene.hinges):
+            slots = self.layout.slots(number)
+            drive = hinge.drive or (None,) * slots.nu
+            if not hinge.is_weld:
+                free += [slots.u + k for k in range(slots.nu) if drive[k] is None]
+        for slots in self.layout.modal.values():
+            free += range(slots.u, slots.u + slots.nu)
+        return tuple(free)
+
+    @cached_property
+    def increments(self) -> tuple[tuple[str, str], ...]:
+        """Name and unit of the tangent increment of every free speed: of the coordinate where its
+        rate is the speed."""
+        found = list[tuple[str, str]]()
+        for speed in self.free_speeds:
+            slots = self.layout.hinge_of_speed(speed)
+            k = speed - slots.u
+            if slots.straight:
+                found.append((f"{slots.name}.{slots.q_names[k]}", slots.q_units[k]))
+            else:
+                unit = slots.u_units[k].removesuffix("/s")
+                found.append((f"{slots.name}.{slots.u_names[k]}_increment", unit))
+        return tuple(found)
 
     @property
     def nq(self) -> int:

@@ -58,6 +58,13 @@ class Tangent:
         self._call("residual_slope", float(d_t), d_q, d_u, d_a, found)
         return found
 
+    def slopes(self, d_q: Array, d_u: Array, d_a: Array) -> Array:
+        """Derivatives (n, nu) of R along n directions, rows of coordinates (n, nq), speeds and
+        accelerations (n, nu)."""
+        found = np.empty((len(d_q), self.nu))
+        self._call("residual_slopes", len(d_q), d_q, d_u, d_a, found)
+        return found
+
     def factor(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:
         """Factor the change of R along unknowns x: du = rate x, da = s x and
         dq = (sq - kappa g_q)^-1 N x, where N u are the rates of the coordinates and g_q their

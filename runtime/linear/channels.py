@@ -56,9 +56,9 @@ def channel(model: Compiled, name: str) -> Channel:
     Raises SceneError for a name that is none of these.
     """
     owner, _, last = name.rpartition(".")
-    ends = References(model.scene.skeleton)
     if name in GROUND:
         return Channel(name, "m/s2", axis=_AXES.index(last))
+    ends = References(model.scene.skeleton)
     if last.startswith("effort") and owner in model.layout.hinges:
         return _effort(model, name, owner, last)
     for letter, (kind, unit) in _KINDS.items():

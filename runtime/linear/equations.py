@@ -34,8 +34,6 @@ class Equations:
     Attributes:
         model: whose motion it is.
         state: t (s), q (nq,), u (nu,) and a (nu,), the accelerations there.
-        free: places of x among the speeds.
-        coordinates, units: names of x, and their units.
         controls, others: where v and w push.
         turning: (n, n) G of x' = G x + du, how increments of coordinates that are no integrals of
             speeds go along with the motion; None where they do not.
@@ -43,15 +41,27 @@ class Equations:
 
     model: Compiled
     state: State
-    free: tuple[int, ...]
-    coordinates: tuple[str, ...] = field(repr=False)
-    units: tuple[str, ...] = field(repr=False)
     controls: tuple[Channel, ...] = ()
     others: tuple[Channel, ...] = ()
     turning: Array | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.free)
+
+    @property
+    def free(self) -> tuple[int, ...]:
+        """Places of x among the speeds."""
+        return self.model.free_speeds
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of x."""
+        return tuple(name for name, _ in self.model.increments)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of x."""
+        return tuple(unit for _, unit in self.model.increments)
 
     # --- matrices ---------------------------------------------------------------------------------
 

@@ -42,18 +42,13 @@ class Matrices:
 
 def matrices(engine: Engine, state: State, free: list[int]) -> Matrices:
     """The matrices of a packed scene.  NumericalFailure where the state cannot be evaluated."""
-    tangent, nu = Tangent(engine), engine.nu
-    units = np.eye(nu)[free]
+    tangent, n, nu = Tangent(engine), len(free), engine.nu
+    units = np.zeros((n, nu))
+    units[np.arange(n), free] = 1.0
     moves = [tangent.rates(state.q, unit) for unit in units]
     tangent.residual(state.t, state.q, state.u, state.a)
-    no_q, no_u = np.zeros(engine.nq), np.zeros(nu)
-
-    def columns(directions: list[tuple[Array, Array, Array]]) -> Array:
-        found = [tangent.slope(0.0, *direction)[free] for direction in directions]
-        return np.array(found).reshape(len(free), len(free)).T
-
-    return Matrices(
-        M=columns([(no_q, no_u, unit) for unit in units]),
-        C=columns([(no_q, unit, no_u) for unit in units]),
-        K=columns([(move, no_u, no_u) for move in moves]),
-    )
+    d_q, d_u, d_a = np.zeros((3 * n, engine.nq)), np.zeros((3 * n, nu)), np.zeros((3 * n, nu))
+    d_a[:n], d_u[n : 2 * n] = units, units
+    d_q[2 * n :] = np.array(moves).reshape(n, engine.nq)
+    m, c, k = np.split(tangent.slopes(d_q, d_u, d_a)[:, free], 3)
+    return Matrices(m.T, c.T, k.T)

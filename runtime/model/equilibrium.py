@@ -41,7 +41,7 @@ class Equilibrium(np.ndarray[Any, np.dtype[np.float64]]):
 
 def equilibrium(model: Compiled, q: Array, t: float, tolerance: float) -> Equilibrium:
     """q at which the free coordinates need no effort at rest; see `Model.equilibrium`."""
-    free = free_speeds(model)
+    free = list(model.free_speeds)
     problem = _problem(model, t, free)
     try:
         if len(free) > _DENSE:
@@ -69,7 +69,7 @@ def equilibrium(model: Compiled, q: Array, t: float, tolerance: float) -> Equili
 def _by_sweep(model: Compiled, q: Array, t: float, tolerance: float) -> Array:
     """Rest of many bodies; `Unsettled` has the efforts of all free speeds."""
     engine, still = model.looped, np.zeros((1, model.nu))
-    memory, free = engine.start_memory(), free_speeds(model)
+    memory, free = engine.start_memory(), list(model.free_speeds)
     times, scene = np.array([t]), SceneSystem(engine)
 
     def acceleration(q: Array) -> Array:
@@ -83,18 +83,6 @@ def _by_sweep(model: Compiled, q: Array, t: float, tolerance: float) -> Array:
         return rest.find(q, tolerance)
     except Unsettled as failure:
         raise Unsettled(str(failure), failure.residual[free]) from None
-
-
-def free_speeds(model: Compiled) -> list[int]:
-    """Speeds that no drive prescribes."""
-    free = []
-    for number, hinge in enumerate(model.packed.scene.hinges):
-        slots = model.layout.slots(number)
-        drive = hinge.drive or (None,) * slots.nu
-        free += [slots.u + k for k in range(slots.nu) if drive[k] is None and not hinge.is_weld]
-    for slots in model.layout.modal.values():
-        free += range(slots.u, slots.u + slots.nu)
-    return free
 
 
 def _problem(model: Compiled, t: float, free: list[int]) -> Rest:

@@ -17,7 +17,7 @@ from ..linear.matrices import State, matrices
 from ..run.start import initial_state
 from ..run.system import SceneSystem
 from .derivatives import Differentiation
-from .equilibrium import equilibrium, free_speeds
+from .equilibrium import equilibrium
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
@@ -40,12 +40,8 @@ def linearize(
     pushes = tuple(channel(model, name) for name in inputs)
     named = GROUND if disturbances is None else disturbances
     others = tuple(channel(model, name) for name in named)
-    state, free = _state(model, q, u, t), free_speeds(model)
-    about = [_increment(model, j) for j in free]
-    return Linear(
-        model, state, tuple(free), tuple(name for name, _ in about), tuple(x for _, x in about),
-        pushes, others, _turning(model, state, free),
-    )  # fmt: skip
+    state = _state(model, q, u, t)
+    return Linear(model, state, pushes, others, _turning(model, state))
 
 
 def _state(model: Compiled, q: Array | None, u: Array | None, t: float) -> State:
@@ -74,7 +70,7 @@ def _rest(model: Compiled, t: float) -> Array:
 
 def _at_rest(model: Compiled, q: Array, t: float) -> bool:
     """Whether what is missing at a state is rounding beside the stiffness that there is."""
-    free, still = free_speeds(model), np.zeros(model.nu)
+    free, still = list(model.free_speeds), np.zeros(model.nu)
     sizes = speed_sizes(model)[free]
     engine = model.looped
     missing = engine.inverse_dynamics(t, q, still, still, engine.start_memory())[free] * sizes
@@ -83,20 +79,10 @@ def _at_rest(model: Compiled, q: Array, t: float) -> bool:
     return float(np.abs(missing).max(initial=0)) <= _AT_REST * scale
 
 
-def _increment(model: Compiled, speed: int) -> tuple[str, str]:
-    """Name and unit of a tangent increment: of the coordinate, where its rate is the speed."""
-    slots = model.layout.hinge_of_speed(speed)
-    k = speed - slots.u
-    if slots.straight:
-        return f"{slots.name}.{slots.q_names[k]}", slots.q_units[k]
-    return f"{slots.name}.{slots.u_names[k]}_increment", slots.u_units[k].removesuffix("/s")
-
-
-def _turning(model: Compiled, state: State, free: list[int]) -> Array | None:
+def _turning(model: Compiled, state: State) -> Array | None:
     """See `Linear.turning`; exact."""
-    curved = any(not slots.straight for slots in model.layout.hinges.values() if slots.nu)
-    if not curved or not state.u.any():
+    if not state.u.any() or all(h.straight for h in model.layout.hinges.values() if h.nu):
         return None
     of = np.array([[state.t]]), state.q[None], state.u[None], np.zeros((1, model.nu))
     found = Differentiation(model, ()).at(*of)["rate_q"][0]
-    return np.asarray(found[np.ix_(free, free)])
+    return np.asarray(found[np.ix_(model.free_speeds, model.free_speeds)])
