@@ -25,6 +25,8 @@ class Pencil:
         self.state, self._nothing = state, np.zeros(engine.nu)
         self.tangent.allow_negative()
         self._no_q = np.zeros(engine.nq)
+        self._inertia = engine.inertia_alone
+        self._strained = self._required(self._nothing)
         self._begin()
 
     def __len__(self) -> int:
@@ -40,8 +42,13 @@ class Pencil:
         return whole
 
     def mass(self, x: Array) -> Array:
-        """M x."""
-        return self.tangent.slope(0.0, self._no_q, self._nothing, self._full(x))[self.free]
+        """M x: the efforts of inertia alone, at rest."""
+        return self._required(self._full(x)) - self._strained
+
+    def _required(self, a: Array) -> Array:
+        engine, state = self._inertia, self.state
+        memory = self.tangent.memory
+        return engine.inverse_dynamics(state.t, state.q, self._nothing, a, memory)[self.free]
 
     def damping(self, x: Array) -> Array:
         """C x."""
