@@ -29,6 +29,7 @@ from ..runtime.pack.structure import structure_of
 
 if TYPE_CHECKING:
     from ..derive.fuse.scene import Fused
+    from ..runtime.engine.live import Places
     from ..runtime.pack.elements import Known
     from ..runtime.pack.packed import Packed
 
@@ -56,7 +57,8 @@ PRINTERS = {
 
 
 class Fusion:
-    """Fused libraries of one packed scene; `numbers` is the vector p that they read."""
+    """Fused libraries of one packed scene; `numbers` is the vector p that they read, `inputs` where
+    inputs stand in it."""
 
     def __init__(
         self,
@@ -75,8 +77,10 @@ class Fusion:
         self.implicit: FusedLibrary | None = None
         self.note = ""
         self._insisted = False  # engine="fused": batches too
+        self.inputs: Places = ()
         if not self.obstacle:
             self.structure, self.numbers = structure_of(packed.system, known, bake)
+            self.inputs = self.structure.inputs
 
     def find(self) -> FusedLibrary | None:
         """The scalar library if it is in the cache; no compiler is started."""

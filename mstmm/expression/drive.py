@@ -9,19 +9,22 @@ from ..errors import ExpressionError
 from ..ir import OPERATIONS
 from ..ir.graph import Graph, Node
 from ..ir.tangent import derivative
-from .expression import Expression
+from .expression import Expression, Name
+from .inputs import Inputs, Resolved
 
 #: Longest numerator or denominator of a constant; fractions are stored as decimal text.
 _MAX_BITS = 12_000
 
 
-def motion(drive: Expression, time: Node) -> tuple[Node, Node, Node]:
+def motion(
+    drive: Expression, time: Node, resolve: Callable[[Name], Node] | None = None
+) -> tuple[Node, Node, Node]:
     """Position, speed and acceleration of a drive as nodes of the graph of `time`.
 
-    The drive may depend on `t` alone.  Derivatives are exact on every smooth piece.  Raises
-    ExpressionError where their constants cannot be stored.
+    The drive depends on `t` and on what `resolve` gives, functions of `time` too.  Derivatives are
+    exact on every smooth piece.  Raises ExpressionError where their constants cannot be stored.
     """
-    position = drive.build(time.graph, lambda _: time)
+    position = drive.build(time.graph, (lambda _: time) if resolve is None else resolve)
     speed = derivative(position, {time: 1})
     acceleration = derivative(speed, {time: 1})
     for node in (position, speed, acceleration):
@@ -55,33 +58,37 @@ def _refuse_long_constants(root: Node, drive: Expression) -> None:
             ) from None
 
 
-def motion_at(drive: Expression, t: float) -> tuple[float, float, float]:
-    """(position, speed, acceleration) of a drive at time t in double precision.
+def motion_at(
+    drive: Expression, t: float, inputs: Inputs | None = None
+) -> tuple[float, float, float]:
+    """(position, speed, acceleration) of a drive at time t in double precision; `inputs` are those
+    that it may name.
 
     An entry is nan or infinite where the mathematics has no finite value.
     """
-    q, u, a = (_at(node, t) for node in motion(drive, Graph().element("t")))
+    resolved = Resolved(Graph().element("t"), inputs or {})
+    nodes = motion(drive, resolved.time, resolved.node)
+    q, u, a = (value(node, resolved.leaf(t)) for node in nodes)
     return q, u, a
-
-
-def _at(node: Node, t: float) -> float:
-    return value(node, lambda _: t)
 
 
 #: A drive may jump by no more than this share of its own size, in position and in speed.
 _CONTINUOUS = 1e-6
 
 
-def jump(drive: Expression, gaps: Iterable[tuple[float, float]]) -> str:
+def jump(
+    drive: Expression, gaps: Iterable[tuple[float, float]], inputs: Inputs | None = None
+) -> str:
     """What jumps first across gaps (before, after) in time, in s; "" if nothing does.
 
     A position that jumps is no motion, a speed that jumps needs an impulse, and neither has a
     finite effort.
     """
-    nodes = motion(drive, Graph().element("t"))[:2]
+    resolved = Resolved(Graph().element("t"), inputs or {})
+    nodes = motion(drive, resolved.time, resolved.node)[:2]
     for gap in gaps:
         for what, node in zip(("position", "speed"), nodes, strict=True):
-            a, b = (_at(node, t) for t in gap)
+            a, b = (value(node, resolved.leaf(t)) for t in gap)
             if abs(b - a) > _CONTINUOUS * max(1.0, abs(a), abs(b)):
                 return (
                     f"jumps in {what} at t = {gap[0]:g} s, from {a:g} to {b:g}; "

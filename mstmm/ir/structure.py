@@ -149,6 +149,8 @@ class Structure:
     drives: ExpressionStructure | None = None
     driven: tuple[tuple[int, int], ...] = ()
     elements: Mapping[Key, str] = field(default_factory=dict)  #: hashes of users' elements
+    #: (place among the numbers of inputs, place in p) of those that are read: they change with time
+    inputs: tuple[tuple[int, int], ...] = field(default=(), repr=False, compare=False)
 
     def identity(self) -> str:
         """SHA-256 over everything that decides the fused code, kernels of mstmm itself aside."""

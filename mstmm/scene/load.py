@@ -18,7 +18,8 @@ def load_scene(
 ) -> Scene:
     """Read and validate a scene file (.toml or .json).
 
-    Relative paths in it start from its folder; no file that it names is opened.
+    Relative paths in it start from its folder.  Of the files that it names the numbers of signals
+    are read, from no other folder.
 
     `known_types` maps (kind, name), kind one of hinge, body, force, to the definitions of users'
     types.  When it is given every type must be built in or in it; without it types that are not

@@ -7,7 +7,7 @@ raises SceneError, one line per problem.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextvars import ContextVar
 from typing import Any
 
@@ -47,7 +47,7 @@ class Scene(SceneTables):
             found = [(("constants", *place), message) for place, message in refused.problems]
             raise report(found, data, _source.get()) from None
         try:
-            with written.known(constants):
+            with written.known(constants, _names(data)):
                 super().__init__(**data)
         except ValidationError as error:
             raise scene_error(error, type(self), data, _source.get()) from None
@@ -91,7 +91,8 @@ class Scene(SceneTables):
         """
         problems = types.problems(self, known_types)
         if not problems:
-            problems = types.learn(self, known_types) + list(flexible.spins(self))
+            with written.known(self.constants, self.channels):
+                problems = types.learn(self, known_types) + list(flexible.spins(self))
         if problems:
             raise report(problems, self._tables(), where)
 
@@ -108,6 +109,17 @@ class Scene(SceneTables):
         if problems:
             raise Refused(*problems)
         return self
+
+
+def _names(data: Mapping[str, Any]) -> Iterator[str]:
+    """The names of inputs and signals, of what has one."""
+    for table in ("input", "signal"):
+        elements = data.get(table, ())
+        for element in elements if isinstance(elements, (list, tuple)) else ():
+            name = element.get("name") if isinstance(element, dict) else element
+            name = getattr(name, "name", name)
+            if isinstance(name, str):
+                yield name
 
 
 def _named(table: str, elements: tuple[Any, ...]) -> tuple[Any, ...]:

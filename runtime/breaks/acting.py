@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from mstmm.expression.expression import Expression
+from mstmm.expression.inputs import Inputs
 from mstmm.scene import Scene
 from mstmm.scene.tables.hinge import Hinge, HingeTable
 from mstmm.scene.tables.loads import Spring
@@ -18,7 +19,7 @@ class Acting:
 
     `hinges` are the numbers of the hinges whose own q, u and parameters it names; `spring` is the
     one whose length it reads.  Of a `drive` the second derivative acts; a `condition` (an event or
-    a release) acts by becoming true.
+    a release) acts by becoming true.  `inputs` are those it names, signals too.
     """
 
     expression: Expression
@@ -28,11 +29,20 @@ class Acting:
     drive: bool = False
     condition: bool = False
     constants: tuple[tuple[str, float], ...] = field(default=())
+    inputs: tuple[str, ...] = ()
 
 
 def acting(scene: Scene) -> list[Acting]:
     """All that are not constant, in the order of the file."""
-    return [one for one in _all(scene) if not one.expression.is_constant]
+    inputs = scene.channels
+    return [_with(one, inputs) for one in _all(scene) if not one.expression.is_constant]
+
+
+def _with(one: Acting, inputs: Inputs) -> Acting:
+    """The same with the inputs it names, of which those that stand still are constants."""
+    used = {n.text: inputs[n.text] for n in one.expression.names if n.text in inputs}
+    still = ((name, channel.value(0.0)) for name, channel in used.items() if channel.stands)
+    return replace(one, constants=(*one.constants, *still), inputs=tuple(used)) if used else one
 
 
 def _all(scene: Scene) -> Iterator[Acting]:
@@ -67,7 +77,8 @@ def _of_hinge(hinge: HingeTable, what: str, numbers: Sequence[int]) -> Iterator[
 def owners(one: Acting, hinges: Hinges) -> Iterator[Hinge | None]:
     """The hinges whose own names an expression means: every one where it reads their q and u, else
     the first alone, for all."""
-    own = any(len(name.parts) == 1 and name.text != "t" for name in one.expression.names)
+    common = ("t", *one.inputs)
+    own = any(len(n.parts) == 1 and n.text not in common for n in one.expression.names)
     for number in one.hinges if own else one.hinges[:1]:
         yield hinges[number]
     if not one.hinges:

@@ -8,6 +8,7 @@ looked for over the whole run: every time at which an expression switches (a com
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -16,6 +17,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.expression.drive import jump
+from mstmm.expression.inputs import Inputs
 from mstmm.risk import Risk
 
 from .acting import Acting
@@ -59,8 +61,11 @@ class TimeMap:
         )  # fmt: skip
 
 
-def time_map(expressions: Iterable[Acting], start: float, end: float) -> TimeMap:
-    """The map of all expressions for a run from `start` to `end` (s).
+def time_map(
+    expressions: Iterable[Acting], start: float, end: float, inputs: Inputs | None = None
+) -> TimeMap:
+    """The map of all expressions for a run from `start` to `end` (s); `inputs` are what they may
+    name, whose knots are breaks.
 
     Raises SceneError for a drive that jumps on the way.
     """
@@ -68,18 +73,23 @@ def time_map(expressions: Iterable[Acting], start: float, end: float) -> TimeMap
         return TimeMap(np.zeros(0), np.zeros(0), np.zeros(0))
     once = {(e.expression, e.constants, e.drive): e for e in reversed(list(expressions))}
     with np.errstate(all="ignore"):
-        return _mapped(list(reversed(once.values())), start, end)
+        return _mapped(list(reversed(once.values())), start, end, inputs or {})
 
 
-def _mapped(expressions: list[Acting], start: float, end: float) -> TimeMap:
+def _mapped(expressions: list[Acting], start: float, end: float, inputs: Inputs) -> TimeMap:
     breaks, paces, notes = set[float](), list[tuple[Pace, str]](), list[Risk]()
     for one in expressions:
         view = View(one.expression, dict(one.constants), one.drive)
         breaks.update(one.expression.time_breaks())
+        knots = sorted({knot for name in one.inputs for knot in inputs[name].knots})
+        breaks.update(knots)
+        jumps = jump(one.expression, _around(knots, start, end), inputs) if one.drive else ""
+        if jumps:
+            raise SceneError(f"{one.what}: {_shown(one)} {jumps}")
         for margin in view.margins():
             found = roots(margin, start, end, view.most)
             breaks.update(found.gaps.ravel().tolist())
-            jumps = jump(one.expression, found.gaps.tolist()) if one.drive else ""
+            jumps = jump(one.expression, found.gaps.tolist(), inputs) if one.drive else ""
             if jumps:
                 raise SceneError(f"{one.what}: {_shown(one)} {jumps}")
             if not found.complete:
@@ -93,6 +103,12 @@ def _mapped(expressions: list[Acting], start: float, end: float) -> TimeMap:
     return TimeMap(
         _inside(breaks, start, end), starts, longest, narrowest, tuple(dict.fromkeys(notes))
     )
+
+
+def _around(knots: list[float], start: float, end: float) -> list[tuple[float, float]]:
+    """The numbers before and after each knot within the run."""
+    inner = [knot for knot in knots if start < knot < end]
+    return [(math.nextafter(t, -math.inf), math.nextafter(t, math.inf)) for t in inner]
 
 
 def _inside(times: set[float], start: float, end: float) -> Array:

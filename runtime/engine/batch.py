@@ -21,6 +21,7 @@ from mstmm.errors import NumericalFailure
 from ..kernels.fused import FusedLibrary
 from .code import Fusing
 from .engine import Engine
+from .live import LiveInputs
 
 #: A thread is worth starting for about 0.2 ms of work; in states times speeds.
 _LEAST_LANES, _LEAST_LOOPED = 20000, 2000
@@ -63,14 +64,16 @@ def accelerations(
     state and the hinge.
     """
     n, udot = len(states.q), np.empty((len(states.q), engine.nu))
+    live = LiveInputs(engine.packed.system.inputs, fusing.inputs)
     if not states.lead and fusing.library is not None:
-        failed = _one(engine, fusing.library, fusing.numbers, states, udot)
+        numbers = live.at(fusing.numbers, states.t).ravel()
+        failed = _one(engine, fusing.library, numbers, states, udot)
     else:
         lanes = fusing.ready_lanes(n) if states.lead and n else None
         if lanes is None:
             run, step, least = _looped(engine, states, udot), 1, _LEAST_LOOPED
         else:
-            run = _lanes(engine, lanes, fusing.numbers, states, udot)
+            run = _lanes(engine, lanes, live.at(fusing.numbers, states.t), states, udot)
             step, least = lanes.lanes, _LEAST_LANES
         smallest = -(-least // max(1, engine.nu))
         failed = in_threads(run, n, step, smallest, threads_of(threads) or processors())
@@ -117,8 +120,9 @@ def _lanes(
         part = slice(first, end)
         efforts = None if states.efforts is None else states.efforts[part]
         codes = library.many(
-            numbers, states.t[part], states.q[part], states.u[part], memory, efforts, udot[part]
-        )
+            numbers if numbers.ndim == 1 else numbers[part], states.t[part], states.q[part],
+            states.u[part], memory, efforts, udot[part],
+        )  # fmt: skip
         bad = np.flatnonzero(codes)
         if not len(bad):
             return None

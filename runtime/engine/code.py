@@ -10,6 +10,8 @@ import numpy as np
 
 from mstmm.arrays import Array
 
+from .live import Places
+
 if TYPE_CHECKING:
     from ..kernels.columns import ColumnsLibrary
     from ..kernels.fused import FusedLibrary
@@ -19,16 +21,18 @@ class Fusing(Protocol):
     """Fused libraries of a scene: `library` for one state, `lanes` for several side by side,
     `implicit` for what implicit methods ask.
 
-    `numbers` is the vector p they read; `note` says where the library came from, `obstacle` why
-    there can be none.  `ready(n)` gives a library if it is there or if n evaluations are worth a
-    compiler run; `find()` only looks; `build()` raises EnvironmentFailure where there can be none;
-    `follow(other)` takes over the libraries of the same scene with other numbers.
+    `numbers` is the vector p they read, `inputs` where inputs stand in it; `note` says where the
+    library came from, `obstacle` why there can be none.  `ready(n)` gives a library if it is there
+    or if n evaluations are worth a compiler run; `find()` only looks; `build()` raises
+    EnvironmentFailure where there can be none; `follow(other)` takes over the libraries of the same
+    scene with other numbers.
     """
 
     library: FusedLibrary | None
     lanes: FusedLibrary | None
     implicit: FusedLibrary | None
     numbers: Array
+    inputs: Places
     note: str
     obstacle: str
 
@@ -55,6 +59,7 @@ class NotFused:
     implicit: FusedLibrary | None = None
     note: str = ""
     numbers: Array = field(default_factory=lambda: np.zeros(0))
+    inputs: Places = ()
 
     def find(self) -> None:
         return None

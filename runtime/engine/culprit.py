@@ -37,7 +37,8 @@ def culprit(engine: Calls, t: float, q: Array, u: Array) -> str:
                 f"t = {t:.9g} s; no rotation is 1, 0, 0, 0"
             )
     for where, drive in _drives(scene) if evaluated.n_drives else ():
-        for kind, number in zip(("", " speed", " acceleration"), motion_at(drive, t), strict=True):
+        moves = motion_at(drive, t, scene.channels)
+        for kind, number in zip(("", " speed", " acceleration"), moves, strict=True):
             if not math.isfinite(number):
                 return _sentence(f"{where}{kind}", drive, number, t)
     for where, expression, values in _with_values(engine, t, q, u):
@@ -128,9 +129,12 @@ class _State:
         self.engine, self.t, self.q, self.u = engine, t, q, u
 
     def of(self, name: Name, own: Hinge | None) -> float:
-        """t, q and u of hinges, the own ones, parameters of the own hinge."""
+        """t, inputs, q and u of hinges, the own ones, parameters of the own hinge."""
         if name.text == "t":
             return self.t
+        inputs = self.engine.packed.described.channels
+        if name.text in inputs:
+            return inputs[name.text].value(self.t)
         if name.quantity not in ("q", "u") and own is not None:
             return own.parameters[name.quantity]
         slots = self.engine.packed.layout.hinges[name.hinge or (own.name if own else "")]

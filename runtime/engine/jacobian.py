@@ -20,6 +20,7 @@ from mstmm.ir.tangent import PREFIX, tangent
 
 from ..kernels.tape import TapeKernel
 from ..pack.structure import structure_of
+from .live import LiveInputs
 
 if TYPE_CHECKING:
     from .compiled import Compiled
@@ -43,7 +44,7 @@ class Jacobian:
     def __init__(self, model: Compiled, with_work: bool, memory: Array, rates: Rates) -> None:
         self._rates, self._memory, self._nq = rates, memory, model.nq
         self._outputs = ["qdot", "udot", *(["power"] if with_work else [])]
-        self._tape = _tape(model, self._outputs)
+        self._tape, self._numbers = _tape(model, self._outputs)
 
     @property
     def exact(self) -> bool:
@@ -63,7 +64,10 @@ class Jacobian:
         n, nq, nu = len(y), self._nq, len(y) - self._nq - (len(self._outputs) == 3)
         found = np.zeros((n, n))
         units = np.eye(nq + nu)
-        given = {"t": np.array([t]), "q": y[:nq], "u": y[nq : nq + nu], "memory": self._memory}
+        given = {
+            "p": self._numbers(t), "t": np.array([t]), "q": y[:nq], "u": y[nq : nq + nu],
+            "memory": self._memory,
+        }  # fmt: skip
         for j, unit in enumerate(units):
             directions = {PREFIX + "q": unit[:nq], PREFIX + "u": unit[nq:]}
             _, outputs = tape.run({**given, **directions})
@@ -83,17 +87,24 @@ class Jacobian:
         return np.array(columns).T
 
 
-def _tape(model: Compiled, outputs: list[str]) -> TapeKernel | None:
-    """The tangent of the equations with respect to q and u; None where there is none."""
+def _tape(
+    model: Compiled, outputs: list[str]
+) -> tuple[TapeKernel | None, Callable[[float], Array]]:
+    """The tangent of the equations with respect to q and u, None where there is none; and the
+    numbers that it reads at a time."""
     packed, known = model.packed, model.known or {}
     if packed.releases or packed.system.count > MOST_BODIES:
-        return None
+        return None, _nothing
     structure, numbers = structure_of(packed.system, known)
     try:
         kernels = model.fusion.fused(structure).kernels
     except (ElementError, EnvironmentFailure):
-        return None
+        return None, _nothing
     kernel = kernels["accelerations_power" if "power" in outputs else "accelerations"]
     tape = TapeKernel(tangent(kernel, ["q", "u"], outputs, values=False, guards=False))
-    tape.run({"p": numbers})  # stays
-    return tape
+    live = LiveInputs(packed.system.inputs, structure.inputs)
+    return tape, lambda t: live.at(numbers, np.array([t])).ravel()
+
+
+def _nothing(_: float) -> Array:
+    return np.zeros(0)

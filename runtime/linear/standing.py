@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.expression.inputs import INPUTS
 
 from ..engine.calls import Probe
 from ..engine.engine import Engine
@@ -49,8 +50,14 @@ def _values(system: System, state: State) -> Array:
     """What the expressions of a scene give at a state."""
     if system.values is None:
         return np.zeros(0)
-    given = {"t": np.array([state.t]), "q": state.q, "u": state.u}
+    given = _given(system, state)
     return TapeKernel(system.values).run(given)[1]["values"][: system.n_values].copy()
+
+
+def _given(system: System, state: State) -> dict[str, Array]:
+    """What expressions of a scene read."""
+    inputs = system.inputs_at(state.t)
+    return {"t": np.array([state.t]), "q": state.q, "u": state.u, INPUTS: inputs}
 
 
 def _dead(engine: Engine, load: LoadNumbers, values: list[float], state: State) -> LoadNumbers:
@@ -76,7 +83,7 @@ def _held(engine: Engine, spring: ForceNumbers, state: State) -> ForceNumbers:
     stiffness, rest, damping = spring.p
     effort = -stiffness * (length - rest) - damping * rate
     if spring.effort is not None:
-        given = {"t": np.array([state.t]), "q": state.q, "u": state.u}
+        given = _given(engine.packed.system, state)
         kernel = TapeKernel(spring.effort)
         effort += float(kernel.run({**given, "length": np.array([length, rate])})[1]["values"][0])
     constant = constant_kernel("effort", engine.packed.system, [effort])

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from mstmm.arrays import Array, batch
 from mstmm.errors import NumericalFailure, SceneError
 
+from ..engine.live import LiveInputs
 from ..engine.tangents import Tangents
 from ..pack.slopes import slopes
 from ..pack.structure import structure_of
@@ -70,6 +71,7 @@ class Differentiation:
         else:
             structure, self.p = structure_of(model.packed.system, known)
             self.slopes = np.zeros((len(self.p), 0))
+        self._live = LiveInputs(model.packed.system.inputs, structure.inputs)
         self.tangents = Tangents(model.fusion, structure, bool(names))
         self._memory = np.zeros(structure.n_memory)
         self._straight = all(hinge.straight for hinge in model.layout.hinges.values())
@@ -79,8 +81,8 @@ class Differentiation:
         `Derivatives`; (n, row, column), parameters as columns."""
         nu = self._model.nu
         states = {
-            "p": self.p[None], "t": t, "q": q, "u": u, "memory": self._memory[None],
-            "efforts": efforts,
+            "p": np.atleast_2d(self._live.at(self.p, t[:, 0])), "t": t, "q": q, "u": u,
+            "memory": self._memory[None], "efforts": efforts,
         }  # fmt: skip
         self.tangents.expect(len(q) * (4 * nu + 1 + len(self.names)))
         units, columns = np.eye(nu)[None], self.tangents.columns

@@ -12,6 +12,7 @@ from mstmm.scene.checks.topology import Topology, build
 from mstmm.scene.tables.hinge import HingeTable
 from mstmm.scene.tables.loads import Load, Spring
 
+from ..breaks.acting import acting
 from ..flexible.modal_body import ModalBody
 from ..kernels.records import Lookup
 from .bodies import Bodies
@@ -78,10 +79,19 @@ def system_of(
         layout.nq, layout.nu, laws[-1].next_twist if laws else len(releases), nodes.gravity, runs,
         laws, loads, tuple(_force(frames, spring, ports) for spring in nodes.spring),
         values.kernel() if len(values) else None,
-        drive_kernel([drive for _, _, drive in driven], ports) if driven else None,
-        tuple((place, k) for place, k, _ in driven), moving or {},
+        drive_kernel([drive for _, _, drive in driven], layout, ports) if driven else None,
+        tuple((place, k) for place, k, _ in driven), tuple(scene.channels.values()), _by_time(nodes),
+        moving or {},
     )  # fmt: skip
     return system, frames
+
+
+def _by_time(scene: Scene) -> bool:
+    """Whether an effort or load names the time, or an input that does not stand still."""
+    inputs = scene.channels
+    loads = (one for one in acting(scene) if not (one.drive or one.condition))
+    names = {name.text for one in loads for name in one.expression.names}
+    return "t" in names or any(not inputs[name].stands for name in names & inputs.keys())
 
 
 def _driven(scene: Scene, tree: Topology) -> Iterator[tuple[int, int, Expression]]:

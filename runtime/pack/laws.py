@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 from mstmm.expression.expression import Expression, number
@@ -67,7 +67,8 @@ def _repeated(
     """A pattern repeated along a run, with the places of its efforts and turns."""
     repeats, rest = divmod(run.count, period)
     count = repeats * len(pattern) + sum(draft.member < rest for draft in pattern)
-    own = [any(map(_reads_its_own, draft.efforts)) for draft in pattern]
+    common = ("t", *scene.channels)
+    own = [any(_reads_its_own(effort, common) for effort in draft.efforts) for draft in pattern]
     places: list[list[Places]] = [[] for _ in pattern]
     for row in range(count if any(own) else len(pattern)):
         repeat, which = divmod(row, len(pattern))
@@ -84,9 +85,9 @@ def _repeated(
     return LawRun(run.place, count, period, tuple(laws), twist)
 
 
-def _reads_its_own(effort: Expression) -> bool:
+def _reads_its_own(effort: Expression, common: Collection[str]) -> bool:
     """True where an expression has a name that means something else in every hinge."""
-    return any(len(name.parts) == 1 and name.text != "t" for name in effort.names)
+    return any(len(name.parts) == 1 and name.text not in common for name in effort.names)
 
 
 def _acts(entry: LawEntry) -> bool:

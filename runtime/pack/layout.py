@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence, ValuesView
+from collections.abc import Iterable, Iterator, Mapping, Sequence, ValuesView
 from dataclasses import dataclass
 from functools import cached_property
 from typing import overload
@@ -110,6 +110,7 @@ class Layout:
     """Layout of q (nq) and u (nu) by hinge: the scene's hinges, then those of its chains.
 
     `hinges` gives the slots of a hinge by its name; of chains they are made when asked for.
+    `inputs` are the places of inputs and signals among them by their names.
     """
 
     def __init__(
@@ -120,12 +121,14 @@ class Layout:
         nu: int,
         modal: Mapping[str, HingeSlots] | None = None,
         internal: range = range(0),
+        inputs: Iterable[str] = (),
     ) -> None:
         self.groups, self.nq, self.nu = groups, nq, nu
         #: Slots of the modal coordinates of flexible bodies, behind those of all hinges.
         self.modal: Mapping[str, HingeSlots] = modal or {}
         #: Numbers of hinges that stand for sections of flexible bodies.
         self.internal = internal
+        self.inputs = {name: place for place, name in enumerate(inputs)}
         self._numbers = scene.hinges
         self.hinges: Mapping[str, HingeSlots] = _ByName(self)
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from mstmm.numbers.pieces import COUNT
+
 from ..breaks.acting import acting
 from ..breaks.times import TimeMap, time_map
 from .frames import Frames
@@ -46,7 +48,8 @@ class Packed(Frames):
         if span not in self._time_maps:
             if len(self._time_maps) >= _MAPS:
                 self._time_maps.clear()
-            self._time_maps[span] = time_map(acting(self.scene), start, end)
+            inputs = self.described.channels
+            self._time_maps[span] = time_map(acting(self.scene), start, end, inputs)
         return self._time_maps[span]
 
     def slopes(self) -> Slopes:
@@ -67,6 +70,7 @@ def resize(packed: Packed, slots: int) -> None:
     system, model = packed.system, packed.model
     packed.tape_slots = max(packed.tape_slots, slots)
     state = 2 * (system.nq + system.nu) + system.n_values + 3 * len(system.driven)
+    state += COUNT * len(system.inputs)
     packed.workspace = packed.scratch + state + packed.tape_slots
     model.scratch, model.tape_slots = packed.scratch, packed.tape_slots
     model.workspace = packed.workspace

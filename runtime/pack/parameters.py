@@ -22,7 +22,7 @@ from mstmm.scene.rules.text import to_expression
 from mstmm.scene.rules.written import known
 from mstmm.scene.tables.constants import evaluated
 
-TABLES = ("body", "beam", "elastic", "hinge", "chain", "load", "event", "spring")
+TABLES = ("input", "body", "beam", "elastic", "hinge", "chain", "load", "event", "spring")
 _INDEX = re.compile(r"(.*)\[(\d+)\]")
 
 
@@ -94,8 +94,9 @@ def _begin_driven(data: dict[str, Any]) -> None:
         for table in data.get("hinge", []):
             start = table.get("initial", {})
             for k, drive in enumerate(table.get("drive", ())):
-                if drive != "free" and start:
-                    q, u, _ = motion_at(to_expression(drive, "a drive"), 0.0)
+                by = None if drive == "free" or not start else to_expression(drive, "a drive")
+                if by is not None and by.depends_on_time_only:
+                    q, u, _ = motion_at(by, 0.0)
                     start["q"][k], start["u"][k] = q, u
 
 

@@ -146,7 +146,9 @@ def _changed(scene: Scene, name: str, change: Change) -> Scene:
     else:
         for table in parameters.TABLES:
             fields[table] = tuple(
-                _element(element, parts[1:], change) if element.name == parts[0] else element
+                _element(element, parts[1:], change)
+                if element.name == parts[0] and parts[1] in type(element).model_fields
+                else element
                 for element in fields[table]
             )
     # Constructed afresh: a copy would keep what the scene has cached of its old numbers.

@@ -43,7 +43,7 @@ def layout_of(expanded: Expanded, releases: Mapping[str, int], elements: Element
         )  # fmt: skip
         q, u = q + n, u + n
     internal = range(len(expanded.described.hinge), len(scene.hinge))
-    return Layout(scene, tuple(groups), q, u, modal, internal)
+    return Layout(scene, tuple(groups), q, u, modal, internal, expanded.described.channels)
 
 
 def _slots(

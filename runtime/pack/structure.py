@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm import ir
+from mstmm.expression.inputs import INPUTS
 from mstmm.ir import KernelIR, Operand, Port, Statement
 from mstmm.ir import structure as code
 from mstmm.ir.structure import Entries, Entry, Structure
@@ -29,7 +30,7 @@ def structure_of(
 ) -> tuple[Structure, NDArray[np.float64]]:
     """(structure, p) of a system; `known` are elements beyond the prebuilt ones.
 
-    With `bake` every number is part of the structure and p is empty.
+    With `bake` every number but those of inputs is part of the structure.
     """
     structure, numbers = structure_and_numbers(system, known, bake)
     return structure, np.array(numbers)
@@ -48,10 +49,11 @@ def structure_and_numbers(
     used = {key for body in bodies for key in (body.hinge, body.body)}
     used |= {force.element for force in forces}
     values, prescribed = sorting.expression(system.values), sorting.expression(system.drives)
+    read = tuple(sorted(sorting.inputs.items()))
     structure = Structure(
         system.nq, system.nu, len(sorting.numbers), system.n_memory, gravity, bodies, laws, loads,
         forces, values, prescribed, system.driven,
-        {key: elements[key].hash for key in sorted(used)},
+        {key: elements[key].hash for key in sorted(used)}, read,
     )  # fmt: skip
     return structure, sorting.numbers
 
@@ -62,6 +64,9 @@ class _Sorting:
     def __init__(self, system: System, bake: bool) -> None:
         self.moving, self.bake = system.moving, bake
         self.numbers: list[Any] = []
+        self._start = [x for one in system.inputs for x in one.at(0.0)]
+        #: Place in p of every number of inputs that is read, by its place among them.
+        self.inputs: dict[int, int] = {}
 
     def entries(self, values: Iterable[float], axes: bool = False) -> Entries:
         """Zeros, and +-1 of axes, are structure; the rest goes to p."""
@@ -84,13 +89,15 @@ class _Sorting:
         """Expressions of the scene with their numbers taken out; None if there are none."""
         if kernel is None:
             return None
-        found: list[Any] = []
+        found: list[Entry] = []
 
         def taken(operand: Operand) -> Operand:
-            if isinstance(operand, ir.Element) and operand.port == MOVING:
-                found.append(self.moving[int(operand.index[0])])
+            if isinstance(operand, ir.Element) and operand.port == INPUTS:
+                found.append(self._input(int(operand.index[0])))
+            elif isinstance(operand, ir.Element) and operand.port == MOVING:
+                found.append(self._place(self.moving[int(operand.index[0])]))
             elif isinstance(operand, ir.Constant) and operand.text not in _STRUCTURAL:
-                found.append(operand.number)
+                found.append(self._place(operand.number))
             else:
                 return operand
             return ir.Element("constants", (len(found) - 1,))
@@ -103,10 +110,17 @@ class _Sorting:
                 statements.append(replace(statement, value=taken(statement.value)))
             else:
                 statements.append(statement)
-        inputs = [port for port in kernel.inputs if port.name != MOVING]
+        inputs = [port for port in kernel.inputs if port.name not in (INPUTS, MOVING)]
         inputs.append(Port("constants", (len(found),)))
         general = KernelIR(kernel.name, tuple(inputs), kernel.outputs, tuple(statements))
-        return code.ExpressionStructure(general, tuple(map(self._place, found)))
+        return code.ExpressionStructure(general, tuple(found))
+
+    def _input(self, entry: int) -> int:
+        """Place in p of a number of inputs: the same wherever it is read."""
+        if entry not in self.inputs:
+            self.inputs[entry] = len(self.numbers)
+            self.numbers.append(self._start[entry])
+        return self.inputs[entry]
 
     # --- bodies -------------------------------------------------------------------------------
 

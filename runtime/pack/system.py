@@ -19,6 +19,7 @@ from mstmm.arrays import Array, Integers
 from mstmm.ir import KernelIR
 from mstmm.ir.kernel import reads
 from mstmm.ir.structure import Key
+from mstmm.numbers.pieces import Pieces
 
 from .layout import Group
 
@@ -212,8 +213,10 @@ class System:
     """A scene in internal frames.
 
     `values` gives efforts and load components of (t, q, u); `drives` value, rate and acceleration
-    of each of `driven` (place of the body, coordinate).  `moving` are the numbers in expressions
-    that carry derivatives, by their places in the port "moving".
+    of each of `driven` (place of the body, coordinate).  `inputs` are inputs and signals over time,
+    whose numbers expressions read; `by_time` says whether an effort or load names the time, or an
+    input that does not stand still.  `moving` are the numbers in expressions that carry
+    derivatives, by their places in the port "moving".
     """
 
     nq: int
@@ -227,6 +230,8 @@ class System:
     values: KernelIR | None
     drives: KernelIR | None
     driven: tuple[tuple[int, int], ...]
+    inputs: tuple[Pieces, ...]
+    by_time: bool
     moving: Mapping[int, Any]
 
     @property
@@ -248,9 +253,14 @@ class System:
 
     @property
     def timed(self) -> bool:
-        """Whether an expression of an effort or load reads the time."""
+        """Whether an expression of an effort or load goes by time."""
         kernels = [self.values, *(force.effort for force in self.forces)]
-        return any(kernel is not None and reads(kernel, "t") for kernel in kernels)
+        reading = any(kernel is not None and reads(kernel, "t") for kernel in kernels)
+        return reading and self.by_time
+
+    def inputs_at(self, t: float) -> Array:
+        """The numbers of all inputs at a time, as expressions read them."""
+        return np.array([x for one in self.inputs for x in one.at(t)])
 
     @property
     def n_values(self) -> int:

@@ -1,4 +1,4 @@
-"""Expressions of a scene -> tapes over t, q, u: efforts, loads, drives, events."""
+"""Expressions of a scene -> tapes over t, q, u and inputs: efforts, loads, drives, events."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 from mstmm.errors import SceneError
 from mstmm.expression.drive import motion
 from mstmm.expression.expression import Expression, Name
+from mstmm.expression.inputs import INPUTS, input_at
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.graph import Graph, Node
 from mstmm.ir.tape import Tape, compile_tape
+from mstmm.numbers.pieces import COUNT
 from mstmm.scene import Hinge
 
 from .layout import Layout
@@ -48,14 +50,19 @@ class Values:
         return len(self._nodes)
 
     def kernel(self) -> KernelIR:
-        """t (1), q, u -> the values in the order of their places."""
-        inputs = [*state_ports(self.layout), *self._moving]
+        """t (1), q, u, inputs -> the values in the order of their places."""
+        inputs = [*state_ports(self.layout), inputs_port(self.layout), *self._moving]
         return _kernel(self._graph, "values", inputs, self._nodes)
 
 
 def state_ports(layout: Layout) -> list[Port]:
     """Inputs of every tape that reads the state."""
     return [Port("t", (1,)), Port("q", (layout.nq,)), Port("u", (layout.nu,))]
+
+
+def inputs_port(layout: Layout) -> Port:
+    """The numbers of all inputs and signals at t: see `mstmm.numbers.pieces`."""
+    return Port(INPUTS, (COUNT * len(layout.inputs),))
 
 
 def resolver(
@@ -65,12 +72,14 @@ def resolver(
     length: bool = False,
     probes: dict[tuple[str, str], int] | None = None,
 ) -> Resolver:
-    """Nodes of names: t, q and u of hinges, parameters, a spring's length, positions."""
+    """Nodes of names: t, inputs, q and u of hinges, parameters, a spring's length, positions."""
 
     def resolve(name: Name) -> Node:
         quantity, index = name.quantity, name.index or 0
         if name.text == "t":
             return graph.element("t", 0)
+        if name.text in layout.inputs:
+            return input_at(layout.inputs[name.text], graph.element("t", 0))
         if quantity in ("q", "u") and (name.hinge or own is not None):
             hinge = name.hinge or (own.name if own else "")
             slots = layout.hinges[hinge]
@@ -102,27 +111,28 @@ def _kernel(graph: Graph, name: str, inputs: Sequence[Port], nodes: list[Node]) 
     return graph.kernel(name, inputs, [output], {"values": nodes})
 
 
-def drive_kernel(drives: Sequence[Expression], moving: Moving = ()) -> KernelIR:
-    """t -> position, speed and acceleration of every drive."""
+def drive_kernel(drives: Sequence[Expression], layout: Layout, moving: Moving = ()) -> KernelIR:
+    """t, inputs -> position, speed and acceleration of every drive."""
     graph = Graph()
-    time = graph.element("t", 0)
-    nodes = [node for drive in drives for node in motion(drive, time)]
-    return _kernel(graph, "drives", [Port("t", (1,)), *moving], nodes)
+    time, resolve = graph.element("t", 0), resolver(graph, layout)
+    nodes = [node for drive in drives for node in motion(drive, time, resolve)]
+    return _kernel(graph, "drives", [Port("t", (1,)), inputs_port(layout), *moving], nodes)
 
 
 def effort_kernel(effort: Expression, layout: Layout, moving: Moving = ()) -> KernelIR:
-    """t, q, u, [length, rate] -> effort of a spring."""
+    """t, q, u, [length, rate], inputs -> effort of a spring."""
     graph = Graph()
     node = effort.build(graph, resolver(graph, layout, length=True))
-    inputs = [*state_ports(layout), Port("length", (2,)), *moving]
+    inputs = [*state_ports(layout), Port("length", (2,)), inputs_port(layout), *moving]
     return _kernel(graph, "effort", inputs, [node])
 
 
 def constant_kernel(name: str, system: System, numbers: Sequence[float]) -> KernelIR:
-    """(t, q, u, [length, rate]) -> the same numbers always."""
+    """(t, q, u, [length, rate], inputs) -> the same numbers always."""
     graph = Graph()
     ports = [Port("t", (1,)), Port("q", (system.nq,)), Port("u", (system.nu,))]
     ports += [Port("length", (2,))] if name == "effort" else []
+    ports += [Port(INPUTS, (COUNT * len(system.inputs),))]
     return _kernel(graph, name, ports, [graph.constant(float(value)) for value in numbers])
 
 
@@ -133,8 +143,8 @@ def event_tape(
     probes: dict[tuple[str, str], int],
     margins: Sequence[Node],
 ) -> Tape:
-    """t, q, u, positions of the ends in `probes` -> g per condition, g >= 0 where it holds, and
-    behind them the margins."""
+    """t, q, u, positions of the ends in `probes`, inputs -> g per condition, g >= 0 where it holds,
+    and behind them the margins."""
     nodes = []
     for condition, own in conditions:
         comparison = condition.comparison
@@ -143,5 +153,5 @@ def event_tape(
         resolve = resolver(graph, layout, own, probes=probes)
         difference = left.build(graph, resolve) - right.build(graph, resolve)
         nodes.append(difference if sign in (">", ">=") else -difference)
-    inputs = [*state_ports(layout), Port("points", (6 * len(probes),))]
+    inputs = [*state_ports(layout), Port("points", (6 * len(probes),)), inputs_port(layout)]
     return compile_tape(_kernel(graph, "events", inputs, [*nodes, *margins]))

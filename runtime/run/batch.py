@@ -1,10 +1,10 @@
 """Many independent runs of a model: side by side in the lanes of vectors, and on several threads.
 
-Where the scene has compiled code and neither events, releases, memory nor drives, every thread
-advances as many trajectories at a time as a vector has lanes, each with its own error control.
-Other scenes run one trajectory after the other on every thread.  Which way is taken depends on the
-scene and the machine alone, so that the numbers of a trajectory depend neither on the size of the
-batch, nor on its neighbours, nor on the number of threads.
+Where the scene has compiled code and neither events, releases, memory, drives nor signals, every
+thread advances as many trajectories at a time as a vector has lanes, each with its own error
+control.  Other scenes run one trajectory after the other on every thread.  Which way is taken
+depends on the scene and the machine alone, so that the numbers of a trajectory depend neither on
+the size of the batch, nor on its neighbours, nor on the number of threads.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from mstmm.arrays import Array, batch, by_name, numbers, pair, threads_of
 from mstmm.errors import MstmmError, SceneError
 
 from ..breaks.acting import acting
+from ..engine.live import LiveInputs
 from ..integrate.loop import Failure, Run, Status, failure_text
 from ..integrate.settings import Settings, checked
 from ..integrate.steppers import AUTO, check_size, check_steps, get
@@ -160,6 +161,8 @@ def _lanes(model: Compiled) -> FusedLibrary | None:
     packed = model.packed
     if has_switches(packed.scene):
         return None
+    if LiveInputs(packed.system.inputs, model.fusion.inputs).varies:
+        return None
     if packed.system.n_memory or packed.scene.event or packed.system.driven:
         return None
     return model.fusion.ready_lanes(math.inf)
@@ -237,7 +240,8 @@ def _scalar(model: Compiled, settings: Settings) -> SceneCode | None:
         return None
     asks = settings.method == AUTO or get(settings.method).implicit
     implicit = model.fusion.ready_implicit(math.inf) if asks else None
-    return SceneCode(library, None, model.fusion.numbers, lambda: implicit)
+    fusion = model.fusion
+    return SceneCode(library, None, fusion.numbers, fusion.inputs, lambda: implicit)
 
 
 def _alone(

@@ -75,4 +75,5 @@ def _compiled(
     """Lanes only for methods that have use for them; what implicit methods ask once one does."""
     fusion, iterated = model.fusion, get(settings.first_method).iterated is not None
     lanes = fusion.ready_lanes(evaluations) if iterated else None
-    return SceneCode(library, lanes, fusion.numbers, partial(fusion.ready_implicit, evaluations))
+    implicit = partial(fusion.ready_implicit, evaluations)
+    return SceneCode(library, lanes, fusion.numbers, fusion.inputs, implicit)

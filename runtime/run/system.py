@@ -14,6 +14,7 @@ from mstmm.ir.tape import Tape
 
 from ..engine.calls import Probe
 from ..engine.engine import Engine
+from ..engine.live import LiveInputs, Places
 from ..engine.tangent import Tangent
 from ..kernels.fused import FusedLibrary
 from ..kernels.tape import c_tape
@@ -25,12 +26,13 @@ from ..pack.switches import MOST
 
 @dataclass(frozen=True)
 class SceneCode:
-    """Code compiled for a scene: for one state, for several side by side, their numbers, and what
-    gives the code for what implicit methods ask, if there is any."""
+    """Code compiled for a scene: for one state, for several side by side, their numbers, where
+    inputs stand in them, and what gives the code for what implicit methods ask, if there is any."""
 
     one: FusedLibrary
     lanes: FusedLibrary | None
     numbers: Array
+    inputs: Places
     implicit: Callable[[], FusedLibrary | None]
 
 
@@ -94,7 +96,7 @@ class SceneSystem:
 
     def _implicit_by(self, code: FusedLibrary, given: Array) -> None:
         engine, lib = self.engine, self.engine.lib
-        numbers = np.ascontiguousarray(given)
+        numbers = np.array(given)  # where inputs are written as time goes on
         scratch = np.zeros(lib.mstmm_implicit_code_size(code.descriptor))
         pointers = engine.pointer(numbers), engine.pointer(scratch)
         lib.mstmm_implicit_by_code(self.run, code.descriptor, *pointers)
@@ -103,7 +105,12 @@ class SceneSystem:
     def _compiled(self, code: SceneCode) -> None:
         engine, lib = self.engine, self.engine.lib
         lanes = engine.ffi.NULL if code.lanes is None else code.lanes.descriptor
-        numbers = np.ascontiguousarray(code.numbers)
+        numbers = np.array(code.numbers)  # where inputs are written as time goes on
+        live = LiveInputs(engine.packed.system.inputs, code.inputs)
+        if live.varies:
+            self.run.live.n, self.run.live.inputs = len(live.places), engine.packed.model.inputs
+            self.run.live.places = engine.ffi.from_buffer("int[]", live.places)
+            self.kept.append(live)
         scratch = np.zeros(max(1, lib.mstmm_compiled_size(code.one.descriptor, lanes)))
         pointers = engine.pointer(numbers), engine.pointer(scratch)
         lib.mstmm_scene_compiled(self.run, code.one.descriptor, lanes, *pointers)

@@ -35,7 +35,8 @@ class Scope:
 
     `own` is the hinge whose `q`, `u` and parameters need no prefix, `spring` means that `q` and
     `u` are a length and its rate, `positions` allows x, y, z, vx, vy, vz of bodies and ends.
-    `flexible` are the flexible bodies by name, whose q and u are the modal coordinates.
+    `flexible` are the flexible bodies by name, whose q and u are the modal coordinates; `inputs`
+    are the names of inputs and signals.
     """
 
     hinges: Hinges
@@ -44,6 +45,7 @@ class Scope:
     spring: bool = False
     positions: bool = False
     flexible: Mapping[str, Modal] = field(default_factory=dict)
+    inputs: Collection[str] = ()
 
 
 def problem_with(name: Name, scope: Scope) -> str | None:
@@ -69,7 +71,7 @@ def problem_with(name: Name, scope: Scope) -> str | None:
 def _bare(name: Name, scope: Scope) -> str | None:
     word = name.parts[0]
     parameters: Collection[str] = scope.own.parameters if scope.own is not None else ()
-    if word == "t" or word in parameters:
+    if word == "t" or word in parameters or word in scope.inputs:
         return None if name.index is None else f"{word!r} is one number; leave out [{name.index}]"
     if word in ("q", "u"):
         if scope.own is not None:
@@ -78,7 +80,7 @@ def _bare(name: Name, scope: Scope) -> str | None:
             return None if name.index in (None, 0) else f"{name.text!r}: a spring has one length"
         return f"{name.text!r} needs the name of a hinge here, as in shoulder.{word}"
     own = ["q", "u"] if scope.own is not None or scope.spring else []
-    return f"{word!r} is unknown{near(word, ['t', *own, 'pi', *parameters])}"
+    return f"{word!r} is unknown{near(word, ['t', *own, 'pi', *parameters, *scope.inputs])}"
 
 
 def _modal(name: Name, modes: Modal) -> str | None:

@@ -14,7 +14,7 @@ from ..rules.messages import MAX_PROBLEMS, TABLES, Problem, near
 from ..rules.values import GROUND, Location, split
 from ..tables.inertia import negative_moment, triangle_excess
 from . import flexible as flexible_bodies
-from . import topology
+from . import inputs, topology
 from .angles import notes
 from .names import Scope, flexible, problem_with
 
@@ -28,8 +28,9 @@ def problems(scene: SceneTables) -> list[Problem]:
     if not (scene.body or scene.chain or scene.beam or scene.elastic):
         return [(("body",), "a scene needs at least one body; add a [[body]]")]
     found = _first(_duplicates(scene), _references(scene), _inertias(scene),
-                   flexible_bodies.problems(scene))  # fmt: skip
-    return found or _first(_expressions(scene), _tree(scene), flexible_bodies.spins(scene))
+                   inputs.problems(scene), flexible_bodies.problems(scene))  # fmt: skip
+    return found or _first(_expressions(scene), inputs.drives(scene), _tree(scene),
+                           flexible_bodies.spins(scene))  # fmt: skip
 
 
 def _tree(scene: SceneTables) -> Iterator[Problem]:
@@ -183,7 +184,7 @@ def risks(scene: SceneTables) -> tuple[Risk, ...]:
         found.append(Risk(
             "inertia", name, means, "write 0 for it", entry, 0.0, "kg*m2", doubt=False, before=True,
         ))  # fmt: skip
-    return (*found, *notes(scene), *flexible_bodies.risks(scene))
+    return (*found, *notes(scene), *flexible_bodies.risks(scene), *inputs.risks(scene))
 
 
 # --- names in expressions -------------------------------------------------------------------------
@@ -191,7 +192,7 @@ def risks(scene: SceneTables) -> tuple[Risk, ...]:
 
 def _expressions(scene: SceneTables) -> Iterator[Problem]:
     hinges, bodies = scene.hinges, scene.skeleton.bodies
-    anywhere = Scope(hinges, bodies, flexible=flexible(scene))
+    anywhere = Scope(hinges, bodies, flexible=flexible(scene), inputs=scene.channels)
     in_events = replace(anywhere, positions=True)
     for i, hinge in enumerate(scene.hinge):
         own = replace(anywhere, own=hinge)

@@ -30,7 +30,9 @@ RESERVED = {
 }
 
 #: The lists of tables of a scene.
-TABLES = ("body", "hinge", "chain", "beam", "elastic", "load", "event", "spring")
+TABLES = (
+    "input", "signal", "body", "hinge", "chain", "beam", "elastic", "load", "event", "spring",
+)  # fmt: skip
 
 Problem = tuple[Location, str]
 

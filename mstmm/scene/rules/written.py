@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -14,19 +14,29 @@ from ...expression.expression import Expression, parse
 _CONSTANTS: ContextVar[Mapping[str, float] | None] = ContextVar("constants", default=None)
 
 
+#: The inputs and signals of the scene that is being read.
+_INPUTS: ContextVar[frozenset[str]] = ContextVar("inputs", default=frozenset())
+
+
 @contextmanager
-def known(constants: Mapping[str, float]) -> Iterator[None]:
-    """Texts that are read meanwhile may name these constants."""
-    token = _CONSTANTS.set(constants)
+def known(constants: Mapping[str, float], inputs: Iterable[str] = ()) -> Iterator[None]:
+    """Texts that are read meanwhile may name these constants, drives these inputs."""
+    tokens = _CONSTANTS.set(constants), _INPUTS.set(frozenset(inputs))
     try:
         yield
     finally:
-        _CONSTANTS.reset(token)
+        _CONSTANTS.reset(tokens[0])
+        _INPUTS.reset(tokens[1])
 
 
 def constants() -> Mapping[str, float]:
     """The named constants of the scene that is being read."""
     return _CONSTANTS.get() or {}
+
+
+def inputs() -> frozenset[str]:
+    """The names of the inputs and signals of the scene that is being read."""
+    return _INPUTS.get()
 
 
 def expression_of(text: str) -> Expression:

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from ...numbers.pieces import Pieces, steady
 from ...numbers.rotations import Vector
 from ..rules import text as texts
 from ..rules import values as rules
@@ -17,6 +18,7 @@ from .chain import Chain
 from .constants import constants as named_numbers
 from .elastic import Elastic
 from .hinge import Hinge
+from .inputs import Input, Signal
 from .loads import Event, Load, Spring
 from .members import Bodies, Hinges
 from .rigid import bare
@@ -35,6 +37,8 @@ class SceneTables(Table):
     gravity: Annotated[Vector, rules.vector("m/s^2, such as [0, -9.81, 0]")]
     allow_unphysical_inertia: Annotated[bool, texts.flag()] = False
     constants: Annotated[dict[str, float], named_numbers()] = Field(default_factory=dict)
+    input: tuple[Input, ...] = ()
+    signal: tuple[Signal, ...] = ()
     body: tuple[Body, ...] = ()
     hinge: tuple[Hinge, ...] = ()
     chain: tuple[Chain, ...] = ()
@@ -53,6 +57,17 @@ class SceneTables(Table):
     def hinges(self) -> Hinges:
         """Every hinge: `hinge`, then the members of the chains, made when they are asked for."""
         return Hinges(self.hinge, self.chain)
+
+    @cached_property
+    def channels(self) -> dict[str, Pieces]:
+        """Inputs, then signals, over time by their names."""
+        signals = {signal.name: signal.pieces for signal in self.signal}
+        inputs = {
+            one.name: signals.get(one.value, steady(0.0)) if isinstance(one.value, str)
+            else steady(one.value, *(one.rates or ()))
+            for one in self.input
+        }  # fmt: skip
+        return inputs | signals
 
     @property
     def skeleton(self) -> SceneTables:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import Any
+from typing import Any, TypeGuard
 
 from ...errors import ExpressionError
 from ...expression.drive import jump, motion_at
 from ...expression.expression import Expression
 from ...ir.facts import HingeFacts, effort_unit
 from ...numbers.rotations import cross, norm, perpendicular, unit
+from ..rules import written
 from ..rules.values import Location, Refused, counted, found, quaternion
 from .hinge_keys import HingeKeys, Initial
 from .law import Law, LawEntry
@@ -222,12 +223,15 @@ def _drive(
         if entry is None:
             continue
         place: Location = ("drive", k) if len(drive) > 1 else ("drive",)
-        if not entry.depends_on_time_only:
-            other = next(n.text for n in entry.names if n.text != "t")
+        others = [n.text for n in entry.names if n.text != "t" and n.text not in written.inputs()]
+        if others:
+            inputs = " and inputs" if written.inputs() else ""
             problems.append((
-                place, f"a drive depends on t alone, found {other!r}; use law.effort for feedback"
+                place,
+                f"a drive depends on t{inputs} alone, found {others[0]!r}; use law.effort for "
+                "feedback",
             ))  # fmt: skip
-        else:
+        elif entry.depends_on_time_only:
             problems += _unsmooth(entry, place)
     return drive
 
@@ -266,7 +270,7 @@ def _initial(
                 "leave one of them out",
             ))  # fmt: skip
         return None
-    start = [(0.0, 0.0, 0.0) if d is None else motion_at(d, 0.0) for d in drive or ()]
+    start = [motion_at(d, 0.0) if _goes_by_time(d) else (0.0, 0.0, 0.0) for d in drive or ()]
     default_q = tuple(s[0] for s in start) if drive else kind.start
     default_u = tuple(s[1] for s in start) if drive else (0.0,) * len(kind.speeds)
     q = _start_values(kind, "q", given.q if given else None, default_q, drive, problems)
@@ -279,6 +283,11 @@ def _initial(
         except Refused as refused:
             problems += refused.problems
     return Initial(q=q, u=u)
+
+
+def _goes_by_time(drive: Expression | None) -> TypeGuard[Expression]:
+    """Whether it drives by itself; where inputs drive is not known here."""
+    return drive is not None and drive.depends_on_time_only
 
 
 def _start_values(
@@ -299,7 +308,9 @@ def _start_values(
         ))  # fmt: skip
         return given
     for k, entry in enumerate(drive or ()):
-        if entry is not None and abs(given[k] - default[k]) > _AGREES * max(1.0, abs(default[k])):
+        if _goes_by_time(entry) and abs(given[k] - default[k]) > _AGREES * max(
+            1.0, abs(default[k])
+        ):
             problems.append((
                 ("initial", key, k),
                 f"{given[k]:g} contradicts the drive, which begins at {default[k]:g}; write that, "

@@ -34,10 +34,10 @@ static real *lanes_memory(const mstmm_scene_run *run)
 }
 
 void mstmm_scene_compiled(mstmm_scene_run *run, const mstmm_fused *one, const mstmm_fused *lanes,
-                          const real *p, real *numbers)
+                          real *p, real *numbers)
 {
     run->fused = one;
-    run->fused_lanes = run->with_power ? NULL : lanes;
+    run->fused_lanes = run->with_power || run->live.n ? NULL : lanes;
     run->fused_p = p;
     run->fused_numbers = numbers;
     memset(numbers, 0, (size_t)mstmm_compiled_size(one, lanes) * sizeof *numbers);
@@ -55,6 +55,7 @@ static int accelerations(void *context, double t, const double *y, double *dy)
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused;
+    mstmm_renew_inputs(&run->live, t, run->fused_p);
     const int code = fused->accelerations(run->fused_p, &t, y, y + fused->nq, run->memory,
                                           run->fused_numbers, dy, dy + fused->nq);
     return code ? failed(run, fused, code) : 0;
@@ -65,6 +66,7 @@ static int accelerations_and_power(void *context, double t, const double *y, dou
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused;
     real power = 0, potential;
+    mstmm_renew_inputs(&run->live, t, run->fused_p);
     const int code = fused->accelerations_power(run->fused_p, &t, y, y + fused->nq, run->memory,
                                                 run->fused_numbers, dy, dy + fused->nq, &power,
                                                 &potential);

@@ -11,15 +11,16 @@ void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system);
 /* Numbers that `mstmm_scene_compiled` needs room for. */
 int64_t mstmm_compiled_size(const mstmm_fused *one, const mstmm_fused *lanes);
 /* From now on `run` evaluates `one`, and several states at a time by `lanes` (or NULL; not used
- * where the work is integrated too); p holds the numbers that both read.  To be called before
- * mstmm_scene_system.  Everything given must live as long as the run. */
+ * where the work is integrated too, or inputs change with time); p holds the numbers that both read,
+ * those of `run->live` inputs written anew.  To be called before mstmm_scene_system.  Everything
+ * given must live as long as the run. */
 void mstmm_scene_compiled(mstmm_scene_run *run, const mstmm_fused *one, const mstmm_fused *lanes,
-                          const real *p, real *numbers);
+                          real *p, real *numbers);
 /* Numbers that `mstmm_implicit_by_code` needs room for. */
 int64_t mstmm_implicit_code_size(const mstmm_fused *fused);
-/* From now on implicit methods go by `fused`; p holds the numbers that it reads.  To be called
- * behind mstmm_scene_implicit.  Everything given must live as long as the run. */
-void mstmm_implicit_by_code(mstmm_scene_run *run, const mstmm_fused *fused, const real *p,
+/* From now on implicit methods go by `fused`; p holds the numbers that it reads, as above.  To be
+ * called behind mstmm_scene_implicit.  Everything given must live as long as the run. */
+void mstmm_implicit_by_code(mstmm_scene_run *run, const mstmm_fused *fused, real *p,
                             real *numbers);
 
 /* Trajectories of a scene without events and memory side by side, on one thread. */

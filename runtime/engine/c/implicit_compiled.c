@@ -6,7 +6,12 @@
 
 #define CODE(run) ((run)->implicit_code.fused)
 
-static const real *parameters(const mstmm_scene_run *run) { return run->implicit_code.p; }
+/* The numbers that the code reads, with those of inputs at t. */
+static const real *parameters(const mstmm_scene_run *run, real t)
+{
+    mstmm_renew_inputs(&run->live, t, run->implicit_code.p);
+    return run->implicit_code.p;
+}
 
 /* Parts of the numbers: the base point (t, q, u, a), steps, slopes, factors, known increments. */
 typedef struct {
@@ -44,8 +49,8 @@ static int residual(void *context, double t, const double *y, const double *a, d
     const real *u = y + code->nq;
     const int wanted = work && run->with_power;
     const int failed =
-        wanted ? code->residual_power(parameters(run), &t, y, u, run->memory, a, r, work)
-               : code->residual(parameters(run), &t, y, u, run->memory, a, r);
+        wanted ? code->residual_power(parameters(run, t), &t, y, u, run->memory, a, r, work)
+               : code->residual(parameters(run, t), &t, y, u, run->memory, a, r);
     return failed ? run->implicit_code.looped.residual(run, t, y, a, r, work) : 0;
 }
 
@@ -57,7 +62,7 @@ static int residual_rate(void *context, double t, const double *y, const double 
         memset(r_t, 0, (size_t)code->nu * sizeof(real));
         return 0;
     }
-    const int failed = code->residual_rate(parameters(run), &t, y, y + code->nq, run->memory, a, r_t);
+    const int failed = code->residual_rate(parameters(run, t), &t, y, y + code->nq, run->memory, a, r_t);
     return failed ? run->implicit_code.looped.residual_rate(run, t, y, a, r_t) : 0;
 }
 
@@ -66,7 +71,7 @@ static int rates(void *context, const double *q, const double *u, double *dq)
 {
     mstmm_scene_run *run = context;
     const real t = 0;
-    const int failed = CODE(run)->rates(parameters(run), &t, q, u, run->memory, u, dq);
+    const int failed = CODE(run)->rates(parameters(run, t), &t, q, u, run->memory, u, dq);
     return failed ? run->implicit_code.looped.rates(run, q, u, dq) : 0;
 }
 
@@ -85,9 +90,9 @@ static int tangent(void *context, double t, const double *y, const double *a, do
     /* Without kappa no increments are known, and no slopes are wanted. */
     const int failed =
         kappa && code->tangent_slopes
-            ? code->tangent_slopes(parameters(run), at.t, at.q, at.u, run->memory, at.a, at.steps,
+            ? code->tangent_slopes(parameters(run, *at.t), at.t, at.q, at.u, run->memory, at.a, at.steps,
                                    at.slopes, at.factors)
-            : code->tangent(parameters(run), at.t, at.q, at.u, run->memory, at.a, at.steps,
+            : code->tangent(parameters(run, *at.t), at.t, at.q, at.u, run->memory, at.a, at.steps,
                             at.factors);
     run->implicit_code.looped_tangent = failed;
     return failed ? run->implicit_code.looped.tangent(run, t, y, a, s, sq, kappa) : 0;
@@ -105,7 +110,7 @@ static int laws(void *context, double t, const double *y, const double *a, doubl
 static int coordinates(const mstmm_scene_run *run, const mstmm_parts *at, const real *x,
                        const real *rho, real *dq)
 {
-    return CODE(run)->coordinates(parameters(run), at->t, at->q, at->u, run->memory, at->a,
+    return CODE(run)->coordinates(parameters(run, *at->t), at->t, at->q, at->u, run->memory, at->a,
                                   at->steps, x, rho, dq);
 }
 
@@ -118,7 +123,7 @@ static int without_known(const mstmm_scene_run *run, const mstmm_parts *at, cons
     mstmm_tangent_free(run->base, at->known_a);
     const int failed = coordinates(run, at, at->still_u, rho_q, at->known_q);
     if (failed) return failed;
-    return code->rest(parameters(run), at->t, at->q, at->u, run->memory, at->a, at->slopes, r,
+    return code->rest(parameters(run, *at->t), at->t, at->q, at->u, run->memory, at->a, at->slopes, r,
                       at->known_q, at->known_a, at->right);
 }
 
@@ -148,7 +153,7 @@ static int solve(void *context, const double *r, const double *rho_q, const doub
     return 0;
 }
 
-void mstmm_implicit_by_code(mstmm_scene_run *run, const mstmm_fused *fused, const real *p,
+void mstmm_implicit_by_code(mstmm_scene_run *run, const mstmm_fused *fused, real *p,
                             real *numbers)
 {
     run->implicit_code = (mstmm_implicit_code){.fused = fused, .p = p, .numbers = numbers,

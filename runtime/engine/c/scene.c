@@ -252,7 +252,7 @@ static int scene_events(void *context, double t, const double *y, double *g)
             memcpy(run->probe_values + 6 * k, one, 6 * sizeof(real));
         }
     }
-    const real *inputs[] = {&t, y, u, run->probe_values};
+    const real *inputs[] = {&t, y, u, run->probe_values, mstmm_input_numbers(&state)};
     real *outputs[] = {g};
     return mstmm_tape_run(run->event_tape, inputs, mstmm_slots(&state), outputs)
                ? MSTMM_FAILED_EXPRESSION

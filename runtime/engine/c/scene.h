@@ -51,7 +51,7 @@ typedef struct {
 /* Code compiled for what implicit methods ask, and the looped engine's way, its last resort */
 typedef struct {
     const mstmm_fused *fused; /* NULL: there is none */
-    const real *p;
+    real *p;
     real *numbers; /* mstmm_implicit_code_size */
     mstmm_implicit looped;
     int looped_tangent; /* the last tangent was factored there */
@@ -74,8 +74,9 @@ typedef struct {
     real *probe_values; /* n_probes x 6, and MSTMM_PROBE_NUMBERS of scratch */
     /* Code compiled for this scene, or NULL: see mstmm_scene_compiled */
     const mstmm_fused *fused, *fused_lanes;
-    const real *fused_p;
+    real *fused_p;
     real *fused_numbers;
+    mstmm_live_inputs live; /* what of p changes with time; of implicit_code.p as well */
     /* For implicit methods: where the equations are linearised, where a stage's residual is made;
      * NULL: not prepared */
     mstmm_tangent *base, *stage;

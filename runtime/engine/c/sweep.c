@@ -39,7 +39,7 @@ int mstmm_hinge_slope_interpreted(mstmm_state *state, const mstmm_body *body,
 int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real *length,
                        real *value)
 {
-    const real *inputs[] = {&state->t, state->q, state->u, length};
+    const real *inputs[] = {&state->t, state->q, state->u, length, mstmm_input_numbers(state)};
     real *outputs[] = {value};
     return mstmm_tape_run(effort, inputs, mstmm_slots(state), outputs);
 }
@@ -47,7 +47,7 @@ int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real 
 int mstmm_hook_drive_values(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
-    const real *inputs[] = {&state->t};
+    const real *inputs[] = {&state->t, mstmm_input_numbers(state)};
     real *outputs[] = {mstmm_drive_values(state)};
     memcpy(mstmm_filled_q(state), state->q, (size_t)model->nq * sizeof(real));
     memcpy(mstmm_filled_u(state), state->u, (size_t)model->nu * sizeof(real));
@@ -61,7 +61,7 @@ int mstmm_hook_drive_values(mstmm_state *state)
 int mstmm_hook_expression_values(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
-    const real *inputs[] = {&state->t, state->q, state->u};
+    const real *inputs[] = {&state->t, state->q, state->u, mstmm_input_numbers(state)};
     real *outputs[] = {mstmm_values(state)};
     const int code = mstmm_tape_run(model->value_tape, inputs, mstmm_slots(state), outputs);
     return code ? mstmm_fail(state, MSTMM_FAILED_EXPRESSION, -1, code) : 0;

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "failures.h"
+#include "inputs.h"
 #include "layout.h"
 #include "mstmm.h"
 #include "tape.h"
@@ -115,8 +116,9 @@ typedef struct {
     int body_f, body_t;
     int own; /* one end is on the ground, and no expression of the state acts */
     real axes_f[9], axes_t[9], offset_f[3], offset_t[3];
-    const mstmm_tape *effort; /* t, q, u, [length, its rate] -> given effort; NULL for none */
-    const mstmm_tape *effort_slope; /* t, q, u, [length, its rate], their derivatives -> its own */
+    /* t, q, u, [length, its rate], inputs -> given effort; NULL for none */
+    const mstmm_tape *effort;
+    const mstmm_tape *effort_slope; /* the same and derivatives of all but inputs -> its own */
     const real *p;
     void (*wrench)(void), (*wrench_slope)(void);
 } mstmm_force;
@@ -153,11 +155,13 @@ typedef struct {
     real gravity[3];
     int n_drives;
     const mstmm_drive *drives;
-    const mstmm_tape *drive_tape; /* t -> value, rate, acceleration of each drive */
+    const mstmm_tape *drive_tape; /* t, inputs -> value, rate, acceleration of each drive */
     int n_values;
-    const mstmm_tape *value_tape; /* t, q, u -> efforts and load components */
-    const mstmm_tape *drive_slopes; /* t, d_t -> derivatives of the drives' values */
-    const mstmm_tape *value_slopes; /* t, q, u, d_t, d_q, d_u -> derivatives of the values */
+    const mstmm_tape *value_tape; /* t, q, u, inputs -> efforts and load components */
+    const mstmm_tape *drive_slopes; /* t, inputs, d_t -> derivatives of the drives' values */
+    const mstmm_tape *value_slopes; /* t, q, u, inputs, d_t, d_q, d_u -> those of the values */
+    int n_inputs;
+    const mstmm_input *inputs; /* inputs and signals, which expressions read */
     int n_laws;
     const mstmm_law *laws;
     int n_loads;
@@ -254,7 +258,7 @@ typedef struct mstmm_state {
 } mstmm_state;
 
 /* Behind the blocks: q and u with driven coordinates, values of expressions and drives, slots of
- * tapes, rates and accelerations that nobody asked for. */
+ * tapes, rates and accelerations that nobody asked for, numbers of inputs. */
 static inline real *mstmm_filled_q(const mstmm_state *state)
 {
     return state->workspace + state->model->scratch;
@@ -282,6 +286,14 @@ static inline real *mstmm_spare_qdot(const mstmm_state *state)
 static inline real *mstmm_spare_udot(const mstmm_state *state)
 {
     return mstmm_spare_qdot(state) + state->model->nq;
+}
+
+/* The numbers of inputs, as they are at the time of the state from now on. */
+static inline const real *mstmm_input_numbers(const mstmm_state *state)
+{
+    real *numbers = mstmm_spare_udot(state) + state->model->nu;
+    mstmm_inputs_at(state->model->n_inputs, state->model->inputs, state->t, numbers);
+    return numbers;
 }
 
 /* The ground, at rest under gravity.  Of its block what is across a hinge is not there. */

@@ -183,7 +183,7 @@ int mstmm_hook_drive_slopes(mstmm_state *state)
 {
     mstmm_state *slope = state->slope;
     const mstmm_model *model = state->model;
-    const real *inputs[] = {&state->t, &slope->t};
+    const real *inputs[] = {&state->t, mstmm_input_numbers(state), &slope->t};
     real *outputs[] = {mstmm_drive_values(slope)};
     memcpy(mstmm_filled_q(slope), slope->q, (size_t)model->nq * sizeof(real));
     memcpy(mstmm_filled_u(slope), slope->u, (size_t)model->nu * sizeof(real));
@@ -197,7 +197,8 @@ int mstmm_hook_drive_slopes(mstmm_state *state)
 int mstmm_hook_expression_slopes(mstmm_state *state)
 {
     mstmm_state *slope = state->slope;
-    const real *inputs[] = {&state->t, state->q, state->u, &slope->t, slope->q, slope->u};
+    const real *inputs[] = {&state->t, state->q, state->u, mstmm_input_numbers(state),
+                            &slope->t, slope->q, slope->u};
     real *outputs[] = {mstmm_values(slope)};
     const int code = mstmm_tape_run(state->model->value_slopes, inputs, mstmm_slots(slope), outputs);
     return code ? mstmm_fail(state, MSTMM_FAILED_EXPRESSION, -1, code) : 0;
@@ -207,7 +208,7 @@ int mstmm_given_effort_slope(mstmm_state *state, const mstmm_tape *tape, const r
                              const real *d_length, real *d_value)
 {
     mstmm_state *slope = state->slope;
-    const real *inputs[] = {&state->t, state->q, state->u, length,
+    const real *inputs[] = {&state->t, state->q, state->u, length, mstmm_input_numbers(state),
                             &slope->t, slope->q, slope->u, d_length};
     real *outputs[] = {d_value};
     return mstmm_tape_run(tape, inputs, mstmm_slots(slope), outputs);

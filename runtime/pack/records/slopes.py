@@ -6,6 +6,7 @@ import threading
 from dataclasses import dataclass, field
 from typing import Any
 
+from mstmm.expression.inputs import INPUTS
 from mstmm.ir import KernelIR
 from mstmm.ir.tangent import tangent
 from mstmm.ir.tape import compile_tape
@@ -32,7 +33,7 @@ def write_slopes(system: System, model: Any, ffi: Any) -> Slopes:
     def tape(kernel: KernelIR | None) -> Any:
         if kernel is None:
             return ffi.NULL
-        ports = [port.name for port in kernel.inputs]
+        ports = [port.name for port in kernel.inputs if port.name != INPUTS]
         slope = compile_tape(tangent(kernel, ports, values=False, guards=False))
         made.slots = max(made.slots, slope.slots)
         return c_tape(ffi, slope, made.kept)

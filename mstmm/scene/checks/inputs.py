@@ -1,0 +1,124 @@
+"""Inputs and signals of a scene: their names, who follows which, which nobody uses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from ...errors import ExpressionError
+from ...expression.drive import motion_at
+from ...expression.expression import Expression
+from ...risk import Risk
+from ..rules.messages import Problem, near
+from ..rules.values import Location, found
+from ..tables.constants import problem_with_name
+from ..tables.inputs import Input
+from .types import tables
+
+if TYPE_CHECKING:
+    from ..tables.all import SceneTables
+
+
+def problems(scene: SceneTables) -> Iterator[Problem]:
+    """Names that mean something else already, and signals that are not there."""
+    taken = dict.fromkeys(scene.constants, "a constant")
+    for table, word in (("input", "an input"), ("signal", "a signal")):
+        for i, element in enumerate(getattr(scene, table)):
+            problem = problem_with_name(element.name)
+            if not problem and taken.get(element.name, word) != word:
+                problem = f'"{element.name}" is also the name of {taken[element.name]}; rename one'
+            taken[element.name] = word
+            if problem:
+                yield (table, i, "name"), problem
+    signals = [signal.name for signal in scene.signal]
+    for i, one in enumerate(scene.input):
+        if isinstance(one.value, str) and one.value not in signals:
+            options = (*signals, *scene.constants)
+            yield (
+                ("input", i, "value"),
+                f'there is no signal "{one.value}", and no constant{near(one.value, options)}',
+            )
+    for _, place, table_ in tables(scene):
+        for name in table_.parameters:
+            if name in taken:
+                yield (
+                    (*place, "parameters"),
+                    f'"{name}" is also the name of {taken[name]} of the scene; rename that',
+                )
+
+
+def drives(scene: SceneTables) -> Iterator[Problem]:
+    """Inputs that drives cannot follow: without rates, or not finite at the start."""
+    inputs = {one.name: one for one in scene.input}
+    for kind, place, table in tables(scene):
+        drive = table.drive if kind == "hinge" else None
+        for k, entry in enumerate(drive or ()):
+            if entry is None or entry.depends_on_time_only:
+                continue
+            at: Location = (*place, "drive", k)
+            unknown = [name.text for name in entry.names if name.text not in scene.channels]
+            if [name for name in unknown if name != "t"]:
+                continue  # the hinge's own check has said so
+            still = [n.text for n in entry.names if _has_no_rates(inputs.get(n.text))]
+            if still:
+                yield (
+                    at,
+                    f"a drive needs the rates of the input {still[0]!r}; declare them there, as in "
+                    "rates = [0, 0], or let it follow a signal",
+                )
+            else:
+                yield from _start(scene, entry, at)
+
+
+def _has_no_rates(one: Input | None) -> bool:
+    return one is not None and one.rates is None and not isinstance(one.value, str)
+
+
+def _start(scene: SceneTables, entry: Expression, at: Location) -> Iterator[Problem]:
+    try:
+        start = motion_at(entry, 0.0, scene.channels)
+    except ExpressionError as error:
+        yield at, str(error)
+        return
+    if not all(abs(x) < float("inf") for x in start):
+        yield (
+            at,
+            f"{found(entry.text)} or one of its first two derivatives is not finite at t = 0; "
+            "begin with a smooth motion",
+        )
+
+
+def risks(scene: SceneTables) -> list[Risk]:
+    """Inputs and signals that nobody uses."""
+    used = {name.text for expression in expressions(scene) for name in expression.names}
+    used |= {one.value for one in scene.input if isinstance(one.value, str)}
+    found_risks = []
+    for table in ("input", "signal"):
+        for element in getattr(scene, table):
+            if element.name not in used:
+                name = f'{table} "{element.name}"'
+                found_risks.append(
+                    Risk(
+                        "unused-input", name, f"{name}: nobody uses it",
+                        "name it in an expression, or take it out", doubt=False, before=True,
+                    )
+                )  # fmt: skip
+    return found_risks
+
+
+def expressions(scene: SceneTables) -> Iterator[Expression]:
+    """Every expression that may name inputs."""
+    for kind, _, table in tables(scene):
+        if kind == "hinge":
+            yield from table.law.effort
+            yield from (entry for entry in table.drive or () if entry is not None)
+    for hinge in scene.hinge:
+        if hinge.release is not None:
+            yield hinge.release
+    for load in scene.load:
+        for key in ("force", "moment", "force_per_length"):
+            yield from getattr(load, key) or ()
+    for event in scene.event:
+        yield event.when
+    for spring in scene.spring:
+        yield spring.law.effort

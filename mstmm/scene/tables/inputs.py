@@ -1,0 +1,154 @@
+"""What comes from outside the scene: inputs, which are set, and signals, which go by time."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from itertools import pairwise
+from typing import Annotated, Any
+
+from pydantic import model_validator
+
+from ...numbers.pieces import INTERPOLATIONS, Pieces, through
+from ..rules import text as texts
+from ..rules import values as rules
+from ..rules import written
+from ..rules.columns import read_columns
+from ..rules.values import NAME, Refused, Rule, Table, finite, found, plain, refuse
+from .elastic_keys import FOLDER
+
+Numbers = tuple[float, ...]
+
+
+def _unit() -> Rule:
+    """A unit for tables and pictures; nothing is converted."""
+    expected = 'a unit such as "N m"'
+
+    def check(value: Any) -> str:
+        checked = texts.text(value, expected)
+        if len(checked) > 64 or not checked.isprintable():
+            raise refuse(f"expected {expected}, found {found(checked)}")
+        return checked
+
+    return Rule(expected, check, {"type": "string", "maxLength": 64})
+
+
+def _value() -> Rule:
+    """A number, or the name of a signal."""
+    expected = "a number or the name of a signal"
+
+    def check(value: Any) -> float | str:
+        value = plain(value)
+        if isinstance(value, str) and NAME.fullmatch(value):
+            number = value in ("pi", "deg") or value in written.constants()
+            return finite(value, expected) if number else value
+        return finite(value, expected)
+
+    return Rule(expected, check, {"type": ["number", "string"]})
+
+
+class Input(Table):
+    """A number that is set from outside: by `simulate(inputs=...)`, or as its `value` says, a
+    number or the name of a signal.
+
+    `rates` are its rate and the rate of that (per s, per s^2) at t = 0, from where on the value is
+    value + rate t + second rate t^2 / 2.
+    """
+
+    name: Annotated[str, texts.name("the input's name")]
+    unit: Annotated[str, _unit()] = ""
+    value: Annotated[float | str, _value()] = 0.0
+    rates: Annotated[Numbers | None, rules.numbers("two numbers: rate, second rate", 2)] = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Input:
+        if self.rates is not None and isinstance(self.value, str):
+            raise refuse(f'the signal "{self.value}" has rates of its own; leave them out', "rates")
+        return self
+
+
+def _column() -> Rule:
+    expected = "the name or the number of a column, 2 or more"
+
+    def check(value: Any) -> str | int:
+        if isinstance(value, str) and value:
+            return value
+        if isinstance(value, bool) or not isinstance(value, int) or value < 2:
+            raise refuse(f"expected {expected}, found {found(value)}")
+        return value
+
+    return Rule(expected, check, {"type": ["integer", "string"], "minimum": 2})
+
+
+class Signal(Table):
+    """A number over time: values at times (s, ascending), or columns of a CSV file in the folder of
+    the scene, read when the scene is.
+
+    Between them it is held, goes on lines, or on a cubic spline; before the first and behind the
+    last it stands still.
+    """
+
+    name: Annotated[str, texts.name("the signal's name")]
+    unit: Annotated[str, _unit()] = ""
+    interpolation: Annotated[str, texts.choice(*INTERPOLATIONS)] = "line"
+    times: Annotated[Numbers, rules.numbers("a list of times", of="s")] = ()
+    values: Annotated[Numbers, rules.numbers("a list of numbers")] = ()
+    file: Annotated[str | None, texts.label("a CSV file in the folder of the scene")] = None
+    column: Annotated[str | int | None, _column()] = None
+
+    @model_validator(mode="after")
+    def _settle(self) -> Signal:
+        if self.file is not None:
+            self._read()
+        elif self.column is not None:
+            raise refuse("only a file has columns; leave it out", "column")
+        else:
+            self._in_order([f"times[{k}]" for k in range(len(self.times))], "times")
+        return self
+
+    def _read(self) -> None:
+        """The numbers of the file in the place of its name."""
+        if self.times or self.values:
+            raise refuse("a file stands instead of times and values; leave one out", "file")
+        try:
+            read = read_columns(str(self.file), FOLDER.get(), self.column or 2)
+        except Refused as refused:
+            raise refuse(str(refused), "file") from None
+        object.__setattr__(self, "times", read.first)
+        object.__setattr__(self, "values", read.other)
+        self._in_order([f"{found(self.file)} row {line}" for line in read.lines], "file")
+        object.__setattr__(self, "file", None)
+        object.__setattr__(self, "column", None)
+
+    def _in_order(self, rows: list[str], place: str) -> None:
+        """Refused, with the rows, for times that do not ascend."""
+        if not self.times:
+            raise refuse(
+                "missing; expected times in s and values, or the file that has them", place
+            )
+        if len(self.values) != len(self.times):
+            raise refuse(
+                f"expected {rules.counted(len(self.times))}, one for each of the times, found "
+                f"{len(self.values)}", "values",
+            )  # fmt: skip
+        for k, (a, b) in enumerate(pairwise(self.times)):
+            if a == b:
+                raise refuse(
+                    f"{rows[k]} and {rows[k + 1]} are both at {a:g} s; keep one of them", place
+                )
+            if a > b:
+                raise refuse(
+                    f"{rows[k + 1]}, {b:g} s, comes after {rows[k]}, {a:g} s; sort them by time",
+                    place,
+                )
+        for k, piece in enumerate(self.pieces.pieces):
+            if not all(map(math.isfinite, piece)):
+                raise refuse(
+                    f"from {rows[max(0, k - 1)]} on its rate is beyond what numbers hold; take "
+                    "fewer rows, or scale it", place,
+                )  # fmt: skip
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """What it is over time."""
+        return through(self.times, self.values, self.interpolation)
