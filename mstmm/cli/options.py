@@ -8,11 +8,14 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mstmm.errors import EnvironmentFailure, MstmmError
+from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
+
+if TYPE_CHECKING:
+    from mstmm.scene import Scene
 
 #: Most samples of one run.
 MAX_SAMPLES = 10_000_000
@@ -114,6 +117,35 @@ def times(text: Any) -> Times:
         raise typer.BadParameter(
             f"{quoted(text)}: expected a number of samples (201) or a spacing in s (0.05, 1s)"
         ) from None
+
+
+def with_inputs(scene: Scene, texts: Sequence[str]) -> Scene:
+    """The scene with inputs as in "motor=3".  MstmmError for what is none, SceneError for what the
+    scene does not have."""
+    from mstmm.runtime.engine import given as inputs
+
+    values: dict[str, float | str] = {}
+    for text in texts:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value):
+            raise MstmmError(
+                f"--input {text}: expected NAME=VALUE, such as motor=3 or the name of a signal"
+            )
+        if name in values:
+            raise MstmmError(f"--input {text}: {name} is given twice; give it once")
+        values[name] = _number_or_name(value)
+    try:
+        return inputs.with_inputs(scene, values)
+    except SceneError as error:
+        lines = str(error).replace("scene with these inputs: ", "").splitlines()
+        raise SceneError("\n".join(f"--input: {line}" for line in lines)) from None
+
+
+def _number_or_name(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def output_file(text: str, endings: Sequence[str], option: str = "--output") -> Path:

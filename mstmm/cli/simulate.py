@@ -31,6 +31,7 @@ from .options import (
     positive,
     python_file,
     times,
+    with_inputs,
 )
 from .progress import Bar, bar, waiting
 
@@ -86,6 +87,7 @@ class Plan:
     error: float | None = None
     of: tuple[str, ...] = ()
     on_risk: str = "warn"
+    inputs: tuple[str, ...] = ()
 
     @property
     def resumable(self) -> bool:
@@ -168,6 +170,11 @@ def simulate(
         typer.Option("--quantity", "-q", metavar="NAME", help="What to plot and to print, such as "
                      "shoulder.angle, rod1.tip.position, energy; may be repeated."),
     ] = None,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option("--input", metavar="NAME=VALUE", help="What an input of the scene is: a "
+                     "number, or the name of a signal of it; may be repeated."),
+    ] = None,
     hinge: Elements = None,
     certify: Annotated[
         bool | None,
@@ -228,7 +235,7 @@ def simulate(
         None if plot is None else output_file(plot, PICTURES, "--plot"),
         tuple(quantity or ()), certify, resume, sweep, engine, flexibility, accuracy,
         max_step or 0.0, radius, scheme, iterations, tangent, error, tuple(of or ()),
-        on_risk,
+        on_risk, tuple(inputs or ()),
     )  # fmt: skip
     _refuse_endless(plan)
     _refuse_beside_error(plan)
@@ -310,6 +317,8 @@ def _model(plan: Plan) -> Model:
     from mstmm.scene.rules.messages import near
 
     scene, level = mstmm.load_scene(plan.scene), plan.flexibility
+    if plan.inputs:
+        scene = with_inputs(scene, plan.inputs)
     model = compiled(plan.scene, scene, plan.sweep, plan.engine, level)
     if plan.quantities:
         start = model.simulate(t_end=0.0, method="dop853")

@@ -17,6 +17,7 @@ from ..pack.pack import pack
 from ..pack.packed import Packed
 from .code import Fusing, NotFused
 from .engine import Engine
+from .given import GivenInput, with_inputs
 
 
 class Compiled:
@@ -126,10 +127,24 @@ class Compiled:
 
         Raises SceneError for an unknown name (the nearest one is suggested) or an impossible value.
         """
+        return self._with(named_parameters.changed(self.scene, changes))
+
+    def with_inputs(self, inputs: Mapping[str, GivenInput]) -> Self:
+        """The same scene with other inputs, by their names; nothing is compiled again.
+
+        An input is given as a number, as the name of a signal of the scene, as (times, values)
+        between which it goes on lines (s; each time after the one before), or as the keys of a
+        [[signal]] that it follows: {"times": ..., "values": ..., "interpolation": "cubic"}.
+
+        Raises SceneError for an unknown name (the nearest one is suggested) or an impossible value.
+        """
+        return self._with(with_inputs(self.scene, inputs))
+
+    def _with(self, scene: Scene) -> Self:
+        """What was asked of this scene, of the same one with other numbers."""
         changed = type(self)(
-            named_parameters.changed(self.scene, changes), self.known, self._fusing,
-            self._product_accuracy, self.packed.qr,
-        )  # fmt: skip
+            scene, self.known, self._fusing, self._product_accuracy, self.packed.qr
+        )
         changed.fusion.follow(self.fusion)
         return changed
 

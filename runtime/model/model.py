@@ -18,6 +18,7 @@ from mstmm.scene import Scene
 
 from ..engine.code import Fusing
 from ..engine.compiled import Compiled
+from ..engine.given import GivenInput
 from ..integrate.settings import Settings, checked, times_of
 from ..pack.elements import Known
 from ..pack.layout import refuse_dense
@@ -284,6 +285,7 @@ class Model(Compiled):
         error_of: str | Sequence[str] = (),
         t_start: float = 0.0,
         initial: tuple[ArrayLike, ArrayLike] | None = None,
+        inputs: Mapping[str, GivenInput] | None = None,
         max_step: float = 0.0,
         max_steps: int = 0,
         radius: float | None = None,
@@ -327,6 +329,8 @@ class Model(Compiled):
                 rodas4pw, and methods that iterate); auto, exact but where iterations may begin
                 with laws.
             initial: (q, u) instead of the scene's own start.
+            inputs: what inputs of the scene are in this run, by their names, as in `with_inputs`:
+                numbers, names of signals, (times, values), or the keys of a [[signal]].
             certify: estimate the error by a second, more accurate run.
             on_risk: where something speaks against the numbers (`Result.risks`): warn, in the
                 result; refuse, which raises RiskRefused, before the run where it is seen there,
@@ -343,6 +347,7 @@ class Model(Compiled):
         from .results import simulate
         from .wanted.asked import Control, asked
 
+        model = self if inputs is None else self.with_inputs(inputs)
         given = Control(method, step, rtol, atol)
         wanted = asked(error, error_of, given, checkpoint is not None or resume)
         method, rtol, atol = given.filled(wanted)
@@ -353,19 +358,19 @@ class Model(Compiled):
                 tangent=tangent,
             )
         )  # fmt: skip
-        q, u = self.initial_state() if initial is None else pair("initial", initial)
+        q, u = model.initial_state() if initial is None else pair("initial", initial)
         instead = "simulate_batch takes many"
         q, u = one("initial q", q, self.nq, instead), one("initial u", u, self.nu, instead)
-        seen = started(self, settings, q, u, on_risk)
+        seen = started(model, settings, q, u, on_risk)
         if wanted is not None:
             from .wanted import search
 
             result = search.simulate(
-                self, settings, wanted, q, u, seen=seen, certify=certify, progress=progress
+                model, settings, wanted, q, u, seen=seen, certify=certify, progress=progress
             )
         else:
             result = simulate(
-                self, settings, q, u, seen=seen,
+                model, settings, q, u, seen=seen,
                 certify=certify, progress=progress, checkpoint=checkpoint, resume=resume,
             )  # fmt: skip
         return ended(result, on_risk)

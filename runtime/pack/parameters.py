@@ -26,7 +26,7 @@ TABLES = ("input", "body", "beam", "elastic", "hinge", "chain", "load", "event",
 _INDEX = re.compile(r"(.*)\[(\d+)\]")
 
 
-def _data(scene: Scene, evaluated: bool = False) -> dict[str, Any]:
+def data_of(scene: Scene, evaluated: bool = False) -> dict[str, Any]:
     """The scene as a file has it, without the ends that every beam has of itself; `evaluated`, with
     numbers alone for what is written as expressions of named constants."""
     data = tomllib.loads(to_toml(scene, evaluated))
@@ -56,7 +56,7 @@ def _numbers(path: str, value: Any) -> Iterator[tuple[str, float]]:
 
 def read(scene: Scene) -> dict[str, float]:
     """Every number by its name, in the scene's order."""
-    data = _data(scene, evaluated=True)
+    data = data_of(scene, evaluated=True)
     found = dict(_numbers("constants", data.get("constants", {})))
     found.update(_numbers("gravity", data["gravity"]))
     for name, element in _named(data):
@@ -72,7 +72,7 @@ def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
     pattern: "rope.body.mass".  Raises SceneError for unknown names and for values that the scene
     refuses.
     """
-    data = _data(scene)
+    data = data_of(scene)
     there: dict[str, float] | None = None
     for path, given in by_name("parameters", changes).items():
         value = real(f'parameter "{path}"', given)
@@ -82,8 +82,14 @@ def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
     for beam in data.get("beam", []):  # an end "tip" with axes of its own stays at the tip
         if "tip" in beam["ends"]:
             beam["ends"]["tip"]["position"] = [beam["length"], 0.0, 0.0]
+    return made_of(data, scene)
+
+
+def made_of(data: dict[str, Any], scene: Scene, where: str = "scene") -> Scene:
+    """The scene that data like those of another one are, validated afresh; `where` begins every
+    message."""
     _begin_driven(data)
-    found = Scene.from_data(data)
+    found = Scene.from_data(data, where)
     inherit(found, scene)
     return found
 

@@ -218,6 +218,10 @@ class Quantities:
         about = "work of everything that is not stored"
         power = self._summed("power")
         table.scalar("work", "J", about, lambda: self.run.work, rates=power)
+        scene = self.observed.references.scene
+        for word, given in (("input", scene.input), ("signal", scene.signal)):
+            for one in given:
+                table.scalar(one.name, one.unit, f"{word} {one.name}", self._over_time(one.name))
 
     def _hinge(self, table: Table, hinge: HingeSlots) -> None:
         """q, u, their rates and efforts by the hinge's own names and by number; loads."""
@@ -246,6 +250,10 @@ class Quantities:
 
     def _summed(self, name: str) -> Values:
         return lambda: self.sum(name)
+
+    def _over_time(self, name: str) -> Values:
+        channel = self.observed.references.scene.channels[name]
+        return lambda: np.array([channel.value(t) for t in self.run.t.tolist()])
 
     @staticmethod
     def _bound(method: Callable[[str, str], Array], name: str, kind: str) -> Values:

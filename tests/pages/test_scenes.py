@@ -19,6 +19,7 @@ from mstmm.scene import (
     Event,
     Friction,
     Hinge,
+    Input,
     Law,
     Limits,
     Load,
@@ -26,6 +27,7 @@ from mstmm.scene import (
     Scene,
     Section,
     Shapes,
+    Signal,
     Spring,
     SpringLaw,
     Start,
@@ -61,7 +63,7 @@ def test_scene_runs(block: str, tmp_path: Path) -> None:
     "table",
     [
         Scene, Body, Hinge, Chain, Law, Friction, Limits, Load, Spring, SpringLaw, Event, Beam,
-        Section, Modes, Shapes, Damping, Start, Elastic, ElasticEnd, Arrays, Box,
+        Section, Modes, Shapes, Damping, Start, Elastic, ElasticEnd, Arrays, Box, Input, Signal,
     ],
     ids=lambda t: t.__name__,
 )  # fmt: skip
@@ -76,5 +78,5 @@ def test_every_hinge_type_is_described() -> None:
 
 
 def test_first_scene_has_the_energy_it_began_with(played: Follow) -> None:
-    energy = float(played(PAGE).printed.split()[-1])
+    energy = float(played(PAGE).printed.splitlines()[0].split()[-1])
     assert energy == pytest.approx(9.81 * 0.5 * 0.29552020666134, abs=1e-6)

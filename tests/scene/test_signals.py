@@ -162,6 +162,7 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest.Monk
         ({"file": "wind.csv"}, ("file stands instead of times and values",)),
         ({"column": 2}, ("only a file has columns",)),
         ({"name": "t"}, ("has a meaning in expressions already",)),
+        ({"name": "energy"}, ('"energy" is a quantity of every result',)),
         ({"name": "sin"}, ("has a meaning in expressions already",)),
         ({"unit": "x" * 65}, ('unit such as "N m"',)),
         ({"values": [0, 1, "k", 0, 0]}, ("values[2]", "expected a number")),
@@ -222,13 +223,12 @@ def test_a_drive_needs_rates() -> None:
 
 
 def test_inputs_and_signals_nobody_uses_are_told() -> None:
-    scene = Scene.from_data(
-        motor("wind", signal=[wind(), wind(name="calm")], input=[{"name": "brake"}])
-    )
-    told = {(risk.name, risk.element, risk.doubt) for risk in scene.risks}
-    assert told == {("unused-input", 'input "brake"', False),
-                    ("unused-input", 'signal "calm"', False)}  # fmt: skip
-    followed = motor("brake", signal=[wind()], input=[{"name": "brake", "value": "wind"}])
+    calm = wind(name="calm")
+    for tables, element in (({"input": [{"name": "brake"}]}, 'input "brake"'),
+                            ({"signal": [wind(), calm]}, 'signal "calm"')):  # fmt: skip
+        (risk,) = Scene.from_data(motor("wind", **{"signal": [wind()]} | tables)).risks
+        assert (risk.name, risk.element, risk.doubt) == ("unused-input", element, False)
+    followed = motor("brake", signal=[wind(), calm], input=[{"name": "brake", "value": "wind"}])
     assert Scene.from_data(followed).risks == ()
 
 

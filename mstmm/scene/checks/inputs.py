@@ -19,12 +19,18 @@ if TYPE_CHECKING:
     from ..tables.all import SceneTables
 
 
+#: Quantities of results that belong to no body and no hinge.
+OF_SCENE = ("energy", "power", "work", "momentum", "angular_momentum")
+
+
 def problems(scene: SceneTables) -> Iterator[Problem]:
     """Names that mean something else already, and signals that are not there."""
     taken = dict.fromkeys(scene.constants, "a constant")
     for table, word in (("input", "an input"), ("signal", "a signal")):
         for i, element in enumerate(getattr(scene, table)):
             problem = problem_with_name(element.name)
+            if not problem and element.name in OF_SCENE:
+                problem = f'"{element.name}" is a quantity of every result; choose another name'
             if not problem and taken.get(element.name, word) != word:
                 problem = f'"{element.name}" is also the name of {taken[element.name]}; rename one'
             taken[element.name] = word
@@ -88,12 +94,18 @@ def _start(scene: SceneTables, entry: Expression, at: Location) -> Iterator[Prob
         )
 
 
+def users(scene: SceneTables) -> Iterator[tuple[str, str]]:
+    """(name, who names it) of inputs and signals, each as often as it is named; of signals that
+    inputs follow the input, else ""."""
+    yield from ((name.text, "") for one in expressions(scene) for name in one.names)
+    yield from ((one.value, one.name) for one in scene.input if isinstance(one.value, str))
+
+
 def risks(scene: SceneTables) -> list[Risk]:
-    """Inputs and signals that nobody uses."""
-    used = {name.text for expression in expressions(scene) for name in expression.names}
-    used |= {one.value for one in scene.input if isinstance(one.value, str)}
+    """Inputs and signals that nobody uses; signals beside inputs wait for these to follow them."""
+    used = {name for name, _ in users(scene)}
     found_risks = []
-    for table in ("input", "signal"):
+    for table in ("input",) if scene.input else ("signal",):
         for element in getattr(scene, table):
             if element.name not in used:
                 name = f'{table} "{element.name}"'

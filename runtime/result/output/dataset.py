@@ -39,7 +39,7 @@ def dataset(result: Record) -> Any:
         variables |= _bodies(result) | _hinges(result) | flexible.variables(result)
     else:
         labels = {key: label for key, label in labels.items() if key not in _EVERYTHING}
-    variables |= _sums(result) | provenance.variables(result)
+    variables |= _sums(result) | _given(result) | provenance.variables(result)
     return xarray.Dataset(variables, labels, provenance.attributes(result))
 
 
@@ -118,6 +118,17 @@ def _hinges(result: Record) -> dict[str, Variable]:
         values = np.stack(columns, axis=1) if columns else np.zeros((len(result.t), 0, 3))
         long_name = f"{about.long_name}, inertial axes"
         found[kind] = (("time", "hinge", "axis"), values, _about(about.unit, long_name))
+    return found
+
+
+def _given(result: Record) -> dict[str, Variable]:
+    """Inputs and signals by their names, as "input_motor" and "signal_wind"."""
+    scene, found = result.model.scene, dict[str, Variable]()
+    for word, given in (("input", scene.input), ("signal", scene.signal)):
+        for one in given:
+            known = result.quantity(one.name)
+            about = _about(known.unit, known.long_name)
+            found[f"{word}_{one.name}"] = (("time",), known.values, about)
     return found
 
 

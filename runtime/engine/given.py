@@ -1,0 +1,87 @@
+"""Inputs of a scene that somebody sets: to a number, or to what they are over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from mstmm.arrays import by_name, numbers, real
+from mstmm.errors import SceneError
+from mstmm.scene import Scene
+from mstmm.scene.checks.inputs import users
+from mstmm.scene.rules.messages import near
+
+from ..pack.parameters import data_of, made_of
+
+#: A number, the name of a signal, (times, values), or the keys of a [[signal]].
+GivenInput = float | str | tuple[ArrayLike, ArrayLike] | Mapping[str, Any]
+
+_EXPECTED = "a number, the name of a signal, (times, values) or the keys of a [[signal]]"
+
+
+def with_inputs(scene: Scene, inputs: Mapping[str, GivenInput]) -> Scene:
+    """The scene with other inputs, validated afresh: what is given over time is a signal of it.
+
+    Raises SceneError for names of no input, and for what no input can be.
+    """
+    data = data_of(scene)
+    tables = {table["name"]: table for table in data.get("input", [])}
+    for name, given in by_name("inputs", inputs).items():
+        if name not in tables:
+            raise _unknown(name, scene)
+        signal = _signal(name, given)
+        if signal is None:
+            tables[name]["value"] = given if isinstance(given, str) else real(_at(name), given)
+            continue
+        signals = data.setdefault("signal", [])
+        signal["name"] = _free_name(scene, name)
+        signals[:] = [other for other in signals if other["name"] != signal["name"]]
+        signals.append(signal | {"unit": tables[name]["unit"]})
+        tables[name]["value"] = signal["name"]
+        tables[name].pop("rates", None)
+    return made_of(data, scene, "scene with these inputs")
+
+
+def _unknown(name: str, scene: Scene) -> SceneError:
+    if any(signal.name == name for signal in scene.signal):
+        return SceneError(
+            f"{_at(name)}: this is a signal of the scene; let an [[input]] follow it, with "
+            f'value = "{name}", which can be set'
+        )
+    hint = near(name, (one.name for one in scene.input))
+    return SceneError(f"{_at(name)}: there is no such input in the scene{hint}")
+
+
+def _at(name: str) -> str:
+    return f'inputs["{name}"]'
+
+
+def _signal(name: str, given: Any) -> dict[str, Any] | None:
+    """The table of what is given over time; None for a number or a name."""
+    if isinstance(given, Mapping):
+        return {key: _plain(name, key, value) for key, value in given.items()}
+    if isinstance(given, str) or not hasattr(given, "__len__"):
+        return None
+    if len(given) != 2 or any(not hasattr(row, "__len__") for row in given):
+        raise SceneError(f"{_at(name)}: expected {_EXPECTED}")
+    return {
+        key: _plain(name, key, row) for key, row in zip(("times", "values"), given, strict=True)
+    }
+
+
+def _plain(name: str, key: str, value: Any) -> Any:
+    return numbers(f"{_at(name)} {key}", value).tolist() if key in ("times", "values") else value
+
+
+def _free_name(scene: Scene, name: str) -> str:
+    """What the signal is called that an input follows from now on; that of such a run before is
+    replaced."""
+    taken = {*scene.channels, *scene.constants}
+    alone = {signal for signal, user in users(scene) if user == name}
+    alone -= {signal for signal, user in users(scene) if user != name}
+    found = f"{name}_given"
+    while found in taken - alone:
+        found += "_"
+    return found
