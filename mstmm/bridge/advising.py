@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..defaults import ADVICE_SAMPLES, CHART_BUDGET, CHART_ERROR, CHART_ROUNDS
 from ..errors import SceneError
 from ..scene import Scene
-from .compilation import compile_scene
+from .compilation import compile_level, compile_scene
 
 if TYPE_CHECKING:
     from ..runtime.advice.record import Advice
@@ -58,10 +58,10 @@ def advise(
     asked = request(t_end, error, of, budget, samples, rounds)
 
     def compiled(one: Scene) -> Model:
-        return compile_scene(one, engine=engine)
+        return compile_level(one, engine=engine)
 
     if isinstance(scene, Scene):
-        model = compiled(scene)
+        model = compile_scene(scene, engine=engine)
     elif hasattr(scene, "simulate"):
         model = scene
     else:

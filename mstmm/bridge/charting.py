@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..defaults import CHART_BUDGET, CHART_ERROR, CHART_ROUNDS
 from ..errors import SceneError
 from ..scene import Scene
-from .compilation import compile_scene
+from .compilation import compile_level, compile_scene
 
 if TYPE_CHECKING:
     from ..runtime.chart.chart import Chart
@@ -69,10 +69,10 @@ def chart(
     chosen = "looped" if models and engine == "auto" else engine
 
     def compiled(one: Scene) -> Model:
-        return compile_scene(one, engine=chosen)
+        return compile_level(one, engine=chosen)
 
     if isinstance(scene, Scene):
-        model = compiled(scene)
+        model = compile_scene(scene, engine=chosen)
     elif hasattr(scene, "simulate"):
         model = scene
     else:

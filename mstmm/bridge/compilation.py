@@ -58,9 +58,25 @@ def compile_scene(
             body's own `model`.
 
     Raises SceneError for hinges that do not form a tree, types that nobody defines, and masses that
-    leave a motion of the start undetermined; EnvironmentFailure if engine="fused" and there is no
-    compiler or it fails.
+    leave a motion of the start undetermined, and outputs of what results do not have;
+    EnvironmentFailure if engine="fused" and there is no compiler or it fails.
     """
+    model = compile_level(scene, engine, sweep, accuracy, bake, flexibility)
+    if flexibility is None:
+        model.refuse_unknown_outputs()
+    return model
+
+
+def compile_level(
+    scene: Scene,
+    engine: str = "auto",
+    sweep: str = "riccati",
+    accuracy: float = 1e-8,
+    bake: bool = False,
+    flexibility: str | None = None,
+) -> Model:
+    """The same of a scene at a lower level of model, which may lack what an output is of: its
+    results do not have that output."""
     if engine not in ENGINES:
         raise SceneError(f'engine "{engine}" is not known; there are: {", ".join(ENGINES)}')
     if sweep not in SWEEPS:

@@ -105,6 +105,7 @@ def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
     layout = result.model.layout
     last = len(result.t) - 1
     counted, reached = result.statistics, result.error_estimate
+    outputs = result.outputs() if last >= 0 else {}
     return {
         "success": result.success,
         "trusted": verdict.trusted,
@@ -115,6 +116,7 @@ def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
         "samples": last + 1,
         "q": dict(zip(layout.q_names, result.q[last].tolist(), strict=True)) if last >= 0 else {},
         "u": dict(zip(layout.u_names, result.u[last].tolist(), strict=True)) if last >= 0 else {},
+        "outputs": {name: values[last].tolist() for name, values in outputs.items()},
         "method": result.settings.method,
         "methods": [asdict(stretch) for stretch in result.methods],
         "engine": result.model.engine,

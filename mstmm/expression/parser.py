@@ -260,8 +260,8 @@ class Parser:
         if token.endswith("]"):
             words, bracket, index = token.rpartition("[")
         parts = tuple(words.split("."))
-        if len(parts) > 3:
-            raise self.error("a name has at most three parts, as in body.end.x", start)
+        if len(parts) > 4:
+            raise self.error("a name has at most four parts, as in body.end.velocity.x", start)
         if any(len(part.partition("[")[0]) > MAX_WORD for part in parts):
             raise self.error(f"a word has at most {MAX_WORD} characters", start)
         return Name(parts, int(index[:-1]) if bracket else None, start)

@@ -15,12 +15,13 @@ from .tables.elastic_keys import Arrays, Box, ElasticEnd
 from .tables.flexible import Damping, Start
 from .tables.hinge import Hinge
 from .tables.hinge_keys import Initial
-from .tables.inputs import Input, Signal
+from .tables.inputs import Input, Output, Signal
 from .tables.law import Friction, Law, LawEntry, Limits, SpringLaw
 from .tables.loads import Event, Load, Spring
 
 __all__ = [
     "Arrays", "Beam", "Body", "Box", "Chain", "Damping", "Elastic", "ElasticEnd", "End", "Event",
-    "Friction", "Hinge", "Initial", "Input", "Law", "LawEntry", "Limits", "Load", "Modes", "Scene",
-    "Section", "Shapes", "Signal", "Spring", "SpringLaw", "Start", "load_scene", "read", "split",
+    "Friction", "Hinge", "Initial", "Input", "Law", "LawEntry", "Limits", "Load", "Modes", "Output",
+    "Scene", "Section", "Shapes", "Signal", "Spring", "SpringLaw", "Start", "load_scene", "read",
+    "split",
 ]  # fmt: skip

@@ -18,6 +18,7 @@ from mstmm.scene.tables.flexible import AUTO
 
 from ..chart.models import with_tables
 from .merging import REFERENCES, with_names
+from .outputs import with_places
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,7 @@ def _cut(found: Split, beam: Beam, count: int) -> Split:
         table: tuple(with_names(one, keys, moved) for one in getattr(scene, table))
         for table, keys in REFERENCES.items()
     }
+    tables["output"] = tuple(with_places(one, moved) for one in scene.output)
     tables["load"] = tuple(
         part for load in tables["load"] for part in _loads(load, beam, parts, size)
     )

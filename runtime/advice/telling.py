@@ -12,6 +12,7 @@ from ..chart.point import Setting
 from ..integrate.steppers import AUTO
 from .choice import RIGID, Choice, given
 from .evidence import Evidence
+from .outputs import with_outputs_there
 from .record import Advice, BodyAdvice, TriedModel
 from .search import Choices, Search
 from .settings import Chosen, compared
@@ -47,7 +48,7 @@ def told(
         asked.error, work.measure.name, work.measure.unit, work.measure.scaling, asked.t_end,
         _compared(work, chosen), bench.span.whole, max(bench.floor, work.unseen), bodies, changes,
         chosen.point.setting, error * growth + work.unseen, chosen.point.cpu_s, model_saving,
-        setting_saving, chosen.tried.scene,
+        setting_saving, with_outputs_there(chosen.tried.scene, work.compile),
         dict(work.measure.names_in(chosen.tried.running)), dict(work.parts),
         tuple(work.notes),
         tuple(

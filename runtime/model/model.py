@@ -71,6 +71,15 @@ class Model(Compiled):
 
         refuse_undetermined_start(self, *self.initial_state())
 
+    def refuse_unknown_outputs(self) -> None:
+        """SceneError for the first output of the scene of a quantity that results do not have."""
+        if self.scene.output:
+            from ..result.outputs import quantity_of
+
+            start = self.simulate(0.0, "dop853")
+            for output in self.scene.output:
+                quantity_of(output, start.t, start.quantity)
+
     def accelerations(
         self,
         q: ArrayLike,

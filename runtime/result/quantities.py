@@ -14,6 +14,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.ir.facts import effort_unit
+from mstmm.scene import Output
 from mstmm.scene.rules.messages import near
 
 from ..pack.layout import HingeSlots
@@ -21,6 +22,7 @@ from .flexible.names import add_body
 from .kinds import Kind
 from .names import Quantity, Table, Values
 from .observed import quaternions
+from .outputs import component_of, one_quantity, quantity_of
 
 if TYPE_CHECKING:
     from .flexible.quantities import FlexibleResults
@@ -137,15 +139,20 @@ class Quantities:
 
     def get(self, name: str) -> Quantity:
         """The quantity of this name; SceneError with the nearest name if there is none."""
-        parts = name.split(".")
-        owners = [".".join(parts[:k]) for k in range(1, len(parts))]
-        for owner in ["", *(x for x in owners if self._owns(x))]:
+        owners = self._owners_in(name)
+        for owner in ["", *owners]:
             entry = self.of(owner).entries.get(name)
             if entry is not None:
                 return entry()
-        known = [n for x in owners if self._owns(x) for n in self.of(x).entries]
+        known = [n for owner in owners for n in self.of(owner).entries]
         hint = near(name, known or self._every())
         raise SceneError(f'"{name}": there is no such quantity{hint}')
+
+    def _owners_in(self, name: str) -> list[str]:
+        """Hinges, bodies and ends with which a name begins."""
+        parts = name.split(".")
+        owners = (".".join(parts[:k]) for k in range(1, len(parts)))
+        return [owner for owner in owners if self._owns(owner)]
 
     def names(self) -> list[str]:
         """Every name there is."""
@@ -157,6 +164,11 @@ class Quantities:
     def scalars(self) -> list[str]:
         """One name for every number there is per sample, in the order of a wide table."""
         return [name for owner in self.owners() for name in self.of(owner).scalars]
+
+    def outputs(self) -> list[str]:
+        """The outputs of the scene that this model has."""
+        there = self.of("").entries
+        return [one.name for one in self.observed.references.scene.output if one.name in there]
 
     def owners(self) -> Iterator[str]:
         """Hinges, bodies and ends, and the scene itself."""
@@ -222,6 +234,32 @@ class Quantities:
         for word, given in (("input", scene.input), ("signal", scene.signal)):
             for one in given:
                 table.scalar(one.name, one.unit, f"{word} {one.name}", self._over_time(one.name))
+        for output in scene.output:
+            self._output(table, output)
+
+    def _output(self, table: Table, output: Output) -> None:
+        """Under its name; of a vector its components too.  Models of a lower level, which lack a
+        quantity of it, do not have it."""
+
+        def is_there(name: str) -> bool:
+            owners = (table, *map(self.of, self._owners_in(name)))
+            return name == "t" or any(name in owner.entries for owner in owners)
+
+        if not all(is_there(name.text) for name in output.of.names):
+            return
+
+        def whole() -> Quantity:
+            return quantity_of(output, self.run.t, self.get)
+
+        def component(label: str) -> Callable[[], Quantity]:
+            return lambda: component_of(whole(), label)
+
+        table.entries[output.name] = whole
+        source = one_quantity(output)
+        labels = [label for label in _WXYZ if source and is_there(f"{source}.{label}")]
+        for label in labels:
+            table.entries[f"{output.name}.{label}"] = component(label)
+        table.scalars += [f"{output.name}.{label}" for label in labels] or [output.name]
 
     def _hinge(self, table: Table, hinge: HingeSlots) -> None:
         """q, u, their rates and efforts by the hinge's own names and by number; loads."""

@@ -219,6 +219,10 @@ class Record(FlexibleResults, ABC):
         """Angular momentum (n, 3) in kg*m2/s of the whole scene about the inertial origin."""
         return self._quantities.sum("angular_momentum")
 
+    def outputs(self) -> dict[str, Array]:
+        """Outputs of the scene by their names, (n,) each or (n, 3), (n, 4) of vectors."""
+        return {name: self.quantity(name).values for name in self._quantities.outputs()}
+
     # --- by name --------------------------------------------------------------------------------
 
     def names(self) -> tuple[str, ...]:

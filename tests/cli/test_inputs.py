@@ -91,3 +91,23 @@ def test_a_file_that_is_not_there_is_named(mstmm: Command, scene: str) -> None:
     done = mstmm("simulate", scene)
     assert done.code == 2
     assert f"{scene}: signal \"gust\": file: 'gust.csv': there is no such file" in done.err
+
+
+def test_outputs_are_shown_and_told(mstmm: Command, scene: str) -> None:
+    outputs = '[[output]]\nname = "hand"\nof = "rod.tip.position"\n'
+    outputs += '[[output]]\nname = "power"\nof = "motor*pivot.angle_rate"\nunit = "W"\n'
+    with Path(scene).open("a") as file:
+        file.write(outputs.replace("power", "motor_power"))
+    done = mstmm("simulate", scene, "--t-end", "1", "-o", "run.nc", "--json", "--error", "1e-4",
+                 "--of", "motor_power")  # fmt: skip
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    assert told["outputs"]["motor_power"] == 0.5 * told["u"]["pivot.angle_rate"]
+    assert len(told["outputs"]["hand"]) == 3 and told["error_estimate"] is not None
+    shown = mstmm("simulate", scene, "--t-end", "1", "-o", "run.nc").out
+    assert "hand.x" in shown and "motor_power" in shown
+    with Path(scene).open("a") as file:
+        file.write('[[output]]\nname = "foot"\nof = "rod.tap.x"\n')
+    done = mstmm("simulate", scene)
+    assert done.code == 2 and done.out == ""
+    assert f'{scene}: output "foot": of: "rod.tap.x": there is no such quantity' in done.err

@@ -182,7 +182,7 @@ BAD = [
     ("q[-1]", "an index follows its name directly"),
     ("q[i]", "an index follows its name directly"),
     ("q [0]", "an index follows its name directly"),
-    ("a.b.c.d", "at most three parts"),
+    ("a.b.c.d.e", "at most four parts"),
     ("a" * 65, "at most 64 characters"),
     ("a..b", "not part of an expression"),
     ("t.", "not part of an expression"),

@@ -24,6 +24,7 @@ from mstmm.scene import (
     Limits,
     Load,
     Modes,
+    Output,
     Scene,
     Section,
     Shapes,
@@ -64,6 +65,7 @@ def test_scene_runs(block: str, tmp_path: Path) -> None:
     [
         Scene, Body, Hinge, Chain, Law, Friction, Limits, Load, Spring, SpringLaw, Event, Beam,
         Section, Modes, Shapes, Damping, Start, Elastic, ElasticEnd, Arrays, Box, Input, Signal,
+        Output,
     ],
     ids=lambda t: t.__name__,
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Inputs and signals of a scene: their names, who follows which, which nobody uses."""
+"""Inputs, signals and outputs of a scene: their names, who follows which, which nobody uses."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from ..tables.all import SceneTables
 
 
+_WORDS = {"input": "an input", "signal": "a signal", "output": "an output"}
+
 #: Quantities of results that belong to no body and no hinge.
 OF_SCENE = ("energy", "power", "work", "momentum", "angular_momentum")
 
@@ -26,7 +28,7 @@ OF_SCENE = ("energy", "power", "work", "momentum", "angular_momentum")
 def problems(scene: SceneTables) -> Iterator[Problem]:
     """Names that mean something else already, and signals that are not there."""
     taken = dict.fromkeys(scene.constants, "a constant")
-    for table, word in (("input", "an input"), ("signal", "a signal")):
+    for table, word in _WORDS.items():
         for i, element in enumerate(getattr(scene, table)):
             problem = problem_with_name(element.name)
             if not problem and element.name in OF_SCENE:
@@ -36,6 +38,7 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
             taken[element.name] = word
             if problem:
                 yield (table, i, "name"), problem
+    yield from _outputs(scene)
     signals = [signal.name for signal in scene.signal]
     for i, one in enumerate(scene.input):
         if isinstance(one.value, str) and one.value not in signals:
@@ -51,6 +54,22 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
                     (*place, "parameters"),
                     f'"{name}" is also the name of {taken[name]} of the scene; rename that',
                 )
+
+
+def _outputs(scene: SceneTables) -> Iterator[Problem]:
+    """Outputs whose components could be mistaken for quantities of others, and outputs of outputs.
+    Whether there are such quantities results know."""
+    outputs = {output.name for output in scene.output}
+    owners = {body.name for body in scene.skeleton.body} | {hinge.name for hinge in scene.hinge}
+    owners |= {chain.name for chain in scene.chain}
+    for i, output in enumerate(scene.output):
+        if output.name in owners:
+            problem = f'"{output.name}" is also the name of a body, hinge or chain; rename one'
+            yield ("output", i, "name"), problem
+        for name in output.of.names:
+            if name.parts[0] in outputs:
+                problem = f'"{name.text}" is an output itself; write what it is of'
+                yield ("output", i, "of"), problem
 
 
 def drives(scene: SceneTables) -> Iterator[Problem]:
@@ -97,7 +116,8 @@ def _start(scene: SceneTables, entry: Expression, at: Location) -> Iterator[Prob
 def users(scene: SceneTables) -> Iterator[tuple[str, str]]:
     """(name, who names it) of inputs and signals, each as often as it is named; of signals that
     inputs follow the input, else ""."""
-    yield from ((name.text, "") for one in expressions(scene) for name in one.names)
+    for one in (*expressions(scene), *(output.of for output in scene.output)):
+        yield from ((name.text, "") for name in one.names)
     yield from ((one.value, one.name) for one in scene.input if isinstance(one.value, str))
 
 

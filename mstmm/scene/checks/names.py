@@ -134,6 +134,7 @@ def _position(name: Name, scope: Scope) -> str | None:
     ends = scope.bodies.ends(name.owner)
     if ends is None:
         return scope.bodies.missing(name.owner, repr(name.owner))
-    if len(name.parts) == 3 and name.parts[1] not in ends:
-        return f'body "{name.owner}" has no end {name.parts[1]!r}{near(name.parts[1], ends)}'
+    end = ".".join(name.parts[1:-1])
+    if end and end not in ends:
+        return f'body "{name.owner}" has no end {end!r}{near(end, ends)}'
     return None

@@ -31,7 +31,8 @@ RESERVED = {
 
 #: The lists of tables of a scene.
 TABLES = (
-    "input", "signal", "body", "hinge", "chain", "beam", "elastic", "load", "event", "spring",
+    "input", "signal", "output", "body", "hinge", "chain", "beam", "elastic", "load", "event",
+    "spring",
 )  # fmt: skip
 
 Problem = tuple[Location, str]

@@ -225,6 +225,21 @@ def one_expression(expected: str) -> Rule:
     return Rule(expected, check, _EXPRESSION_SCHEMA, dump_expression)
 
 
+def formula(expected: str) -> Rule:
+    """One expression that is not constant, such as "rod1.tip.x - 2*shoulder.angle"."""
+
+    def check(value: Any) -> Expression:
+        value = plain(value)
+        if not isinstance(value, (str, Expression)):
+            raise refuse(f"expected {expected}, found {found(value)}")
+        result = to_expression(value, expected)
+        if result.is_constant:
+            raise refuse(f"expected {expected}, found {found(result.text)}, which is one number")
+        return result
+
+    return Rule(expected, check, {"type": "string"}, lambda value: value.text)
+
+
 def condition(expected: str, time: bool = False) -> Rule:
     """A comparison such as "rod1.x < 0.1"; with `time` a number alone means t >= number."""
 

@@ -18,7 +18,7 @@ from .chain import Chain
 from .constants import constants as named_numbers
 from .elastic import Elastic
 from .hinge import Hinge
-from .inputs import Input, Signal
+from .inputs import Input, Output, Signal
 from .loads import Event, Load, Spring
 from .members import Bodies, Hinges
 from .rigid import bare
@@ -39,6 +39,7 @@ class SceneTables(Table):
     constants: Annotated[dict[str, float], named_numbers()] = Field(default_factory=dict)
     input: tuple[Input, ...] = ()
     signal: tuple[Signal, ...] = ()
+    output: tuple[Output, ...] = ()
     body: tuple[Body, ...] = ()
     hinge: tuple[Hinge, ...] = ()
     chain: tuple[Chain, ...] = ()

@@ -1,4 +1,5 @@
-"""What comes from outside the scene: inputs, which are set, and signals, which go by time."""
+"""What a scene has to do with the outside: inputs, which are set, signals, which go by time, and
+outputs, which are looked at."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import model_validator
 
+from ...expression.expression import Expression
 from ...numbers.pieces import INTERPOLATIONS, Pieces, through
 from ..rules import text as texts
 from ..rules import values as rules
@@ -65,6 +67,15 @@ class Input(Table):
         if self.rates is not None and isinstance(self.value, str):
             raise refuse(f'the signal "{self.value}" has rates of its own; leave them out', "rates")
         return self
+
+
+class Output(Table):
+    """A quantity of results, or an expression of such and of t, inputs and signals, under a name of
+    its own; without a `unit` it has that of its one quantity."""
+
+    name: Annotated[str, texts.name("the output's name")]
+    of: Annotated[Expression, texts.formula("a quantity of results or an expression of some")]
+    unit: Annotated[str, _unit()] = ""
 
 
 def _column() -> Rule:

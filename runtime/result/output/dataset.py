@@ -12,6 +12,7 @@ from mstmm.ir.facts import effort_unit
 from ..flexible import dataset as flexible
 from ..quantities import BODY, HINGE, SUMS, acceleration_name, rate_unit
 from . import provenance
+from .table import flat
 
 if TYPE_CHECKING:
     from ..record import Record
@@ -122,14 +123,31 @@ def _hinges(result: Record) -> dict[str, Variable]:
 
 
 def _given(result: Record) -> dict[str, Variable]:
-    """Inputs and signals by their names, as "input_motor" and "signal_wind"."""
+    """Inputs, signals and outputs by their names, as "input_motor", "signal_wind" and
+    "output_height"."""
     scene, found = result.model.scene, dict[str, Variable]()
-    for word, given in (("input", scene.input), ("signal", scene.signal)):
-        for one in given:
-            known = result.quantity(one.name)
-            about = _about(known.unit, known.long_name)
-            found[f"{word}_{one.name}"] = (("time",), known.values, about)
+    names = {
+        "input": [one.name for one in scene.input], "signal": [one.name for one in scene.signal],
+        "output": result._quantities.outputs(),
+    }  # fmt: skip
+    for word, given in names.items():
+        for name in given:
+            known = result.quantity(name)
+            about, key = _about(known.unit, known.long_name), f"{word}_{name}"
+            if known.labels in _DIMENSIONS:
+                found[key] = (("time", *_DIMENSIONS[known.labels]), known.values, about)
+            else:
+                columns = flat([known])
+                ends = [f"_{label}" for label in known.labels] or [""]
+                for end, (_, _, values) in zip(ends, columns, strict=True):
+                    found[f"{key}{end}"] = (("time",), values, about)
     return found
+
+
+#: Dimensions of vectors by the labels of their components.
+_DIMENSIONS: dict[tuple[str, ...], tuple[str, ...]] = {
+    tuple("xyz"): ("axis",), tuple("wxyz"): ("component",),
+}  # fmt: skip
 
 
 def _sums(result: Record) -> dict[str, Variable]:

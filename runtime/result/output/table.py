@@ -23,8 +23,11 @@ _LOOKED_AT = 10_000
 
 
 def default_names(result: Record, most: int = _DEFAULT_COLUMNS) -> list[str]:
-    """The first hinge coordinates, without quaternions, and deflections of the last end of the
-    first flexible bodies."""
+    """Outputs of the scene; where there are none, the first hinge coordinates, without quaternions,
+    and deflections of the last end of the first flexible bodies."""
+    outputs = result._quantities.outputs()
+    if outputs:
+        return outputs[:most]
     layout, bent = result.model.layout, list(_deflections(result, most // 2))
     names = (
         f"{hinge.name}.{name}"

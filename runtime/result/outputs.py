@@ -1,0 +1,79 @@
+"""Outputs of a scene: quantities of a run, and expressions of them, by names of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+from mstmm.expression.expression import Expression, Name
+from mstmm.ir import Port
+from mstmm.ir.graph import Graph
+from mstmm.scene import Output
+
+from ..kernels import vectorized
+from .names import Quantity
+
+#: Gives the quantity of a name, and raises SceneError where there is none.
+Known = Callable[[str], Quantity]
+
+
+def quantity_of(output: Output, t: Array, known: Known) -> Quantity:
+    """The output at the times t (n,); SceneError for what it names in vain."""
+    source = one_quantity(output)
+    try:
+        if source:
+            return _renamed(output, known(source))
+        columns = [_column(name, t, known) for name in output.of.names]
+    except SceneError as error:
+        raise SceneError(f'output "{output.name}": of: {error}') from None
+    values = _evaluated(output.of, np.stack(columns, axis=1))
+    return Quantity(output.name, values, output.unit, _long_name(output))
+
+
+def one_quantity(output: Output) -> str:
+    """The name of the quantity that an output is; "" for an expression."""
+    names, text = output.of.names, output.of.text
+    return text if len(names) == 1 and text == names[0].text != "t" else ""
+
+
+def component_of(quantity: Quantity, label: str) -> Quantity:
+    """One column of a vector."""
+    values = quantity.values[:, quantity.labels.index(label)]
+    long_name = f"{quantity.long_name}, {label}"
+    return Quantity(f"{quantity.name}.{label}", values, quantity.unit, long_name)
+
+
+def _renamed(output: Output, of: Quantity) -> Quantity:
+    long_name = f"{_long_name(output)}, {of.long_name}"
+    return replace(of, name=output.name, unit=output.unit or of.unit, long_name=long_name)
+
+
+def _long_name(output: Output) -> str:
+    return f"output {output.name} = {output.of.text}"
+
+
+def _column(name: Name, t: Array, known: Known) -> Array:
+    """The values (n,) of a name in an expression."""
+    if name.text == "t":
+        return t
+    found = known(name.text)
+    if found.values.ndim > 1:
+        raise SceneError(
+            f'"{name.text}" has {found.values.shape[1]} components; take one of them, such as '
+            f"{name.text}.{found.labels[0]}"
+        )
+    return found.values
+
+
+def _evaluated(expression: Expression, columns: Array) -> Array:
+    """An expression over the samples, its names given as columns (n, k)."""
+    graph = Graph()
+    places = {name: k for k, name in enumerate(expression.names)}
+    node = expression.build(graph, lambda name: graph.element("names", places[name]))
+    ports = Port("names", (columns.shape[1],)), Port("value", (1,))
+    kernel = graph.kernel("output", [ports[0]], [ports[1]], {"value": [node]})
+    return vectorized.evaluate(kernel, {"names": columns})["value"][:, 0]
