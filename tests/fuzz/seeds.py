@@ -8,6 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from mstmm import load_scene
+
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).parent
 Data = dict[str, Any]
@@ -30,8 +32,14 @@ def seeds() -> dict[str, Data]:
 
 
 def whole(data: Data, folder: Path) -> Data:
-    """The scene with files named from anywhere."""
+    """The scene with files named from anywhere, and with the numbers of signals in it."""
     for body in data.get("elastic", []):
         for key in {"mesh", "matrices"} & body.keys():
             body[key] = str(folder / body[key])
+    if any("file" in signal for signal in data.get("signal", [])):
+        signals = load_scene(folder / "scene.toml").signal
+        data["signal"] = [
+            {**one.model_dump(exclude_none=True), "times": [*one.times], "values": [*one.values]}
+            for one in signals
+        ]
     return data
