@@ -20,6 +20,9 @@ Piece = tuple[float, float, float, float, float]
 
 INTERPOLATIONS = ("hold", "line", "cubic")
 
+#: What jumps by less than this, of numbers above 1 relatively, does not.
+_ROUNDING = 1e-12
+
 
 @dataclass(frozen=True)
 class Pieces:
@@ -47,6 +50,22 @@ class Pieces:
         t0, c0, c1, c2, c3 = self.at(t)
         s = t - t0
         return c0 + s * (c1 + s * (c2 + s * c3))
+
+
+def rough(number: Pieces) -> list[float]:
+    """The knots at which the number or its rate jumps, but for rounding."""
+    found = []
+    for knot, before, behind in zip(number.knots, number.pieces, number.pieces[1:], strict=False):
+        ends = zip(_value_and_rate(before, knot), _value_and_rate(behind, knot), strict=True)
+        if any(abs(b - a) > _ROUNDING * max(1.0, abs(a), abs(b)) for a, b in ends):
+            found.append(knot)
+    return found
+
+
+def _value_and_rate(piece: Piece, t: float) -> tuple[float, float]:
+    t0, c0, c1, c2, c3 = piece
+    s = t - t0
+    return c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2 * c2 + s * 3 * c3)
 
 
 def steady(value: float, rate: float = 0.0, second_rate: float = 0.0) -> Pieces:

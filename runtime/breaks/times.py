@@ -18,6 +18,7 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.expression.drive import jump
 from mstmm.expression.inputs import Inputs
+from mstmm.numbers.pieces import rough
 from mstmm.risk import Risk
 
 from .acting import Acting
@@ -81,11 +82,12 @@ def _mapped(expressions: list[Acting], start: float, end: float, inputs: Inputs)
     for one in expressions:
         view = View(one.expression, dict(one.constants), one.drive)
         breaks.update(one.expression.time_breaks())
-        knots = sorted({knot for name in one.inputs for knot in inputs[name].knots})
-        breaks.update(knots)
-        jumps = jump(one.expression, _around(knots, start, end), inputs) if one.drive else ""
-        if jumps:
-            raise SceneError(f"{one.what}: {_shown(one)} {jumps}")
+        breaks.update(knot for name in one.inputs for knot in inputs[name].knots)
+        if one.drive:
+            knots = sorted({knot for name in one.inputs for knot in rough(inputs[name])})
+            jumps = jump(one.expression, _around(knots, start, end), inputs)
+            if jumps:
+                raise SceneError(f"{one.what}: {_shown(one)} {jumps}")
         for margin in view.margins():
             found = roots(margin, start, end, view.most)
             breaks.update(found.gaps.ravel().tolist())

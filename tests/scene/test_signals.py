@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from mstmm import load_scene
 from mstmm.errors import SceneError
-from mstmm.numbers.pieces import steady, through
+from mstmm.numbers.pieces import rough, steady, through
 from mstmm.scene import Scene, Signal
 from scene.scenes import Data, body, hinge
 
@@ -70,6 +70,13 @@ def test_a_line_has_not_stopped_at_its_last_time() -> None:
     found = through(TIMES, VALUES, "line")
     assert found.at(2.5)[2] == pytest.approx(-0.25 / 1.2)
     assert found.value(2.5) == pytest.approx(0.25, abs=1e-15)
+
+
+def test_jumps_are_found_among_the_knots() -> None:
+    assert rough(through(TIMES, VALUES, "cubic"))[0] == 0.0
+    assert len(rough(through(TIMES, VALUES, "cubic"))) == 2
+    assert rough(through((0, 1, 2, 3), (0, 1, 2, 4), "line"))[1:] == [2.0, math.nextafter(3.0, 4)]
+    assert rough(through(TIMES, VALUES, "hold")) == list(TIMES[1:])
 
 
 def test_rates_of_an_input_are_those_of_its_start() -> None:
@@ -215,6 +222,8 @@ def test_a_drive_needs_rates() -> None:
     Scene.from_data(data)
     data["hinge"][0]["drive"] = ["sin(q)"]
     assert "a drive depends on t and inputs alone, found 'q'" in refused(data)
+    data["hinge"][0]["drive"] = ["2*abs(angle - 0.3) + where(t < 1, t, 1)"]
+    assert "a drive cannot switch with an input, found 'abs(angle - 0.3)'" in refused(data)
     data["hinge"][0]["drive"] = ["1/(angle - 0.2)"]
     assert "not finite at t = 0" in refused(data)
 

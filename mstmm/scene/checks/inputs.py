@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import ExpressionError
 from ...expression.drive import motion_at
-from ...expression.expression import Expression
+from ...expression.expression import SWITCHES, Expression
 from ...risk import Risk
 from ..rules.messages import Problem, near
 from ..rules.values import Location, found
@@ -85,7 +85,14 @@ def drives(scene: SceneTables) -> Iterator[Problem]:
             if [name for name in unknown if name != "t"]:
                 continue  # the hinge's own check has said so
             still = [n.text for n in entry.names if _has_no_rates(inputs.get(n.text))]
-            if still:
+            switch = _switch(entry, scene)
+            if switch:
+                yield (
+                    at,
+                    f"a drive cannot switch with an input, found {switch!r}; let the input go the "
+                    "whole way that is meant",
+                )
+            elif still:
                 yield (
                     at,
                     f"a drive needs the rates of the input {still[0]!r}; declare them there, as in "
@@ -93,6 +100,19 @@ def drives(scene: SceneTables) -> Iterator[Problem]:
                 )
             else:
                 yield from _start(scene, entry, at)
+
+
+def _switch(entry: Expression, scene: SceneTables) -> str:
+    """The first term that switches with an input; "" where there is none."""
+    follows = set[int]()
+    for number, term in enumerate(entry.terms):
+        if term.name is not None and term.name.text in scene.channels:
+            follows.add(number)
+        elif any(i in follows for i in term.args):
+            follows.add(number)
+            if term.op in SWITCHES and number in entry.needed:
+                return entry.text[term.start : term.end]
+    return ""
 
 
 def _has_no_rates(one: Input | None) -> bool:
