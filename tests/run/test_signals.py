@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scene.scenes import body
+from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 
 import mstmm
@@ -90,7 +92,7 @@ def test_lines_and_splines_are_integrated_exactly(interpolation: str, engine: st
     run = wheel(engine, interpolation, values, "wind").simulate(4.0, "rk4", step=0.5)
     impulse = (
         CubicSpline(TIMES, values).integrate(0, 3) if interpolation == "cubic"
-        else np.trapezoid(values, TIMES)
+        else trapezoid(values, TIMES)
     ) + values[-1] * 1.0  # fmt: skip
     assert run.u[-1, 0] == pytest.approx(impulse / 0.5, abs=1e-12)
 
@@ -114,6 +116,36 @@ def test_a_signal_acts_as_the_cubic_that_it_is(
     assert run.success
     np.testing.assert_allclose(run.q, reference.q, rtol=0, atol=error)
     np.testing.assert_allclose(run.u, reference.u, rtol=0, atol=10 * error)
+
+
+def rope(name: str) -> dict[str, Any]:
+    link = {"mass": 0.1, "center_of_mass": [0.1, 0, 0], "inertia": [1e-4, 1e-3, 1e-3],
+            "ends": {"tip": [0.2, 0, 0]}}  # fmt: skip
+    pin = {"type": "pin", "law": {"effort": f"0.1*{name} - 0.01*u"}}
+    chain = {"name": "rope", "count": 5, "inboard": "ground", "body": [link], "hinge": [pin]}
+    return {"gravity": [0, -9.81, 0], "chain": [chain]}
+
+
+def blade(name: str) -> dict[str, Any]:
+    beam = {"name": "blade", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 40.0,
+            "modes": {"y": 2}}  # fmt: skip
+    pin = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "blade",
+           "law": {"effort": name}}  # fmt: skip
+    load = {"on": "blade", "force_per_length": [0, name, 0], "span": [0.5, 1.0]}
+    return {"gravity": [0, 0, 0], "beam": [beam], "hinge": [pin], "load": [load]}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("made", [rope, blade])
+def test_signals_act_on_chains_and_flexible_bodies(
+    made: Callable[[str], dict[str, Any]], engine: str
+) -> None:
+    times = [0.7, 1.3, 3.0]
+    reference = mstmm.compile(mstmm.Scene(**made(CUBIC)), engine="looped")
+    model = mstmm.compile(mstmm.Scene(**made("wind"), signal=[wind()]), engine=engine)
+    for method in ("dop853", "rodas5p"):
+        one, other = (m.simulate(3.0, method, output_times=times) for m in (model, reference))
+        np.testing.assert_allclose(one.q, other.q, rtol=0, atol=1e-8)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
