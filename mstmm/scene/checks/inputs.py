@@ -49,7 +49,7 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
             )
     for _, place, table_ in tables(scene):
         for name in table_.parameters:
-            if name in taken:
+            if name in scene.constants or name in scene.channels:
                 yield (
                     (*place, "parameters"),
                     f'"{name}" is also the name of {taken[name]} of the scene; rename that',
@@ -143,6 +143,8 @@ def users(scene: SceneTables) -> Iterator[tuple[str, str]]:
 
 def risks(scene: SceneTables) -> list[Risk]:
     """Inputs and signals that nobody uses; signals beside inputs wait for these to follow them."""
+    if not (scene.input or scene.signal):
+        return []
     used = {name for name, _ in users(scene)}
     found_risks = []
     for table in ("input",) if scene.input else ("signal",):
