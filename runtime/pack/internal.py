@@ -80,8 +80,8 @@ def system_of(
         laws, loads, tuple(_force(frames, spring, ports) for spring in nodes.spring),
         values.kernel() if len(values) else None,
         drive_kernel([drive for _, _, drive in driven], layout, ports) if driven else None,
-        tuple((place, k) for place, k, _ in driven), tuple(scene.channels.values()), _by_time(nodes),
-        moving or {},
+        tuple((place, k) for place, k, _ in driven), tuple(scene.channels.values()),
+        _by_time(nodes), moving or {},
     )  # fmt: skip
     return system, frames
 

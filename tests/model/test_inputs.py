@@ -166,3 +166,25 @@ def test_what_no_input_can_be(inputs: Any, says: str) -> None:
     with pytest.raises(SceneError) as error:
         model("looped").simulate(1.0, inputs=inputs)
     assert says in str(error.value)
+
+
+def acted_on(name: str, **tables: Any) -> Model:
+    """A rod on which this name acts by a law, a load that turns with it and a spring."""
+    pin = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod1",
+           "orientation": [0, 0, -1.5], "law": {"effort": f"{name}*cos(q)"}}  # fmt: skip
+    spring = {"from": "ground", "position": [0.3, -2, 0], "to": "rod1.tip",
+              "law": {"effort": f"2*(q - 0.5) + {name}"}}  # fmt: skip
+    load = {"on": "rod1.tip", "axes": "body", "force": [0, f"0.5*{name}", 0]}
+    data: dict[str, Any] = {"hinge": [pin], "spring": [spring], "load": [load]}
+    return mstmm.compile(mstmm.Scene(gravity=(0, -9.81, 0), body=[body("rod1")], **data, **tables))
+
+
+def test_linear_models_are_those_of_the_numbers_that_inputs_are() -> None:
+    plain = acted_on("0.7").linearize()
+    still = acted_on("motor", input=[{"name": "motor", "value": 0.7}])
+    moving = acted_on("wind", signal=[{"name": "wind", "times": [0, 1], "values": [0.2, 1.2]}])
+    for linear in (still.linearize(), moving.linearize(t=0.5)):
+        for name in ("M", "C", "K", "load", "geometric", "elastic"):
+            found, expected = getattr(linear, name), getattr(plain, name)
+            np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+    assert not still.packed.system.timed and moving.packed.system.timed
