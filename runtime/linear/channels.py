@@ -1,8 +1,12 @@
-"""Where a linear model is pushed: efforts, forces and moments at ends, accelerations of the ground.
+"""Where a linear model is pushed: efforts, forces and moments at ends, accelerations of the ground,
+inputs of the scene.
 
 The residual is linear in whatever acts, so that a column is the difference of two residuals of the
 tree at rest under nothing else, without error.  By duality the column of a force at a point along n
 is also how far the point goes along n with each coordinate.
+
+What an input changes is the derivative of the residual by it: by time, where the input goes by time
+at a unit's rate, less that where it stands still.
 """
 
 from __future__ import annotations
@@ -16,9 +20,12 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.ir.facts import effort_unit
+from mstmm.numbers.pieces import Pieces
 from mstmm.scene.rules.messages import near
 
+from ..breaks.acting import acting
 from ..engine.engine import Engine
+from ..engine.tangent import Tangent
 from ..pack.pack import packed_system
 from ..pack.system import LoadNumbers
 from ..pack.values import constant_kernel
@@ -37,8 +44,8 @@ GROUND = tuple(f"ground.acceleration.{axis}" for axis in _AXES)
 
 @dataclass(frozen=True)
 class Channel:
-    """One push: its name, unit, and which place pushes (`speed`, or `end` with `kind` and `axis`);
-    an acceleration of the ground where there is neither."""
+    """One push: its name, unit, and which place pushes: `speed`, or `end` with `kind` and `axis`,
+    or the place of an `input` among all; an acceleration of the ground where there is none."""
 
     name: str
     unit: str
@@ -46,16 +53,21 @@ class Channel:
     end: str = ""
     kind: str = ""
     axis: int = 0
+    input: int = -1
 
 
 def channel(model: Compiled, name: str) -> Channel:
     """The push of a name: "shoulder.effort" (of hinges with several speeds "ball.effort_wx"),
     "boom.tip.force.x" or short "boom.tip.fx", "boom.tip.moment.z" or "boom.tip.mz" (inertial axes),
-    "ground.acceleration.y".
+    "ground.acceleration.y", or an input of the scene.
 
-    Raises SceneError for a name that is none of these.
+    Raises SceneError for a name that is none of these, and for an input that drives.
     """
     owner, _, last = name.rpartition(".")
+    given = next((one for one in model.scene.input if one.name == name), None)
+    if given is not None:
+        _refuse_drive(model, name)
+        return Channel(name, given.unit, input=model.layout.inputs[name])
     if name in GROUND:
         return Channel(name, "m/s2", axis=_AXES.index(last))
     ends = References(model.scene.skeleton)
@@ -67,12 +79,27 @@ def channel(model: Compiled, name: str) -> Channel:
             long = end != owner and last == component
             if (long or last == letter + component) and end in ends:
                 return Channel(f"{end}.{kind}.{component}", unit, end=end, kind=kind, axis=axis)
-    known = [*_efforts(model), *(f"{end}.force.{axis}" for end in ends for axis in _AXES), *GROUND]
+    given_names = [one.name for one in model.scene.input]
+    known = [
+        *given_names,
+        *_efforts(model),
+        *(f"{end}.force.{axis}" for end in ends for axis in _AXES),
+        *GROUND,
+    ]
     raise SceneError(
         f'"{name}": expected an effort of a hinge such as "shoulder.effort", a force or moment at '
-        'an end such as "boom.tip.force.x", or an acceleration of the ground such as '
-        f'"ground.acceleration.x"{near(name, known)}'
+        'an end such as "boom.tip.force.x", an acceleration of the ground such as '
+        f'"ground.acceleration.x", or an input of the scene{near(name, known)}'
     )
+
+
+def _refuse_drive(model: Compiled, name: str) -> None:
+    for one in acting(model.scene):
+        if one.drive and name in one.inputs:
+            raise SceneError(
+                f'"{name}": the {one.what} follows this input, which is a motion and no push; take '
+                "the effort of that hinge as an input instead"
+            )
 
 
 def _effort(model: Compiled, name: str, hinge: str, last: str) -> Channel:
@@ -111,13 +138,31 @@ def columns(engine: Engine, state: State, channels: Sequence[Channel], free: lis
     for one in channels:
         unit = [0.0, 0.0, 0.0]
         unit[one.axis] = 1.0
-        if one.speed >= 0:
+        if one.input >= 0:
+            found.append(
+                _rate(engine, state, one.input, 0.0) - _rate(engine, state, one.input, 1.0)
+            )
+        elif one.speed >= 0:
             found.append(np.eye(engine.nu)[one.speed])
         elif one.end:
             found.append(nothing - residual(_under(engine, (0.0, 0.0, 0.0), one, unit)))
         else:
             found.append(residual(_under(engine, unit)) - nothing)
     return np.array(found).T[free]
+
+
+def _rate(engine: Engine, state: State, place: int, rate: float) -> Array:
+    """How the residual (nu,) changes with time where all inputs stand still at their values but
+    one, which goes at this rate."""
+    system = engine.packed.system
+    inputs = [
+        Pieces((), ((state.t, one.value(state.t), rate if k == place else 0.0, 0.0, 0.0),))
+        for k, one in enumerate(system.inputs)
+    ]
+    tangent = Tangent(Engine(packed_system(replace(system, inputs=tuple(inputs)), engine.packed)))
+    tangent.residual(state.t, state.q, state.u, state.a)
+    nothing = np.zeros(engine.nu)
+    return tangent.slope(1.0, np.zeros(engine.nq), nothing, nothing)
 
 
 def _under(

@@ -190,8 +190,9 @@ class Model(Compiled):
 
         `inputs` name v and `disturbances` w: efforts of hinges ("shoulder.effort"), forces and
         moments at ends in inertial axes ("boom.tip.force.x", "boom.tip.mz"), accelerations of the
-        ground ("ground.acceleration.y"; all three are w where nothing is named).  Coordinates that
-        a drive imposes are left out; the others move along with it.  Exact, no differences.
+        ground ("ground.acceleration.y"; all three are w where nothing is named), inputs of the
+        scene that nothing is driven by.  Coordinates that a drive imposes are left out; the others
+        move along with it.  Exact, no differences.
 
         Raises SceneError for a name or shape that does not fit, NumericalFailure where there is no
         equilibrium near the scene's start or the state has no accelerations.

@@ -188,3 +188,41 @@ def test_linear_models_are_those_of_the_numbers_that_inputs_are() -> None:
             found, expected = getattr(linear, name), getattr(plain, name)
             np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
     assert not still.packed.system.timed and moving.packed.system.timed
+
+
+@pytest.mark.parametrize("t", [0.0, 0.5])
+def test_linear_models_are_pushed_by_inputs(t: float) -> None:
+    """By laws, loads and springs; also where the input follows a signal, at its value there."""
+    gust = {"name": "gust", "times": [0, 1], "values": [0.2, 1.2]}
+    still = acted_on("(motor^2 + t)", input=[{"name": "motor", "unit": "N", "value": 0.7}])
+    moving = acted_on("(motor^2 + t)", input=[{"name": "motor", "value": "gust"}], signal=[gust])
+    for given, value in ((still, 0.7), (moving, 0.2 + t)):
+        linear = given.linearize([0.3], [0.2], t, inputs=["motor", "pin.effort"])
+        state = linear.state
+
+        def missing(number: float, given: Model = given, state: Any = state) -> Any:
+            with_number = given.with_inputs({"motor": number})
+            return with_number.inverse_dynamics(state.q, state.u, state.a, state.t)
+
+        slope = (missing(value - 1e-4) - missing(value + 1e-4)) / 2e-4
+        np.testing.assert_allclose(linear.V[:, 0], slope, rtol=1e-8)
+        np.testing.assert_allclose(linear.V[:, 1], 1.0, rtol=1e-14)
+        assert linear.inputs == ("motor", "pin.effort")
+
+
+def test_an_input_on_a_flexible_body_pushes_as_the_force_does() -> None:
+    beam = {"name": "blade", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 40.0,
+            "modes": {"y": 3}}  # fmt: skip
+    pin = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "blade",
+           "law": {"stiffness": 5.0}}  # fmt: skip
+    load = {"on": "blade.tip", "force": [0, "2*push", 0]}
+    blade = mstmm.compile(mstmm.Scene(gravity=(0, 0, 0), beam=[beam], hinge=[pin], load=[load],
+                                      input=[{"name": "push"}]))  # fmt: skip
+    linear = blade.linearize(inputs=["push", "blade.tip.force.y"])
+    np.testing.assert_allclose(linear.V[:, 0], 2 * linear.V[:, 1], rtol=1e-12, atol=1e-14)
+    assert np.abs(linear.V[:, 0]).min() > 0.1
+
+
+def test_an_input_that_drives_is_no_push() -> None:
+    with pytest.raises(SceneError, match='the drive of hinge "crank" follows this input'):
+        model("looped").linearize([0.1, 0.2], inputs=["angle"])
