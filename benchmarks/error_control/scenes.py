@@ -158,6 +158,26 @@ def spun_beams(rng: np.random.Generator) -> Drawn:
     return {"schema_version": 1, "gravity": [0.0] * 3, "beam": [beam], "hinge": [hinge]}, t_end
 
 
+def jerked_beams(rng: np.random.Generator) -> Drawn:
+    """A beam in a hub, a load on it or not, that a torque turns from one moment to the next."""
+    beam = _beam(
+        "boom", float(rng.uniform(1, 4)), float(rng.uniform(0.5, 3)), _log(rng, 1.5, 4.5),
+        modes={"y": int(rng.integers(1, 5))}, stiffening=bool(rng.random() < 0.5),
+        damping=float(rng.choice([0.0, 0.01, 0.05])),
+    )  # fmt: skip
+    law = {"effort": float(rng.uniform(2, 30)), "damping": float(rng.choice([0.0, 0.5]))}
+    hinges = [{
+        "name": "hub", "type": "pin", "axis": _Z, "inboard": "ground", "outboard": "boom",
+        "law": law,
+    }]  # fmt: skip
+    bodies = []
+    if rng.random() < 0.4:
+        bodies = [_rod("load", 0.3, float(rng.uniform(0.1, 1)))]
+        held = {"name": "grip", "type": "pin", "axis": _Z, "inboard": "boom.tip"}
+        hinges.append({**held, "outboard": "load", "law": {"damping": 0.05}})
+    return _scene(bodies, hinges, [0.0] * 3, beam=[beam]), float(rng.uniform(0.5, 3))
+
+
 def beam_arms(rng: np.random.Generator) -> Drawn:
     """A rigid link, a beam on its tip, and a load that the beam carries."""
     length = float(rng.uniform(0.5, 1.5))
@@ -339,7 +359,7 @@ TUNING: dict[str, Family] = {
     f.__name__: f
     for f in (
         rigid_trees, planar_chains, bushed_rows, spun_beams, beam_arms, driven_arms,
-        rubbing_rotors, stopped_arms,
+        rubbing_rotors, stopped_arms, jerked_beams,
     )
 }  # fmt: skip
 JUDGED: dict[str, Family] = {

@@ -10,6 +10,7 @@ import pytest
 from mstmm.runtime.model.wanted.looks import (
     RUNS,
     TIGHTEST,
+    Kind,
     Look,
     estimate,
     first_rtol,
@@ -18,31 +19,31 @@ from mstmm.runtime.model.wanted.looks import (
 )
 
 
-def looks(error: Callable[[float], float], *rtols: float, explicit: bool = True) -> list[Look]:
+def looks(error: Callable[[float], float], *rtols: float, kind: Kind = Kind.EXPLICIT) -> list[Look]:
     """Runs whose error is a function of the tolerance; they err all the same way."""
     tightest = error(rtols[-1])
-    return [Look(rtol, explicit, abs(error(rtol) - tightest), summed=10.0 * rtol) for rtol in rtols]
+    return [Look(rtol, kind, abs(error(rtol) - tightest), summed=10.0 * rtol) for rtol in rtols]
 
 
-def search(error: Callable[[float], float], asked: float, explicit: bool) -> tuple[float, float]:
+def search(error: Callable[[float], float], asked: float, kind: Kind) -> tuple[float, float]:
     """(true, estimated) error at the end of a search by one kind of method."""
-    rtols = [first_rtol(asked, explicit)]
+    rtols = [first_rtol(asked, kind)]
     while True:
-        found = looks(error, *rtols, explicit=explicit)
+        found = looks(error, *rtols, kind=kind)
         known = estimate(found)
         if known is not None and (known <= asked or hopeless(found)):
             return error(rtols[-1]), known
-        rtols.append(next_rtol(found, asked, explicit))
+        rtols.append(next_rtol(found, asked, kind))
 
 
-@pytest.mark.parametrize("explicit", [True, False])
+@pytest.mark.parametrize("kind", Kind)
 @pytest.mark.parametrize("asked", [1e-2, 1e-4, 1e-6, 1e-8])
 @pytest.mark.parametrize("growth", [0.03, 1.0, 50.0, 3e3])
 @pytest.mark.parametrize("power", [0.7, 0.9, 1.0, 1.2])
 def test_errors_that_follow_a_power_are_reached_and_told(
-    explicit: bool, asked: float, growth: float, power: float
+    kind: Kind, asked: float, growth: float, power: float
 ) -> None:
-    true, told = search(lambda rtol: growth * rtol**power, asked, explicit)
+    true, told = search(lambda rtol: growth * rtol**power, asked, kind)
     assert true <= 10 * told
     if growth * TIGHTEST**power < asked / 1000:  # within reach of numbers of 16 digits
         assert told <= asked
@@ -55,43 +56,49 @@ def test_one_run_tells_nothing() -> None:
 
 def test_an_error_that_stays_ends_the_search() -> None:
     """Rounding: about 1e-9, whatever the tolerance, now this way and now that."""
-    true, told = search(lambda rtol: 1e-9 * math.sin(1 / rtol) + 1e-3 * rtol, 1e-12, explicit=True)
+    true, told = search(
+        lambda rtol: 1e-9 * math.sin(1 / rtol) + 1e-3 * rtol, 1e-12, kind=Kind.EXPLICIT
+    )
     assert told > 1e-12
     assert abs(true) <= 10 * told
 
 
 def test_motion_that_cannot_be_told_ends_at_the_tightest_tolerance() -> None:
     """Errors of the size of the motion however tight, as of chaos."""
-    rtols = [first_rtol(1e-6, explicit=True)]
+    rtols = [first_rtol(1e-6, kind=Kind.EXPLICIT)]
     while not hopeless(found := looks(lambda rtol: 1.0 + 0.3 * math.sin(1 / rtol), *rtols)):
-        rtols.append(next_rtol(found, 1e-6, explicit=True))
+        rtols.append(next_rtol(found, 1e-6, kind=Kind.EXPLICIT))
     assert rtols[-1] == TIGHTEST
     assert len(rtols) < RUNS
 
 
 def test_runs_that_end_elsewhere_have_no_estimate() -> None:
-    found = [Look(1e-3, True, math.inf, None), Look(1e-5, True, 0.0, None)]
+    found = [Look(1e-3, Kind.EXPLICIT, math.inf, None), Look(1e-5, Kind.EXPLICIT, 0.0, None)]
     assert estimate(found) == math.inf
-    assert next_rtol(found, 1e-6, explicit=True) == pytest.approx(1e-7)
+    assert next_rtol(found, 1e-6, kind=Kind.EXPLICIT) == pytest.approx(1e-7)
 
 
 def test_an_explicit_run_after_implicit_ones_begins_anew() -> None:
-    implicit = [Look(1e-4, False, 0.05, 1e-4)]
-    first = next_rtol(implicit, 1e-7, explicit=True)
-    assert first == first_rtol(1e-7, explicit=True)
-    found = [*implicit, Look(first, True, 0.0, 1e-2)]
-    assert estimate(found) == pytest.approx(0.05)
-    assert next_rtol(found, 1e-7, explicit=True) == pytest.approx(first * 1e-5 ** (1 / 0.9))
+    implicit = [Look(1e-4, Kind.IMPLICIT, 0.05, 1e-4)]
+    first = next_rtol(implicit, 1e-7, kind=Kind.EXPLICIT)
+    assert first == first_rtol(1e-7, kind=Kind.EXPLICIT)
+    found = [*implicit, Look(first, Kind.EXPLICIT, 0.0, 1e-2)]
+    assert estimate(found) == pytest.approx(1.5 * 0.05)
+    assert next_rtol(found, 1e-7, kind=Kind.EXPLICIT) == pytest.approx(
+        first * (1e-5 / 3) ** (1 / 0.9)
+    )
 
 
 def test_local_errors_where_stability_sets_the_steps_count_for_less() -> None:
-    free, held = (next_rtol([Look(3e-3, True, 0.0, 1e-1, h)], 1e-3, True) for h in (False, True))
+    kind = Kind.EXPLICIT
+    free, held = (next_rtol([Look(3e-3, kind, 0.0, 1e-1, h)], 1e-3, kind) for h in (False, True))
     assert free < held < 3e-3
 
 
 def test_with_stops_errors_are_trusted_to_fall_less() -> None:
+    runs = (1e-3, 0.1), (1e-6, 0.0)
     smooth, rough = (
-        estimate([Look(1e-3, True, 0.1, 1e-3, False, r), Look(1e-6, True, 0.0, 1e-6, False, r)])
+        estimate([Look(rtol, Kind.EXPLICIT, apart, rtol, False, r) for rtol, apart in runs])
         for r in (False, True)
     )
     assert smooth is not None and rough is not None

@@ -17,6 +17,7 @@ import mstmm
 from mstmm.runtime.integrate.loop import Statistics, Status
 from mstmm.runtime.integrate.settings import Settings
 from mstmm.runtime.model.wanted import family, search
+from mstmm.runtime.model.wanted.shaken import shaken
 from mstmm.runtime.result.output.provenance import attributes
 from mstmm.runtime.run import execution
 
@@ -56,13 +57,27 @@ def swing(t: np.ndarray, angle: float) -> np.ndarray:
     return np.asarray(2 * np.arcsin(k * sn))
 
 
-@pytest.mark.parametrize("asked", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10])
-def test_a_pendulum_is_as_near_to_its_closed_form_as_asked(asked: float) -> None:
-    run = pendulums(1, 2.5).simulate(10.0, error=asked)
+@pytest.mark.parametrize("angle", [1.0, 2.5, 3.0])
+def test_a_pendulum_is_as_near_to_its_closed_form_as_asked(angle: float) -> None:
+    """Errors of single runs scatter: in 19 of 20 requests the estimate tells the error."""
+    model, told, kept = pendulums(1, angle), [], []
+    for asked in np.geomspace(1e-2, 1e-9, 29).tolist():
+        run = model.simulate(10.0, error=asked)
+        known = run.error_estimate
+        assert known is not None and known.met and known.estimate is not None
+        assert known.estimate <= asked
+        true = np.abs(run.q[:, 0] + math.pi / 2 - swing(run.t, angle)).max()
+        told.append(true <= 10 * known.estimate)
+        kept.append(true <= 3 * asked)
+    assert np.mean(told) >= 0.95 and np.mean(kept) >= 0.9
+
+
+def test_an_error_near_rounding_is_told() -> None:
+    run = pendulums(1, 2.5).simulate(10.0, error=1e-10)
     known = run.error_estimate
     assert known is not None and known.met and known.estimate is not None
     true = np.abs(run.q[:, 0] + math.pi / 2 - swing(run.t, 2.5)).max()
-    assert true <= 10 * known.estimate <= 10 * asked
+    assert true <= 10 * known.estimate <= 1e-9
     assert run.trusted
 
 
@@ -111,6 +126,56 @@ def test_stiff_motion_is_reached_by_an_implicit_method() -> None:
     assert known.estimate is not None
     assert np.linalg.norm(way, axis=1).max() <= 10 * known.estimate <= 1e-2
     assert sum(one.evaluations for one in known.runs) < _counts(best).evaluations / 3
+
+
+def boom(torque: float, modes: int = 3) -> mstmm.Model:
+    """A beam of 2 m on a pin that a torque (N m) turns from the start, nothing damps it."""
+    beam = {
+        "name": "boom", "length": 2.0, "mass_per_length": 1.0, "bending_stiffness": 1e3,
+        "modes": {"y": modes},
+    }  # fmt: skip
+    hinge = {
+        "name": "hub", "type": "pin", "axis": [0.0, 0.0, 1.0], "inboard": "ground",
+        "outboard": "boom", "law": {"effort": torque},
+    }  # fmt: skip
+    tables: dict[str, Any] = {
+        "schema_version": 1, "gravity": [0.0] * 3, "beam": [beam], "hinge": [hinge],
+    }  # fmt: skip
+    return mstmm.compile(mstmm.Scene(**tables), engine="looped")
+
+
+@pytest.mark.parametrize("asked", [1e-3, 1e-5])
+def test_a_beam_that_begins_to_vibrate_is_tried_by_the_exponential_method(asked: float) -> None:
+    model = boom(1.0)
+    run = model.simulate(1.0, error=asked, error_of="boom.tip.position")
+    known = run.error_estimate
+    assert known is not None and known.met and known.estimate is not None
+    assert known.runs[0].method == "exprb32" and not known.runs[0].failure
+    best = model.simulate(1.0, "dop853", rtol=1e-11, atol=1e-13, output_times=run.t)
+    way = run.position("boom.tip") - best.position("boom.tip")
+    assert np.linalg.norm(way, axis=1).max() <= 10 * known.estimate <= 10 * asked
+
+
+def test_a_beam_that_nothing_shakes_is_followed_by_others() -> None:
+    q, u = boom(0.0).initial_state()
+    assert not shaken(boom(0.0), 0.0, q, u)
+    assert shaken(boom(5.0), 0.0, q, u)
+    assert shaken(boom(0.0), 0.0, q, np.array([0.0, 0.0, 0.0, 0.1]))
+    many = boom(5.0, modes=6)
+    assert not shaken(many, 0.0, *many.initial_state())
+    known = boom(0.0).simulate(1.0, error=1e-3).error_estimate
+    assert known is not None and "exprb32" not in {one.method for one in known.runs}
+
+
+def test_an_exponential_run_that_takes_too_many_steps_is_given_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(family, "_SHORT", 2)
+    monkeypatch.setattr(family, "_LONG", 0.0)
+    known = boom(5.0).simulate(1.0, error=1e-3).error_estimate
+    assert known is not None and known.met
+    assert [one.method for one in known.runs if one.failure] == ["exprb32"]
+    assert "exprb32" not in {one.method for one in known.runs if not one.failure}
 
 
 def test_beyond_the_horizon_it_says_that_nothing_is_known() -> None:
@@ -220,7 +285,7 @@ def test_a_first_run_that_takes_too_many_steps_is_given_up_to_auto(
     run = pendulums(2, 2.0).simulate(4.0, error=1e-5)
     known = run.error_estimate
     assert known is not None and known.met
-    assert [one.method for one in known.runs if one.failure] == ["dopri5"]
+    assert [one.method for one in known.runs if one.failure] == ["dop853"]
     assert {one.method for one in known.runs if not one.failure} == {"auto"}
     assert run.settings.max_steps == 0
 

@@ -1,9 +1,10 @@
-"""Whether a wanted error is reached by an explicit or by an implicit method, and by which one.
+"""By which kind of method a wanted error is reached, and by which one.
 
 The explicit one follows the fastest vibration of the scene whatever the tolerance; steps of the
 implicit one grow shorter with the tolerance.  Which costs less shows in a first run and in the
-fastest motion: no run is made to compare the two.  Of the explicit ones that of lower order costs
-less as long as tolerances are loose.
+fastest motion: no run is made to compare the two.  The exponential one follows vibration exactly as
+long as nothing else changes much: a beam on a hinge or two that something shakes from the start is
+tried by it first, for a few steps.
 """
 
 from __future__ import annotations
@@ -16,27 +17,31 @@ from weakref import WeakKeyDictionary
 from mstmm.arrays import Array
 from mstmm.errors import MstmmError
 
+from ...guard.shapes import squares
 from ...integrate.loop import Status
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO, AUTO_EXPLICIT, get
 from ...run import second_opinion
 from ...run.fastest import Fastest, fastest_possible
 from ...run.method_choice import implicit_method
+from .looks import Kind
+from .shaken import shaken
 
 if TYPE_CHECKING:
     from ...engine.compiled import Compiled
     from ...run.trajectory import Trajectory
 
-#: |lambda| T from which the first run is an implicit one; and for an error from which on it may
-#: leave small vibrations out.
-_VIBRATING, _LEFT_OUT, _LOOSE = 2000.0, 700.0, 1e-4
+#: |lambda| T from which the first run is an implicit one, for an error of _LOOSE; and the power by
+#: which it rises for smaller ones.
+_VIBRATING, _LOOSE, _RISES = 700.0, 1e-3, 0.25
 
 #: The explicit method for loose tolerances, and the tolerance down to which it costs less than that
 #: of higher order.
-_LOOSE_EXPLICIT, _LOW_ORDER = "dopri5", 3e-6
+_LOOSE_EXPLICIT, _LOW_ORDER = "dopri5", 2e-5
 
-#: Errors for which a first run is one of that, too; for smaller ones the other tells more.
-_TELLING = 1e-6
+#: The exponential method; for errors from this one on, and from this |lambda| T on; steps after
+#: which its first run is given up, and that number in |lambda| T.
+_EXPONENTIAL, _PAYS, _SWINGING, _SHORT, _LONG = "exprb32", 1e-6, 100.0, 15, 1 / 20
 
 #: The part of a run's steps that counts when stability has set them.
 _PART = 0.1
@@ -52,8 +57,8 @@ _PILOT = 3000
 #: falls.
 _FOLLOWED, _AT, _SLOWLY = 4.0, 1e-3, 16.0
 
-#: An implicit step in explicit ones, and the order at which their number grows.
-_STEP, _ORDER = 2.5, 4.0
+#: A step in explicit ones, and the order at which their number grows.
+_STEP, _ORDER = {Kind.IMPLICIT: 4.0, Kind.EXPONENTIAL: 2.0}, 3.0
 
 #: Explicit ones among the methods of SciPy and SUNDIALS.
 _EXPLICIT_OF_OTHERS = ("scipy-DOP853", "scipy-RK45")
@@ -62,21 +67,28 @@ _EXPLICIT_OF_OTHERS = ("scipy-DOP853", "scipy-RK45")
 #: the last implicit run in this one, at most.
 _EXPECTED, _NEAR = 1 / 20, 4.0
 
+#: How many times faster a shape may be than by itself where its body is free to move.
+_FREED = 8.0
+
 #: What `_fastest_possible` found.
 _possible: WeakKeyDictionary[Compiled, float] = WeakKeyDictionary()
 
 
-def is_explicit(run: Trajectory) -> bool:
-    """Whether explicit methods alone made a run."""
-    made = {one.method for one in run.methods} or {run.settings.method}
-    return all(explicit(method) for method in made)
+def kind_of_run(run: Trajectory) -> Kind:
+    """The kind of the method that made a run; explicit if all were."""
+    kinds = {kind_of(one.method) for one in run.methods} or {kind_of(run.settings.method)}
+    return kinds.pop() if len(kinds) == 1 else Kind.IMPLICIT
 
 
-def explicit(method: str) -> bool:
-    """Whether a method is explicit; `auto` begins so."""
+def kind_of(method: str) -> Kind:
+    """The kind of a method; `auto` begins by an explicit one."""
+    if method == _EXPONENTIAL:
+        return Kind.EXPONENTIAL
     if method in second_opinion.METHODS:
-        return method in _EXPLICIT_OF_OTHERS
-    return method == AUTO or not get(method).implicit
+        explicit = method in _EXPLICIT_OF_OTHERS
+    else:
+        explicit = method == AUTO or not get(method).implicit
+    return Kind.EXPLICIT if explicit else Kind.IMPLICIT
 
 
 def held_back(run: Trajectory) -> bool:
@@ -95,7 +107,9 @@ def has_stops(model: Compiled) -> bool:
 def _fastest_possible(model: Compiled) -> float:
     """|lambda| of the fastest motion that the tables of a scene allow, 1/s; looked up once."""
     if model not in _possible:
-        _possible[model] = math.inf if model.flexible else fastest_possible(model.scene)
+        shapes = [squares(body).max(initial=0.0) for body in model.flexible.values()]
+        shaped = _FREED * math.sqrt(max(shapes, default=0.0))
+        _possible[model] = max(shaped, fastest_possible(model.scene))
     return _possible[model]
 
 
@@ -114,61 +128,76 @@ class Family:
     def __init__(
         self, model: Compiled, settings: Settings, error: float, q: Array, u: Array
     ) -> None:
-        self._settings, self._error = settings, error
-        self._free = settings.method == AUTO
-        self._many = _VIBRATING if error < _LOOSE else _LEFT_OUT
-        self._span = settings.t_end - settings.t_start
-        self._rate, self._rescued = 0.0, False
-        if self._free and _fastest_possible(model) * self._span > self._many:
-            try:
-                fastest = Fastest(model.looped, model.looped.start_memory())
-                self._rate = fastest.rate(settings.t_start, q, u)
-            except MstmmError:  # a scene without tangent, or a start that the run itself will blame
-                pass
+        self._settings, span = settings, settings.t_end - settings.t_start
+        self._free, self._rescued = settings.method == AUTO, False
+        self._span, self._rate, self._tried = span, 0.0, False
+        self._many = _VIBRATING * (_LOOSE / error) ** _RISES
+        few = _SWINGING if model.flexible else self._many
+        if not self._free or _fastest_possible(model) * span <= few:
+            return
+        try:
+            fastest = Fastest(model.looped, model.looped.start_memory())
+            self._rate = fastest.rate(settings.t_start, q, u)
+            if self._rate * span > _SWINGING and error >= _PAYS:
+                self._tried = shaken(model, settings.t_start, q, u)
+        except MstmmError:  # a scene without tangent, or a start that the run itself will blame
+            pass
 
     @property
-    def begins_explicit(self) -> bool:
-        """Whether the first run is an explicit one."""
-        if not self._free:
-            return explicit(self._settings.method)
-        return self._rate * self._span <= self._many
+    def begins(self) -> Kind:
+        """The kind of the first run."""
+        if not self._free or self._rescued:
+            return kind_of(self._settings.method)
+        if self._tried:
+            return Kind.EXPONENTIAL
+        return Kind.IMPLICIT if self._rate * self._span > self._many else Kind.EXPLICIT
 
-    def next_is_explicit(self, rtol: float, asked: float, made: Sequence[Trajectory]) -> bool:
-        """Whether the next run after these ones is an explicit one: `rtol` is its tolerance if it
-        is of the same kind as the last one, `asked` the wanted error in the size of the motion."""
-        kind, last = is_explicit(made[-1]), made[-1]
-        if kind or not self._free or self._rescued:
+    def next(self, rtol: float, asked: float, made: Sequence[Trajectory]) -> Kind:
+        """The kind of the next run after these ones: `rtol` is its tolerance if it is of the same
+        kind as the last one, `asked` the wanted error in the size of the motion."""
+        last, kind = made[-1], kind_of_run(made[-1])
+        if kind is Kind.EXPLICIT or not self._free or self._rescued:
             return kind
         expected = _EXPECTED * asked
         rate = max([self._rate, *(one.rate or 0.0 for run in made for one in run.methods)])
-        growth = (last.settings.rtol / min(rtol, _NEAR * expected)) ** (1 / _ORDER)
+        reached = rtol if kind is Kind.EXPONENTIAL else min(rtol, _NEAR * expected)
+        growth = (last.settings.rtol / reached) ** (1 / _ORDER)
         followed = rate * self._span / _FOLLOWED * (_AT / expected) ** (1 / _SLOWLY)
-        return _STEP * last.statistics.steps * growth >= followed
+        steps = _STEP[kind] * last.statistics.steps * growth
+        return Kind.EXPLICIT if steps >= followed else kind
 
-    def method(self, kind: bool, rtol: float, made: Sequence[Trajectory]) -> str:
-        """The method of the next run after these ones, an explicit one or not, at a tolerance."""
+    def method(self, kind: Kind, rtol: float, made: Sequence[Trajectory]) -> str:
+        """The method of the next run after these ones, of a kind, at a tolerance."""
         if not self._free or self._rescued:
             return self._settings.method
-        if not kind:
+        if kind is Kind.EXPONENTIAL:
+            return _EXPONENTIAL
+        if kind is Kind.IMPLICIT:
             return implicit_method(rtol if made else 1.0)
         if made and not self._rate and _may_be_stiff(made[-1]):
             return AUTO
-        low = rtol > _LOW_ORDER and (made or self._error > _TELLING)
-        return _LOOSE_EXPLICIT if low else AUTO_EXPLICIT
+        return _LOOSE_EXPLICIT if made and rtol > _LOW_ORDER else AUTO_EXPLICIT
 
     def most_steps(self, method: str) -> int:
         """Steps after which a first run by this method is given up; 0 for no limit."""
-        most = self._settings.max_steps
-        if not self._free or method == AUTO or not explicit(method):
+        most, kind = self._settings.max_steps, kind_of(method)
+        if not self._free or method == AUTO or kind is Kind.IMPLICIT:
             return most
-        return min(most or _PILOT, _PILOT)
+        few = _PILOT if kind is Kind.EXPLICIT else int(_SHORT + _LONG * self._rate * self._span)
+        return min(most or few, few)
 
     def rescues(self, lost: Trajectory) -> bool:
-        """Whether this run, which has failed, is to be made by `auto`: where an implicit method
-        finds no step, and where a first run was given up.  From then on all are."""
+        """Whether this run, which has failed, is to be made by another method: by `auto` where an
+        implicit one finds no step, and where a first explicit run was given up, from then on all;
+        where the exponential one was given up, as if it had not been tried."""
         method, most = lost.settings.method, lost.settings.max_steps
         given_up = lost.status is Status.TOO_MANY_STEPS and most != self._settings.max_steps
-        if not self._free or method == AUTO or (explicit(method) and not given_up):
+        if not self._free or method == AUTO or lost.status is None:
+            return False
+        if self._tried and kind_of(method) is Kind.EXPONENTIAL:
+            self._tried = False
+            return True
+        if kind_of(method) is Kind.EXPLICIT and not given_up:
             return False
         self._rescued = True
         return True

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 #: The tightest tolerance that has a meaning.
 TIGHTEST = 1e-13
@@ -21,8 +22,16 @@ TIGHTEST = 1e-13
 _ROUNDING = 5e-12
 
 
+class Kind(Enum):
+    """Of a method: what sets its steps, and how its error falls with the tolerance."""
+
+    EXPLICIT = "explicit"
+    IMPLICIT = "implicit"
+    EXPONENTIAL = "exponential"
+
+
 @dataclass(frozen=True)
-class _Kind:
+class _Usual:
     """What is taken for usual of a kind of method.
 
     Attributes:
@@ -46,8 +55,11 @@ class _Kind:
     least: float
 
 
-_EXPLICIT = _Kind((3.0, 3e-4, 3e-3), 3e3, 1.0, 0.3, 0.9, 1.0, 0.5, 1e-7)
-_IMPLICIT = _Kind((100.0, 1e-3, 1e-1), 1e6, 1.0, 1.0, 0.8, 1.0, 0.1, 1e-6)
+_USUAL = {
+    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 3e3, 3.0, 0.3, 0.9, 1.5, 0.5, 1e-7),
+    Kind.IMPLICIT: _Usual((100.0, 1e-4, 1e-1), 1e6, 1.0, 1.0, 0.8, 1.0, 0.1, 1e-6),
+    Kind.EXPONENTIAL: _Usual((30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.5, 1.0, 0.1, 1e-4),
+}
 
 #: The power of the tolerance by which the sum of local errors falls.
 _SUMMED = 0.9
@@ -59,8 +71,8 @@ _UNKNOWN = 15.0
 #: chance: one above the second number here counts as the third at least.
 _TRUSTED, _NOISE, _SURE = 0.9, 0.5, 0.75
 
-#: Powers from an implicit to an explicit run, with stops, and where errors hardly fall.
-_CHANGED, _ROUGH, _HARDLY = 0.8, 0.8, 0.25
+#: Powers from another kind to an explicit run, with stops, and where errors hardly fall.
+_CHANGED, _ROUGH, _HARDLY = {Kind.IMPLICIT: 0.8, Kind.EXPONENTIAL: 0.0}, 0.8, 0.25
 
 #: A next tolerance aims at this part of what is wanted; it is at most this part of the one before.
 _AIM, _MOST = 0.7, 0.3
@@ -82,7 +94,7 @@ class Look:
 
     Attributes:
         rtol: its relative tolerance.
-        explicit: made by an explicit method alone.
+        kind: of its method; of several, explicit if all are.
         apart: how far it is from the tightest run; 0 for that one, inf where they end elsewhere.
         summed: its local errors added up; None where the method keeps none.
         held: stability, not accuracy, set many of its steps.
@@ -90,19 +102,18 @@ class Look:
     """
 
     rtol: float
-    explicit: bool
+    kind: Kind
     apart: float
     summed: float | None
     held: bool = False
     rough: bool = False
 
 
-def first_rtol(asked: float, explicit: bool) -> float:
+def first_rtol(asked: float, kind: Kind) -> float:
     """The first tolerance: loose, for it is there to look."""
-    kind = _kind(explicit)
-    times, tightest, loosest = kind.first
+    times, tightest, loosest = _USUAL[kind].first
     wanted = min(max(times * asked, tightest), loosest)
-    return max(min(wanted, kind.reach * asked), TIGHTEST)
+    return max(min(wanted, _USUAL[kind].reach * asked), TIGHTEST)
 
 
 def estimate(looks: Sequence[Look]) -> float | None:
@@ -112,31 +123,30 @@ def estimate(looks: Sequence[Look]) -> float | None:
         return None
     before, last = looks[-2:]
     fallen = (last.rtol / before.rtol) ** _power(looks) if last.rtol < before.rtol else 1.0
-    kind = _kind(last.explicit)
-    return kind.safety * before.apart * (1.0 if before.apart >= kind.parted else fallen)
+    usual = _USUAL[last.kind]
+    return usual.safety * before.apart * (1.0 if before.apart >= usual.parted else fallen)
 
 
-def next_rtol(looks: Sequence[Look], asked: float, explicit: bool) -> float:
+def next_rtol(looks: Sequence[Look], asked: float, kind: Kind) -> float:
     """Tolerance of the next run, for an error `asked` in the size of the motion (1 for angles and
-    parts); `explicit` says by which kind of method it is made."""
-    last, known = looks[-1], estimate(looks)
-    if explicit != last.explicit:
-        return first_rtol(asked, explicit)
-    if known is None or looks[-2].explicit != explicit:
-        factor = (asked / _summed(last)) ** (1 / _SUMMED)
-    elif not looks[-2].apart < _kind(explicit).parted:
+    parts); `kind` is that of the method by which it is made."""
+    last, known, tightest = looks[-1], estimate(looks), TIGHTEST
+    if kind is not last.kind:
+        return first_rtol(asked, kind)
+    if known is None or looks[-2].kind is not kind:
+        factor, tightest = (asked / _summed(last)) ** (1 / _SUMMED), min(_ROUNDING, last.rtol / 2)
+    elif not looks[-2].apart < _USUAL[kind].parted:
         factor = _LEAP
     else:
         factor = (_AIM * asked / known) ** (1 / _usual(last))
-    least = _kind(explicit).least
-    return max(last.rtol * min(max(factor, least), _MOST), TIGHTEST)
+    return max(last.rtol * min(max(factor, _USUAL[kind].least), _MOST), tightest)
 
 
 def hopeless(looks: Sequence[Look]) -> str:
     """Why a further run would lead nowhere; "" if it may."""
     stays = len(looks) > 3 and not _falls(looks) and not _falls(looks[:-1])
-    stays = stays and looks[-2].apart < _EXPLICIT.parted
-    if stays and (looks[-1].explicit or looks[-1].rtol < _SLOW):
+    stays = stays and looks[-2].apart < _USUAL[Kind.EXPLICIT].parted
+    if stays and (looks[-1].kind is Kind.EXPLICIT or looks[-1].rtol < _SLOW):
         return (
             "the error falls no more with the tolerance (rounding, or jumps of forces at which no "
             "step ends)"
@@ -146,31 +156,28 @@ def hopeless(looks: Sequence[Look]) -> str:
     return f"{RUNS} runs did not get there" if len(looks) >= RUNS else ""
 
 
-def _kind(explicit: bool) -> _Kind:
-    return _EXPLICIT if explicit else _IMPLICIT
-
-
 def _summed(look: Look) -> float:
     """What the error of a run is by its local errors, about."""
-    kind = _kind(look.explicit)
+    usual = _USUAL[look.kind]
     known = look.summed or _UNKNOWN * look.rtol
-    return known * (kind.held if look.held else kind.growth)
+    return known * (usual.held if look.held else usual.growth)
 
 
 def _usual(look: Look) -> float:
     """The power by which errors usually fall to a run from a looser one of its kind."""
-    power = _kind(look.explicit).power
+    power = _USUAL[look.kind].power
     return min(power, _ROUGH) if look.rough else power
 
 
 def _power(looks: Sequence[Look]) -> float:
     """The power by which the error of the last run is believed to have fallen."""
     before, last = looks[-2:]
-    changed = before.explicit != last.explicit
-    seen, usual = _seen(looks), _CHANGED if changed else _usual(last)
+    seen, usual = _seen(looks), _usual(last)
+    if before.kind is not last.kind:
+        usual = _CHANGED[before.kind]
     if seen is None:
         return _HARDLY if last.rtol < _ROUNDING else usual
-    if last.explicit and seen > _NOISE:
+    if last.kind is Kind.EXPLICIT and seen > _NOISE:
         return min(max(seen, _SURE), usual)
     return min(max(_TRUSTED * seen, _HARDLY), usual)
 
@@ -185,11 +192,11 @@ def _seen(looks: Sequence[Look]) -> float | None:
     if len(looks) < 3:
         return None
     a, b, last = looks[-3:]
-    if a.explicit != b.explicit or b.explicit != last.explicit:
+    if not a.kind is b.kind is last.kind:
         return None
     if not 0 < b.apart < math.inf or not 0 < a.apart < math.inf:
         return None
-    parted = _kind(last.explicit).parted
+    parted = _USUAL[last.kind].parted
     if a.apart > parted:
         return None if b.apart < parted else 0.0
     return math.log(a.apart / b.apart) / math.log(a.rtol / b.rtol)

@@ -28,8 +28,8 @@ from ...run.error_estimate import compare
 from ...run.execution import Watch, first_run
 from ..results import certified, result_of
 from .asked import Asked
-from .family import Family, has_stops, held_back, is_explicit
-from .looks import Look, estimate, first_rtol, hopeless, next_rtol
+from .family import Family, has_stops, held_back, kind_of_run
+from .looks import Kind, Look, estimate, first_rtol, hopeless, next_rtol
 
 if TYPE_CHECKING:
     from ...engine.compiled import Compiled
@@ -54,7 +54,7 @@ class _Made:
     run: Trajectory
     numbers: Array
     cpu_s: float
-    explicit: bool
+    kind: Kind
 
 
 class Search:
@@ -90,13 +90,11 @@ class Search:
 
     def _found_by(self, interrupted: Sequence[bool]) -> Result:
         """Run after run, until one is good enough, nothing helps, or `interrupted` is set."""
-        kind = self._family.begins_explicit
-        rtol = first_rtol(self._wanted.error, kind)
-        method = self._family.method(kind, rtol, ())
+        method, rtol = self._first()
         while True:
             lost = self._run(method, rtol)
             if lost is not None and self._family.rescues(lost):
-                method = AUTO
+                method, rtol = (AUTO, rtol) if self._made else self._first()
                 continue
             if lost is not None and (not self._made or lost.status is None):
                 return self._lost(lost)
@@ -120,7 +118,7 @@ class Search:
         if not run.success:
             self._failed.append(_attempt(run, spent, None, run.message))
             return run
-        self._made.append(_Made(run, self._numbers(run), spent, is_explicit(run)))
+        self._made.append(_Made(run, self._numbers(run), spent, kind_of_run(run)))
         self._look()
         return None
 
@@ -142,7 +140,7 @@ class Search:
         counted = last.run.statistics
         summed = None if counted is None else counted.sum_local_error
         rtol, held = last.run.settings.rtol, held_back(last.run)
-        self._looks.append(Look(rtol, last.explicit, 0.0, summed, held, self._rough))
+        self._looks.append(Look(rtol, last.kind, 0.0, summed, held, self._rough))
 
     def _apart(self, one: _Made, tightest: _Made) -> float:
         """How far a run is from the tightest one, in the size of the motion."""
@@ -188,13 +186,19 @@ class Search:
             return f"the next run, rtol {lost.settings.rtol:.0e}, failed: {lost.message}"
         return hopeless(self._looks) or None
 
+    def _first(self) -> tuple[str, float]:
+        """Method and tolerance of the first run."""
+        kind = self._family.begins
+        rtol = first_rtol(self._wanted.error, kind)
+        return self._family.method(kind, rtol, ()), rtol
+
     def _next(self) -> tuple[str, float]:
         """Method and tolerance of the next run."""
-        part, kind = self._wanted.error / self._size, self._looks[-1].explicit
-        rtol = next_rtol(self._looks, part, kind)
+        part, before = self._wanted.error / self._size, self._looks[-1].kind
+        rtol = next_rtol(self._looks, part, before)
         made = [one.run for one in self._made]
-        if self._family.next_is_explicit(rtol, part, made) != kind:
-            kind = not kind
+        kind = self._family.next(rtol, part, made)
+        if kind is not before:
             rtol = next_rtol(self._looks, part, kind)
         return self._family.method(kind, rtol, made), rtol
 
