@@ -103,3 +103,14 @@ def test_with_stops_errors_are_trusted_to_fall_less() -> None:
     )
     assert smooth is not None and rough is not None
     assert rough > 1.5 * smooth
+
+
+@pytest.mark.parametrize(
+    ("before", "fallen"),
+    [(Kind.EXPLICIT, 0.1**0.8), (Kind.IMPLICIT, 0.1**0.8), (Kind.EXPONENTIAL, 1)],
+)
+def test_of_another_kind_less_is_believed(before: Kind, fallen: float) -> None:
+    kind = Kind.IMPLICIT if before is Kind.EXPLICIT else Kind.EXPLICIT
+    safety = {Kind.IMPLICIT: 1.0, Kind.EXPLICIT: 1.5}[kind]
+    known = estimate([Look(1e-3, before, 0.05, 1e-3), Look(1e-4, kind, 0.0, 1e-4)])
+    assert known == pytest.approx(safety * 0.05 * fallen)

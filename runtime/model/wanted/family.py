@@ -63,9 +63,8 @@ _STEP, _ORDER = {Kind.IMPLICIT: 4.0, Kind.EXPONENTIAL: 2.0}, 3.0
 #: Explicit ones among the methods of SciPy and SUNDIALS.
 _EXPLICIT_OF_OTHERS = ("scipy-DOP853", "scipy-RK45")
 
-#: The tolerance in what is wanted with which an explicit method is expected to reach it; that of
-#: the last implicit run in this one, at most.
-_EXPECTED, _NEAR = 1 / 20, 4.0
+#: The tolerance in what is wanted with which an explicit method is expected to reach it.
+_EXPECTED = 1 / 20
 
 #: How many times faster a shape may be than by itself where its body is free to move.
 _FREED = 8.0
@@ -156,19 +155,18 @@ class Family:
         """The kind of the next run after these ones: `rtol` is its tolerance if it is of the same
         kind as the last one, `asked` the wanted error in the size of the motion."""
         last, kind = made[-1], kind_of_run(made[-1])
-        if kind is Kind.EXPLICIT or not self._free or self._rescued:
+        if kind is Kind.EXPLICIT or self._settled_on(made):
             return kind
         expected = _EXPECTED * asked
         rate = max([self._rate, *(one.rate or 0.0 for run in made for one in run.methods)])
-        reached = rtol if kind is Kind.EXPONENTIAL else min(rtol, _NEAR * expected)
-        growth = (last.settings.rtol / reached) ** (1 / _ORDER)
+        growth = (last.settings.rtol / rtol) ** (1 / _ORDER)
         followed = rate * self._span / _FOLLOWED * (_AT / expected) ** (1 / _SLOWLY)
         steps = _STEP[kind] * last.statistics.steps * growth
         return Kind.EXPLICIT if steps >= followed else kind
 
     def method(self, kind: Kind, rtol: float, made: Sequence[Trajectory]) -> str:
         """The method of the next run after these ones, of a kind, at a tolerance."""
-        if not self._free or self._rescued:
+        if self._settled_on(made):
             return self._settings.method
         if kind is Kind.EXPONENTIAL:
             return _EXPONENTIAL
@@ -177,6 +175,10 @@ class Family:
         if made and not self._rate and _may_be_stiff(made[-1]):
             return AUTO
         return _LOOSE_EXPLICIT if made and rtol > _LOW_ORDER else AUTO_EXPLICIT
+
+    def _settled_on(self, made: Sequence[Trajectory]) -> bool:
+        """Whether the method stays what the user named, or `auto` where that has made a run."""
+        return not self._free or self._rescued or bool(made and made[-1].methods)
 
     def most_steps(self, method: str) -> int:
         """Steps after which a first run by this method is given up; 0 for no limit."""

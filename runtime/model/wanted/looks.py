@@ -58,7 +58,7 @@ class _Usual:
 _USUAL = {
     Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 3e3, 3.0, 0.3, 0.9, 1.5, 0.5, 1e-7),
     Kind.IMPLICIT: _Usual((100.0, 1e-4, 1e-1), 1e6, 1.0, 1.0, 0.8, 1.0, 0.1, 1e-6),
-    Kind.EXPONENTIAL: _Usual((30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.5, 1.0, 0.1, 1e-4),
+    Kind.EXPONENTIAL: _Usual((30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.6, 1.0, 0.1, 1e-4),
 }
 
 #: The power of the tolerance by which the sum of local errors falls.
@@ -71,8 +71,9 @@ _UNKNOWN = 15.0
 #: chance: one above the second number here counts as the third at least.
 _TRUSTED, _NOISE, _SURE = 0.9, 0.5, 0.75
 
-#: Powers from another kind to an explicit run, with stops, and where errors hardly fall.
-_CHANGED, _ROUGH, _HARDLY = {Kind.IMPLICIT: 0.8, Kind.EXPONENTIAL: 0.0}, 0.8, 0.25
+#: Powers between explicit and implicit runs, with stops, and where errors hardly fall; steps of the
+#: exponential method tell nothing of others.
+_CHANGED, _ROUGH, _HARDLY = 0.8, 0.8, 0.25
 
 #: A next tolerance aims at this part of what is wanted; it is at most this part of the one before.
 _AIM, _MOST = 0.7, 0.3
@@ -174,7 +175,7 @@ def _power(looks: Sequence[Look]) -> float:
     before, last = looks[-2:]
     seen, usual = _seen(looks), _usual(last)
     if before.kind is not last.kind:
-        usual = _CHANGED[before.kind]
+        usual = 0.0 if before.kind is Kind.EXPONENTIAL else _CHANGED
     if seen is None:
         return _HARDLY if last.rtol < _ROUNDING else usual
     if last.kind is Kind.EXPLICIT and seen > _NOISE:
