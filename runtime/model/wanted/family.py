@@ -3,8 +3,8 @@
 The explicit one follows the fastest vibration of the scene whatever the tolerance; steps of the
 implicit one grow shorter with the tolerance.  Which costs less shows in a first run and in the
 fastest motion: no run is made to compare the two.  The exponential one follows vibration exactly as
-long as nothing else changes much: a beam on a hinge or two that something shakes from the start is
-tried by it first, for a few steps.
+long as nothing else changes much: a beam on one hinge that something shakes from the start is tried
+by it first, for a few steps.
 """
 
 from __future__ import annotations

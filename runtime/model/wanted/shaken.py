@@ -1,4 +1,4 @@
-"""Whether a scene is a beam on a hinge or two that begins to vibrate from its start.
+"""Whether a scene is a beam on one hinge that begins to vibrate from its start.
 
 Its motion is then vibration about one that changes little: an exponential method follows it by few
 steps.  With more hinges the vibrations themselves change with their angles, and a beam that nothing
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ...engine.compiled import Compiled
 
 #: Most speeds, and most of them that are none of a shape.
-_SPEEDS, _RIGID = 6, 2
+_SPEEDS, _RIGID = 6, 1
 
 #: The part of the largest acceleration that counts.
 _PART = 1e-3
