@@ -376,7 +376,7 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion)
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
     int code;
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     if (body->section) {
         code = mstmm_at_section_motion(state, index);
         if (code) return code;
@@ -427,7 +427,7 @@ static int mstmm_at_qr_own(mstmm_state *state, int index)
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
     int code;
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     if (!body->generic) {
         code = mstmm_at_hinge_motion(state, index);
         if (code) return code;
@@ -529,7 +529,7 @@ static int mstmm_at_poses(mstmm_state *state, int index)
     real *block = state->workspace + body->block;
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
     int code;
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     if (!body->generic && !state->hinges_known) {
         code = mstmm_at_hinge_motion(state, index);
         if (code) return code;
@@ -743,7 +743,7 @@ int mstmm_at_condense(mstmm_state *state, int index)
     real hinge_tau_free[6];
     const mstmm_body *body = &state->model->bodies[index];
     int code;
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     if (body->modal) {
         code = mstmm_at_modal_condense(state, index);
         if (code) return code;
@@ -766,7 +766,7 @@ int mstmm_at_condense(mstmm_state *state, int index)
         real *block = state->workspace + body->block;
         const int nu = body->nu;
         int columns[6];
-        const int speeds = mstmm_free_speeds(state, body, columns);
+        const int speeds = mstmm_free_speeds(state->memory, body, columns);
         for (int k = 0; k < speeds; k++)
             for (int row = 0; row < 6; row++)
                 (mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
@@ -794,7 +794,7 @@ int mstmm_at_condense(mstmm_state *state, int index)
         real *parent = mstmm_block(state->model, state->workspace, body->parent);
         const int nu = body->nu;
         int columns[6];
-        const int speeds = mstmm_free_speeds(state, body, columns);
+        const int speeds = mstmm_free_speeds(state->memory, body, columns);
         code = mstmm_generic_condense(speeds,
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE), .J = hinge_J_free,
@@ -824,9 +824,9 @@ static int mstmm_at_qr_condense(mstmm_state *state, int index)
     real *block = state->workspace + body->block;
     const int nu = body->nu;
     int columns[6];
-    const int speeds = mstmm_free_speeds(state, body, columns);
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     for (int k = 0; k < speeds; k++)
         for (int row = 0; row < 6; row++)
             (mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
@@ -865,7 +865,7 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
 {
     real delta[6];
     const mstmm_body *body = &state->model->bodies[index];
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     if (!body->generic) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
@@ -879,7 +879,7 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
         real *block = state->workspace + body->block;
         const int nu = body->nu;
         int columns[6];
-        const int speeds = mstmm_free_speeds(state, body, columns);
+        const int speeds = mstmm_free_speeds(state->memory, body, columns);
         mstmm_generic_recover(speeds,
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
@@ -957,7 +957,7 @@ static int mstmm_at_required(mstmm_state *state, int index)
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
     const int nu = body->nu;
     int code;
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     if (body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -1004,9 +1004,9 @@ static int mstmm_at_factorise(mstmm_state *state, int index)
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
     const int nu = body->nu;
     int columns[6];
-    const int speeds = mstmm_free_speeds(state, body, columns);
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     if (!body->generic) {
         code = mstmm_at_hinge_motion(state, index);
         if (code) return code;
@@ -1074,8 +1074,8 @@ static int mstmm_at_column_carried(mstmm_state *state, int index)
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
     const int nu = body->nu;
     int columns[6];
-    const int speeds = mstmm_free_speeds(state, body, columns);
-    if (mstmm_idle(state, body)) return 0;
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
+    if (mstmm_idle(state->observed, body)) return 0;
     if (body->modal && body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -1129,8 +1129,8 @@ static int mstmm_at_column_answered(mstmm_state *state, int index)
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
     const int nu = body->nu;
     int columns[6];
-    const int speeds = mstmm_free_speeds(state, body, columns);
-    if (mstmm_idle(state, body)) return 0;
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
+    if (mstmm_idle(state->observed, body)) return 0;
     mstmm_generic_answer(speeds,
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
@@ -1327,7 +1327,7 @@ static int mstmm_at_forward_slope(mstmm_state *state, int index)
     real *d_block = state->slope->workspace + body->block;
     real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
     int code;
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     if (body->section) {
         code = mstmm_at_section_motion_slope(state, index);
         if (code) return code;
@@ -1421,7 +1421,7 @@ static int mstmm_at_poses_slope(mstmm_state *state, int index)
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
     real *d_block = state->slope->workspace + body->block;
     real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     mstmm_frames_pose_slope(
         .A_I = parent + MSTMM_BLOCK_A, .x_I = parent + MSTMM_BLOCK_X,
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
@@ -1637,7 +1637,7 @@ static int mstmm_at_required_slope(mstmm_state *state, int index)
     const int nu = body->nu;
     real *d_block = state->slope->workspace + body->block;
     real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     if (body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -1891,7 +1891,7 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
     const mstmm_model *model = state->model;
     const mstmm_body *body = &state->model->bodies[index];
     int code;
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     if (model->n_laws) {
         const int nu = body->nu;
         real *tangent = state->tangents->numbers + body->tangent;
@@ -2002,7 +2002,7 @@ static int mstmm_at_law_slopes(mstmm_state *state, int index)
     const mstmm_body *body = &state->model->bodies[law->body];
     real *tangent = state->tangents->numbers + body->tangent;
     int columns[6];
-    const int speeds = mstmm_free_speeds(state, body, columns);
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
     for (int c = 0; c < speeds; c++) {
         if (mstmm_unfelt(body, law, columns[c])) continue;
         mstmm_aim_unknown(state, body, columns[c]);
@@ -2340,9 +2340,9 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
     real *tangent = state->tangents->numbers + body->tangent;
     int columns[6];
-    const int speeds = mstmm_free_speeds(state, body, columns);
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     if (body->modal && body->section) {
         const int nu = body->nu;
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -2391,80 +2391,6 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             memcpy(bend + MSTMM_BEND_W(n) + n * c, d_modes + MSTMM_MODES_RIGHT(n), (size_t)(n) * sizeof(real));
         }
         mstmm_aim_no_mode(state, modal);
-    }
-    if (body->modal && body->section && body->placed) {
-        real *place = state->tangents->numbers + body->place;
-        const mstmm_modal *modal = mstmm_modal_of(body);
-        const int n = mstmm_modes_of(modal);
-        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        mstmm_tangent_placed_own(
-            .n = modal->n, .B_p = bend + MSTMM_BEND_PLACE_B(n),
-            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
-            .Z_p = bend + MSTMM_BEND_PLACE_Z(n), .K = bend + MSTMM_BEND_K(n),
-            .Z_x = bend + MSTMM_BEND_Z_X(n));
-    }
-    if (body->modal && body->section) {
-        const mstmm_modal *modal = mstmm_modal_of(body);
-        const int n = mstmm_modes_of(modal);
-        const mstmm_section *section = body->section;
-        real *laid = section ? state->workspace + section->place : NULL;
-        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        code = mstmm_judged(state, mstmm_tangent_node(
-            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .B = bend + MSTMM_BEND_B(n),
-            .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
-            .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n),
-            .V = bend + MSTMM_BEND_V(n), .D = bend + MSTMM_BEND_D(n),
-            .right = bend + MSTMM_BEND_RIGHT(n), .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
-            .work = bend + MSTMM_BEND_WORK(n)));
-        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
-    }
-    if (body->modal && !body->section) {
-        const mstmm_modal *modal = mstmm_modal_of(body);
-        const int n = mstmm_modes_of(modal);
-        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        code = mstmm_judged(state, mstmm_tangent_node(
-            .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .B = bend + MSTMM_BEND_B(n),
-            .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
-            .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n),
-            .V = bend + MSTMM_BEND_V(n), .D = bend + MSTMM_BEND_D(n),
-            .right = bend + MSTMM_BEND_RIGHT(n), .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
-            .work = bend + MSTMM_BEND_WORK(n)));
-        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
-    }
-    if (body->modal) {
-        memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), S_c, 54 * sizeof(real));
-    }
-    if (body->modal && body->section && body->placed) {
-        real *place = state->tangents->numbers + body->place;
-        const mstmm_modal *modal = mstmm_modal_of(body);
-        const int n = mstmm_modes_of(modal);
-        const mstmm_section *section = body->section;
-        real *laid = section ? state->workspace + section->place : NULL;
-        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        mstmm_tangent_placed_node(
-            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .V = bend + MSTMM_BEND_V(n),
-            .D = bend + MSTMM_BEND_D(n), .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
-            .Z_p = bend + MSTMM_BEND_PLACE_Z(n), .right = bend + MSTMM_BEND_RIGHT(n),
-            .gain = bend + MSTMM_BEND_PLACE_GAIN(n), .S_c = S_p,
-            .work = bend + MSTMM_BEND_WORK(n));
-    }
-    if (body->modal && !body->section && body->placed) {
-        real *place = state->tangents->numbers + body->place;
-        const mstmm_modal *modal = mstmm_modal_of(body);
-        const int n = mstmm_modes_of(modal);
-        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
-        mstmm_tangent_placed_node(
-            .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .V = bend + MSTMM_BEND_V(n),
-            .D = bend + MSTMM_BEND_D(n), .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
-            .Z_p = bend + MSTMM_BEND_PLACE_Z(n), .right = bend + MSTMM_BEND_RIGHT(n),
-            .gain = bend + MSTMM_BEND_PLACE_GAIN(n), .S_c = S_p,
-            .work = bend + MSTMM_BEND_WORK(n));
-    }
-    if (body->modal && body->placed) {
-        real *place = state->tangents->numbers + body->place;
-        memcpy(place + MSTMM_PLACE_S(body->nu, body->nq), S_p, 54 * sizeof(real));
     }
     if (!body->section && speeds) {
         const int nu = body->nu;
@@ -2547,43 +2473,6 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             for (int row = 0; row < 6; row++)
                 (tangent + MSTMM_TANGENT_H(body->nu, body->nq))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
     }
-    if (!body->section && speeds && body->placed) {
-        real *place = state->tangents->numbers + body->place;
-        mstmm_tangent_placed_rows(
-            .n = speeds, .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
-            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .Z_p = placed);
-        mstmm_tangent_placed_own(
-            .n = speeds, .B_p = place + MSTMM_PLACE_B(body->nu, body->nq),
-            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .Z_p = placed,
-            .K = tangent + MSTMM_TANGENT_G(body->nu, body->nq),
-            .Z_x = tangent + MSTMM_TANGENT_W(body->nu, body->nq));
-    }
-    if (!body->section && speeds) {
-        mstmm_generic_tangent_rows(speeds,
-            .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
-            .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
-            .W = tangent + MSTMM_TANGENT_W(body->nu, body->nq),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = K, .right = right, .D = D,
-            .one = one);
-        code = mstmm_judged(state, mstmm_tangent_invert(
-            .n = speeds, .D = D, .one = one,
-            .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), .work = work));
-        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
-        mstmm_generic_tangent_reduce(speeds,
-            .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), .right = right,
-            .K = K, .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq),
-            .gain = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
-            .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq));
-    }
-    if (!body->section && speeds && body->placed) {
-        real *place = state->tangents->numbers + body->place;
-        mstmm_tangent_placed_reduce(
-            .n = speeds, .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq),
-            .Z_p = placed, .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
-            .gain = place + MSTMM_PLACE_GAIN(body->nu, body->nq),
-            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq));
-    }
     if (body->section && !body->section->inward) {
         const int nu = body->nu;
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -2633,18 +2522,129 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         }
         mstmm_aim_no_mode(state, modal);
     }
+    if (body->modal && body->section && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        mstmm_tangent_placed_own(
+            .n = modal->n, .B_p = bend + MSTMM_BEND_PLACE_B(n),
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
+            .Z_p = bend + MSTMM_BEND_PLACE_Z(n), .K = bend + MSTMM_BEND_K(n),
+            .Z_x = bend + MSTMM_BEND_Z_X(n));
+    }
+    if (body->modal && body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        code = mstmm_judged(state, mstmm_tangent_node(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .B = bend + MSTMM_BEND_B(n),
+            .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
+            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
+            .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n),
+            .V = bend + MSTMM_BEND_V(n), .D = bend + MSTMM_BEND_D(n),
+            .right = bend + MSTMM_BEND_RIGHT(n), .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
+            .work = bend + MSTMM_BEND_WORK(n)));
+        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
+    }
+    if (body->modal && !body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        code = mstmm_judged(state, mstmm_tangent_node(
+            .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .B = bend + MSTMM_BEND_B(n),
+            .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
+            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
+            .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n),
+            .V = bend + MSTMM_BEND_V(n), .D = bend + MSTMM_BEND_D(n),
+            .right = bend + MSTMM_BEND_RIGHT(n), .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
+            .work = bend + MSTMM_BEND_WORK(n)));
+        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
+    }
+    if (body->modal) {
+        memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), S_c, 54 * sizeof(real));
+    }
+    if (body->modal && body->section && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        mstmm_tangent_placed_node(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .V = bend + MSTMM_BEND_V(n),
+            .D = bend + MSTMM_BEND_D(n), .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
+            .Z_p = bend + MSTMM_BEND_PLACE_Z(n), .right = bend + MSTMM_BEND_RIGHT(n),
+            .gain = bend + MSTMM_BEND_PLACE_GAIN(n), .S_c = S_p,
+            .work = bend + MSTMM_BEND_WORK(n));
+    }
+    if (body->modal && !body->section && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        mstmm_tangent_placed_node(
+            .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .V = bend + MSTMM_BEND_V(n),
+            .D = bend + MSTMM_BEND_D(n), .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
+            .Z_p = bend + MSTMM_BEND_PLACE_Z(n), .right = bend + MSTMM_BEND_RIGHT(n),
+            .gain = bend + MSTMM_BEND_PLACE_GAIN(n), .S_c = S_p,
+            .work = bend + MSTMM_BEND_WORK(n));
+    }
+    if (body->modal && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        memcpy(place + MSTMM_PLACE_S(body->nu, body->nq), S_p, 54 * sizeof(real));
+    }
+    if (!body->section && speeds && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        mstmm_tangent_placed_rows(
+            .n = speeds, .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .Z_p = placed);
+        mstmm_tangent_placed_own(
+            .n = speeds, .B_p = place + MSTMM_PLACE_B(body->nu, body->nq),
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .Z_p = placed,
+            .K = tangent + MSTMM_TANGENT_G(body->nu, body->nq),
+            .Z_x = tangent + MSTMM_TANGENT_W(body->nu, body->nq));
+    }
+    if (!body->section && speeds) {
+        mstmm_generic_tangent_rows(speeds,
+            .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
+            .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
+            .W = tangent + MSTMM_TANGENT_W(body->nu, body->nq),
+            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = K, .right = right, .D = D,
+            .one = one);
+        code = mstmm_judged(state, mstmm_tangent_invert(
+            .n = speeds, .D = D, .one = one,
+            .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), .work = work));
+        if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
+        mstmm_generic_tangent_reduce(speeds,
+            .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), .right = right,
+            .K = K, .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq),
+            .gain = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
+            .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
+            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq));
+    }
+    if (!body->section && speeds && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        mstmm_tangent_placed_reduce(
+            .n = speeds, .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq),
+            .Z_p = placed, .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
+            .gain = place + MSTMM_PLACE_GAIN(body->nu, body->nq),
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq));
+    }
     mstmm_frames_tangent_carry(
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
         .w = block + MSTMM_BLOCK_HINGE_W, .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
-        .T = T, .S_I = mstmm_tangent_at(state, body->parent));
+        .T = T, .S_I = state->tangents->numbers + mstmm_tangent_at(state->model, body->parent));
     if (body->placed) {
         real *place = state->tangents->numbers + body->place;
         mstmm_frames_placed_carry(
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .T_p = T_p, .T_w = T,
-            .S_pI = mstmm_place_at(state, body->parent),
-            .S_wI = mstmm_tangent_at(state, body->parent));
+            .S_pI = state->tangents->numbers + mstmm_place_at(state->model, body->parent),
+            .S_wI = state->tangents->numbers + mstmm_tangent_at(state->model, body->parent));
     }
     if (body->section && !body->section->inward) {
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -2679,6 +2679,204 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
     return 0;
 }
 
+/* What a body brings to the elimination. */
+static int mstmm_at_tangent_brought(mstmm_state *state, int index)
+{
+    real carrier[9];
+    real turn[3];
+    real shift[3];
+    real change[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    int columns[6];
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
+    int code;
+    if (mstmm_idle(state->observed, body)) return 0;
+    if (body->modal && body->section) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        real *d_laid = section ? state->slope->workspace + section->place : NULL;
+        mstmm_generic_tangent_carrier(nu,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
+            .motion = block + MSTMM_BLOCK_MOTION, .Q = carrier);
+        for (int c = 0; c < n; c++) {
+            mstmm_aim_mode(state, modal, c);
+            for (int j = 0; j < n; j++)
+                (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
+            code = mstmm_at_section_motion_slope(state, index);
+            if (code) return code;
+            mstmm_frames_tangent_turned(
+                .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+                .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = shift);
+            mstmm_generic_tangent_column(nu,
+                .theta = turn, .x = shift, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
+                .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
+                .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
+                .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
+                .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
+                .J = body->rotor, .laws = mstmm_zeros, .B = bend + MSTMM_BEND_B(n) + 9 * c,
+                .G = bend + MSTMM_BEND_G(n) + 6 * c, .row = change);
+            if (body->placed) {
+                mstmm_frames_placed_column(
+                    .theta = turn, .x = shift, .v_P = block + MSTMM_BLOCK_V,
+                    .v = block + MSTMM_BLOCK_HINGE_V, .d_v = d_block + MSTMM_BLOCK_HINGE_V,
+                    .Q = carrier, .B_p = bend + MSTMM_BEND_PLACE_B(n) + 9 * c);
+            }
+            mstmm_modal_modal_effort_slope(
+                .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = block + MSTMM_BLOCK_E,
+                .e_f = modes + MSTMM_MODES_E_F(n), .d_H = d_laid + MSTMM_SECTION_H(n),
+                .d_e = mstmm_zeros, .d_e_f = d_modes + MSTMM_MODES_E_F(n),
+                .d_tau = d_modes + MSTMM_MODES_RIGHT(n));
+            memcpy(bend + MSTMM_BEND_W(n) + n * c, d_modes + MSTMM_MODES_RIGHT(n), (size_t)(n) * sizeof(real));
+        }
+        mstmm_aim_no_mode(state, modal);
+    }
+    if (!body->section && speeds) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        real *tangent = state->tangents->numbers + body->tangent;
+        real *place = state->tangents->numbers + body->place;
+        real *d_block = state->slope->workspace + body->block;
+        mstmm_generic_tangent_carrier(nu,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
+            .motion = block + MSTMM_BLOCK_MOTION, .Q = carrier);
+        for (int c = 0; c < speeds; c++) {
+            mstmm_aim_unknown(state, body, columns[c]);
+            if (!body->steady) {
+                code = mstmm_at_hinge_motion_slope(state, index);
+                if (code) return code;
+            }
+            if (body->steady && !body->straight) {
+                code = mstmm_at_hinge_motion_slope(state, index);
+                if (code) return code;
+            }
+            if (body->steady && body->straight && body->placed) {
+                code = mstmm_at_hinge_motion_slope(state, index);
+                if (code) return code;
+            }
+            if (body->straight) {
+                mstmm_generic_tangent_along(nu,
+                    .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                    .d_q = state->slope->q + body->q, .theta = turn, .x = shift);
+            }
+            if (!body->straight) {
+                mstmm_frames_tangent_turned(
+                    .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+                    .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = shift);
+            }
+            if (body->turning) {
+                mstmm_generic_tangent_turning(nu,
+                    .theta = turn, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                    .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
+                    .d_u = state->slope->u + body->u, .d_s = state->slope->given + body->u,
+                    .J = body->rotor,
+                    .laws = tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + nu * c,
+                    .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * c,
+                    .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq) + 6 * c, .row = change);
+            }
+            if (body->steady && !body->turning) {
+                mstmm_generic_tangent_steady(nu,
+                    .theta = turn, .x = shift, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                    .v = block + MSTMM_BLOCK_HINGE_V, .w = block + MSTMM_BLOCK_HINGE_W,
+                    .Q = carrier, .f = block + MSTMM_BLOCK_E, .d_u = state->slope->u + body->u,
+                    .d_s = state->slope->given + body->u, .J = body->rotor,
+                    .laws = tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + nu * c,
+                    .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * c,
+                    .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq) + 6 * c, .row = change);
+            }
+            if (!body->steady) {
+                mstmm_generic_tangent_column(nu,
+                    .theta = turn, .x = shift, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                    .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S),
+                    .v = block + MSTMM_BLOCK_HINGE_V, .w = block + MSTMM_BLOCK_HINGE_W,
+                    .Q = carrier, .f = block + MSTMM_BLOCK_E,
+                    .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
+                    .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
+                    .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
+                    .J = body->rotor,
+                    .laws = tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + nu * c,
+                    .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq) + 9 * c,
+                    .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq) + 6 * c, .row = change);
+            }
+            if (body->placed) {
+                mstmm_frames_placed_column(
+                    .theta = turn, .x = shift, .v_P = block + MSTMM_BLOCK_V,
+                    .v = block + MSTMM_BLOCK_HINGE_V, .d_v = d_block + MSTMM_BLOCK_HINGE_V,
+                    .Q = carrier, .B_p = place + MSTMM_PLACE_B(body->nu, body->nq) + 9 * c);
+            }
+            for (int k = 0; k < speeds; k++)
+                (tangent + MSTMM_TANGENT_W(body->nu, body->nq) + speeds * c)[k] = change[columns[k]];
+        }
+        mstmm_aim_nowhere(state, body);
+        for (int k = 0; k < speeds; k++)
+            for (int row = 0; row < 6; row++)
+                (tangent + MSTMM_TANGENT_H(body->nu, body->nq))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
+    }
+    if (body->section && !body->section->inward) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        real *d_laid = section ? state->slope->workspace + section->place : NULL;
+        mstmm_generic_tangent_carrier(nu,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
+            .motion = block + MSTMM_BLOCK_MOTION, .Q = carrier);
+        for (int c = 0; c < n; c++) {
+            mstmm_aim_mode(state, modal, c);
+            for (int j = 0; j < n; j++)
+                (d_modes + MSTMM_MODES_E_F(n))[j] = 0;
+            code = mstmm_at_section_motion_slope(state, index);
+            if (code) return code;
+            mstmm_frames_tangent_turned(
+                .R = block + MSTMM_BLOCK_HINGE_R, .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+                .d_d = d_block + MSTMM_BLOCK_HINGE_D, .theta = turn, .x = shift);
+            mstmm_generic_tangent_column(nu,
+                .theta = turn, .x = shift, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+                .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .v = block + MSTMM_BLOCK_HINGE_V,
+                .w = block + MSTMM_BLOCK_HINGE_W, .Q = carrier, .f = block + MSTMM_BLOCK_E,
+                .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
+                .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
+                .d_c = d_block + MSTMM_BLOCK_HINGE_C, .d_s = state->slope->given + body->u,
+                .J = body->rotor, .laws = mstmm_zeros, .B = port + MSTMM_PORT_B(n) + 9 * c,
+                .G = port + MSTMM_PORT_G(n) + 6 * c, .row = change);
+            if (body->placed) {
+                mstmm_frames_placed_column(
+                    .theta = turn, .x = shift, .v_P = block + MSTMM_BLOCK_V,
+                    .v = block + MSTMM_BLOCK_HINGE_V, .d_v = d_block + MSTMM_BLOCK_HINGE_V,
+                    .Q = carrier, .B_p = port + MSTMM_PORT_PLACE_B(n) + 9 * c);
+            }
+            mstmm_modal_modal_effort_slope(
+                .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .e = block + MSTMM_BLOCK_E,
+                .e_f = modes + MSTMM_MODES_E_F(n), .d_H = d_laid + MSTMM_SECTION_H(n),
+                .d_e = mstmm_zeros, .d_e_f = d_modes + MSTMM_MODES_E_F(n),
+                .d_tau = d_modes + MSTMM_MODES_RIGHT(n));
+            memcpy(port + MSTMM_PORT_W(n) + n * c, d_modes + MSTMM_MODES_RIGHT(n), (size_t)(n) * sizeof(real));
+        }
+        mstmm_aim_no_mode(state, modal);
+    }
+    return 0;
+}
+
 /* A right-hand side as loads of the rows. */
 static int mstmm_at_tangent_column(mstmm_state *state, int index)
 {
@@ -2709,8 +2907,8 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
     real rows[6];
     const mstmm_body *body = &state->model->bodies[index];
     int columns[6];
-    const int speeds = mstmm_free_speeds(state, body, columns);
-    if (mstmm_idle(state, body)) return 0;
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
+    if (mstmm_idle(state->observed, body)) return 0;
     if (body->modal && body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -2787,8 +2985,8 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
     const mstmm_body *body = &state->model->bodies[index];
     const int nu = body->nu;
     int columns[6];
-    const int speeds = mstmm_free_speeds(state, body, columns);
-    if (mstmm_idle(state, body)) return 0;
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
+    if (mstmm_idle(state->observed, body)) return 0;
     for (int j = 0; j < nu; j++)
         (state->answer + body->u)[j] = 0;
     if (body->placed) {
@@ -2798,7 +2996,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
         mstmm_frames_placed_moved(
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .z_I = d_parent + MSTMM_BLOCK_MOTION,
-            .p_I = mstmm_place_at(state, body->parent) + MSTMM_PLACE_Z(0, 0),
+            .p_I = state->tangents->numbers + mstmm_place_at(state->model, body->parent) + MSTMM_PLACE_Z(0, 0),
             .p = place + MSTMM_PLACE_Z(body->nu, body->nq));
     }
     if (!body->section && speeds && body->placed) {
@@ -2972,9 +3170,9 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
     real rows[6];
     const mstmm_body *body = &state->model->bodies[index];
     int columns[6];
-    const int speeds = mstmm_free_speeds(state, body, columns);
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     if (body->section) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
@@ -3220,8 +3418,8 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
     const mstmm_body *body = &state->model->bodies[index];
     const int nu = body->nu;
     int columns[6];
-    const int speeds = mstmm_free_speeds(state, body, columns);
-    if (mstmm_idle(state, body)) return 0;
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
+    if (mstmm_idle(state->observed, body)) return 0;
     for (int j = 0; j < nu; j++)
         (state->answer + body->u)[j] = 0;
     if (body->placed) {
@@ -3231,7 +3429,7 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
         mstmm_frames_placed_moved(
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .z_I = d_parent + MSTMM_BLOCK_MOTION,
-            .p_I = mstmm_place_at(state, body->parent) + MSTMM_PLACE_Z(0, 0),
+            .p_I = state->tangents->numbers + mstmm_place_at(state->model, body->parent) + MSTMM_PLACE_Z(0, 0),
             .p = place + MSTMM_PLACE_Z(body->nu, body->nq));
     }
     if (!body->section && speeds && body->placed) {
@@ -3354,7 +3552,7 @@ static int mstmm_at_laws_own(mstmm_state *state, int index)
     real *block = state->workspace + body->block;
     const int nu = body->nu;
     real *tangent = state->tangents->numbers + body->tangent;
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), block + MSTMM_BLOCK_S, 21 * sizeof(real));
     for (int j = 0; j < nu * nu; j++)
         (tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq))[j] = 0;
@@ -3489,9 +3687,9 @@ static int mstmm_at_laws_factorise(mstmm_state *state, int index)
     const int nu = body->nu;
     real *tangent = state->tangents->numbers + body->tangent;
     int columns[6];
-    const int speeds = mstmm_free_speeds(state, body, columns);
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     for (int k = 0; k < speeds; k++)
         for (int row = 0; row < speeds; row++)
             (tangent + MSTMM_TANGENT_W(body->nu, body->nq))[row * speeds + k] = (tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq))[columns[row] * nu + columns[k]];
@@ -3527,7 +3725,7 @@ static int mstmm_at_laws_factorise(mstmm_state *state, int index)
         .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
         .F = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
         .G = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
-        .S_I = mstmm_tangent_at(state, body->parent));
+        .S_I = state->tangents->numbers + mstmm_tangent_at(state->model, body->parent));
     if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
     return 0;
 }
@@ -3578,10 +3776,10 @@ static int mstmm_at_laws_column_carried(mstmm_state *state, int index)
     const int nu = body->nu;
     real *tangent = state->tangents->numbers + body->tangent;
     int columns[6];
-    const int speeds = mstmm_free_speeds(state, body, columns);
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
     real *d_block = state->slope->workspace + body->block;
     real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     if (body->modal && body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -3636,10 +3834,10 @@ static int mstmm_at_laws_column_answered(mstmm_state *state, int index)
     const int nu = body->nu;
     real *tangent = state->tangents->numbers + body->tangent;
     int columns[6];
-    const int speeds = mstmm_free_speeds(state, body, columns);
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
     real *d_block = state->slope->workspace + body->block;
     real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
-    if (mstmm_idle(state, body)) return 0;
+    if (mstmm_idle(state->observed, body)) return 0;
     mstmm_generic_answer(speeds,
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
@@ -4332,6 +4530,33 @@ static int mstmm_pass_tangent_condense(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_tangent_brought(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    real *tangent = state->tangents->numbers + body->tangent;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_MOTION, block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(d_block + MSTMM_BLOCK_HINGE_R, d_block + MSTMM_BLOCK_HINGE_C + 6);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_H(body->nu, body->nq) + 6 * nu);
+}
+static int mstmm_pass_tangent_brought(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_brought(state, i, MSTMM_TILE);
+        const int code = mstmm_at_tangent_brought(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 MSTMM_AT_ONCE void mstmm_fetch_tangent_column(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -4736,6 +4961,48 @@ static int mstmm_tiles_tangent_condense(mstmm_state *state)
         for (int i = end - 1; i >= first; i--) {
             if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_condense_tile(state, i, -MSTMM_TILE);
             code = mstmm_at_tangent_condense(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_tangent_brought_chain(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    real *tangent = state->tangents->numbers + body->tangent;
+    const int nu = body->nu;
+    const int nq = body->nq;
+    mstmm_fetch(block + MSTMM_BLOCK_MOTION, block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(d_block + MSTMM_BLOCK_HINGE_R, d_block + MSTMM_BLOCK_HINGE_C + 6);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_S(body->nu, body->nq), tangent + MSTMM_TANGENT_H(body->nu, body->nq) + 6 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq), tangent + MSTMM_TANGENT_LAG_WORK(body->nu, body->nq) + nq * nq);
+}
+static int mstmm_chain_tangent_brought(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code, law = 0;
+    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
+        const int end = mstmm_end_of_tile(model, first);
+        for (int i = first; i < end; i++) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_brought_chain(state, i, MSTMM_TILE);
+            code = mstmm_at_tangent_own(state, i);
+            if (code) return code;
+        }
+        for (; law < model->n_laws && model->laws[law].body < end; law++) {
+            const int i = law;
+            code = mstmm_at_law_slopes(state, i);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_tangent_brought(state, i);
             if (code) return code;
         }
     }
@@ -5280,6 +5547,33 @@ int mstmm_run_tangent(mstmm_state *state)
         if (code) return code;
     } else {
         code = mstmm_tiles_tangent_condense(state);
+        if (code) return code;
+    }
+    return 0;
+}
+
+/* What the tangent is eliminated from, behind inverse dynamics. */
+int mstmm_run_tangent_brought(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code;
+    if ((model->needs_pose || model->product)) {
+        code = mstmm_pass_tangent_own(state);
+        if (code) return code;
+        code = mstmm_pass_law_slopes(state);
+        if (code) return code;
+        if ((model->needs_pose || model->product)) {
+            code = mstmm_pass_loads_by_place(state);
+            if (code) return code;
+        }
+        if ((model->needs_pose || model->product)) {
+            code = mstmm_pass_forces_by_place(state);
+            if (code) return code;
+        }
+        code = mstmm_pass_tangent_brought(state);
+        if (code) return code;
+    } else {
+        code = mstmm_chain_tangent_brought(state);
         if (code) return code;
     }
     return 0;

@@ -22,6 +22,7 @@ int mstmm_run_solution(mstmm_state *state);
 int mstmm_run_required_slope(mstmm_state *state);
 int mstmm_run_applied_slope(mstmm_state *state);
 int mstmm_run_tangent(mstmm_state *state);
+int mstmm_run_tangent_brought(mstmm_state *state);
 int mstmm_run_tangent_solution(mstmm_state *state);
 int mstmm_run_tangent_beyond(mstmm_state *state);
 int mstmm_run_laws_alone(mstmm_state *state);

@@ -8,7 +8,7 @@ inline function that hands them on in the kernel's own order; a macro makes a ca
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from mstmm.border import elements as abi
@@ -151,17 +151,17 @@ def calls_header(specs: Specs) -> str:
         " * take the number of speeds first, kernels of elements the record's pointer. */\n"
         "#ifndef MSTMM_KERNEL_CALLS_H\n#define MSTMM_KERNEL_CALLS_H\n\n"
         '#include "elements.h"\n',
-        *(_caller(callee) for callee in found.values()),
+        *(caller(callee) for callee in found.values()),
         "#endif\n",
     ]
     return "\n".join(parts)
 
 
-def tables(specs: Specs) -> str:
-    """C of the tables by numbers of speeds."""
+def tables(specs: Specs, wanted: Collection[str] | None = None) -> str:
+    """C of the tables by numbers of speeds, all or those of the callees that are wanted."""
     lines = []
     for callee in callees(specs).values():
-        if callee.by != "speeds":
+        if callee.by != "speeds" or (wanted is not None and callee.name not in wanted):
             continue
         kernel = callee.kernel.name
         names = [
@@ -176,16 +176,15 @@ def tables(specs: Specs) -> str:
     return "\n".join(lines)
 
 
-def _caller(callee: Callee) -> str:
+def caller(callee: Callee, plain: Collection[str] = ()) -> str:
+    """C of the call of one kernel; `plain` as in `border.elements.prototype`."""
     name, fields = f"mstmm_{callee.name}", callee.fields
     inputs = {port.name for port in callee.kernel.inputs}
     sized = callee.kernel.size_symbol is not None
     members = ["    int n;"] if sized else []
-    members += [
-        f"    {'const ' if port in inputs else ''}real *{field};" for port, field in fields.items()
-    ]
+    members += [f"    {_type(port, inputs, plain)} *{field};" for port, field in fields.items()]
     types = ["int"] if sized else []
-    types += [f"{'const ' if port in inputs else ''}real *restrict" for port in fields]
+    types += [f"{_type(port, inputs, plain)} *restrict" for port in fields]
     words = [f"to.{field}" for field in (["n"] if sized else []) + list(fields.values())]
     struct = f"struct {name} {{\n" + "\n".join(members) + "\n};\n"
     handed = _wrapped(words, "        ")
@@ -209,6 +208,10 @@ def _caller(callee: Callee) -> str:
         f"static inline int {name}_by({first}, struct {name} to)\n{{\n{body}}}\n"
         f"#define {name}({word}, ...) {name}_by({word}, (struct {name}){{__VA_ARGS__}})\n{arrays}"
     )
+
+
+def _type(port: str, inputs: Collection[str], plain: Collection[str]) -> str:
+    return f"{'const ' if port in inputs else ''}{abi.scalar(port, plain)}"
 
 
 def _arrays(name: str, callee: Callee) -> str:

@@ -8,7 +8,7 @@ from .storage import VARIABLES, reads
 _TRAITS = {
     "own": "!body->generic", "parts": "body->generic", "section": "body->section",
     "outward": "body->section && !body->section->inward", "modal": "body->modal",
-    "imposed": "mstmm_imposed(body, state->memory)", "idle": "mstmm_idle(state, body)",
+    "imposed": "mstmm_imposed(body, state->memory)", "idle": "mstmm_idle(state->observed, body)",
     "drag": "body->modal && body->modal->drag", "inverse": "state->given",
     "balance": "state->balance", "efforts": "state->efforts", "known": "state->hinges_known",
     "linked": "state->linked", "laws": "model->n_laws", "driven": "model->n_drives",

@@ -6,11 +6,11 @@ floats, operation by operation, and so that a NaN is never hidden by min, max, s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from fractions import Fraction
 from typing import Any
 
-from mstmm.border.elements import parameter_names, work_name
+from mstmm.border.elements import REAL, parameter_names, work_name
 from mstmm.ir import (
     OPERATIONS,
     Assign,
@@ -69,15 +69,22 @@ def comment(text: str) -> str:
 class KernelText:
     """C text of one kernel's statements, in the form the templates lay out.
 
-    `alike` names outputs whose entries along an axis are printed as a loop (`.alike`).
+    `alike` names outputs whose entries along an axis are printed as a loop (`.alike`); `plain`,
+    where the scalar type of C is another one, ports that stay `REAL`.
     """
 
-    def __init__(self, kernel: KernelIR, alike: Sequence[tuple[str, int]] = ()) -> None:
+    def __init__(
+        self,
+        kernel: KernelIR,
+        alike: Sequence[tuple[str, int]] = (),
+        plain: Collection[str] = (),
+    ) -> None:
         self.kernel = kernel
         self.alike = Alike(kernel, alike) if alike else None
         self.names = parameter_names(kernel)
         self.ports = {port.name: port for port in (*kernel.inputs, *kernel.outputs)}
         self._truths: set[int] = set()
+        self._plain_ports, self._plain_numbers = plain, set[int]()
 
     def statements(self) -> list[dict[str, Any]]:
         """One dictionary a statement; its `kind` is assign, sum, store, guard, solve or alike."""
@@ -208,7 +215,23 @@ class KernelText:
         words = [self.operand(a) for a in assign.args]
         truths = {f"t{place}": self._truth(a) for place, a in enumerate(assign.args)}
         expression = row.c.format(*words, **truths)
-        return {"kind": "assign", "number": assign.number, "expression": expression}
+        return {
+            "kind": "assign", "number": assign.number, "expression": expression,
+            "scalar": self._scalar(assign),
+        }  # fmt: skip
+
+    def _scalar(self, assign: Assign) -> str:
+        """Type of what comes of plain numbers alone, and of everything else."""
+        self._plain_numbers.discard(assign.number)
+        known = self._plain_ports and all(
+            o.number in self._plain_numbers if isinstance(o, Temporary)
+            else not isinstance(o, Element) or o.port in self._plain_ports
+            for o in assign.args
+        )  # fmt: skip
+        if not known:
+            return "real"
+        self._plain_numbers.add(assign.number)
+        return REAL
 
     def _solve(self, solve: Solve) -> dict[str, Any]:
         columns = self.ports[solve.right].shape[1:]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from mstmm.ir.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
 
 from .alike import ALIKE
 from .callers import calls_header
+from .complex import PLAIN, complex_kernels, complex_passes, in_complex
 from .kernel import KernelText, comment, solver, string
 from .storage import layout_header
 from .sweep import sweep_files
@@ -137,7 +138,16 @@ def _engine_files(specs: Sequence[ElementSpec]) -> dict[str, str]:
         "kernel_calls.h": calls_header(known),
         "layout.h": layout_header(),
         **sweep_files(known),
+        "complex_steps.c": complex_source(known),
     }
+
+
+def complex_source(specs: Mapping[tuple[str, str], ElementSpec]) -> str:
+    """`complex_steps.c`: the tangent's elimination in complex numbers."""
+    kernels = [_kernel_view(*pair, PLAIN) for pair in complex_kernels(specs)]
+    return in_complex(
+        _render("complex_steps.c.jinja", kernels=kernels, passes=complex_passes(specs))
+    )
 
 
 def _kind_and_name(spec: ElementSpec) -> tuple[str, str]:
@@ -255,8 +265,12 @@ def _name_tables(letter: str, group: Sequence[Param]) -> list[dict[str, Any]]:
     ]
 
 
-def _kernel_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
-    text = KernelText(kernel, ALIKE.get((spec.name, kernel.name), ()))
+def _kernel_view(
+    spec: ElementSpec, kernel: KernelIR, plain: Collection[str] = ()
+) -> dict[str, Any]:
+    """`plain`: inputs that stay plain numbers where others are complex, entry by entry."""
+    alike = () if plain else ALIKE.get((spec.name, kernel.name), ())
+    text = KernelText(kernel, alike, plain)
     outputs = abi.c_outputs(kernel)
     used = text.used_names()
     arguments = ["n"] if kernel.size_symbol else []
@@ -274,8 +288,8 @@ def _kernel_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
     return {
         "name": kernel.name,
         "function": abi.kernel_symbol(spec.kind, spec.name, kernel.name),
-        "prototype": abi.prototype(spec.kind, spec.name, kernel),
-        "sized": _sized_view(spec, kernel) if kernel.size_symbol else None,
+        "prototype": abi.prototype(spec.kind, spec.name, kernel, plain=plain),
+        "sized": _sized_view(spec, kernel, plain) if kernel.size_symbol else None,
         "purpose": kernel.purpose,
         "sources": list(kernel.sources),
         "inputs": [_port_view(port) for port in kernel.inputs],
@@ -293,11 +307,11 @@ def _kernel_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
     }
 
 
-def _sized_view(spec: ElementSpec, kernel: KernelIR) -> dict[str, Any]:
+def _sized_view(spec: ElementSpec, kernel: KernelIR, plain: Collection[str]) -> dict[str, Any]:
     """The function that is compiled for some sizes of their own, and its arguments but the size."""
     names = abi.parameter_names(kernel)
     return {
-        "prototype": abi.prototype(spec.kind, spec.name, kernel, "_sized"),
+        "prototype": abi.prototype(spec.kind, spec.name, kernel, "_sized", plain),
         "sizes": _OWN_SIZES,
         "arguments": [names[port.name] for port in kernel.inputs]
         + [names.get(port.name, port.name) for port in abi.c_outputs(kernel)],

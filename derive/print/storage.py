@@ -116,10 +116,11 @@ _PLACES = {
     "law.slopes": "tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + body->nu * c + law->speed",
     "law.own_slopes": "tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq)"
     " + body->nu * (law->speed + c) + law->speed",
-    "inboard.S": "mstmm_tangent_at(state, body->parent)",
-    "inboard.mass": "mstmm_tangent_at(state, body->parent)",
-    "inboard.place": "mstmm_place_at(state, body->parent)",
-    "inboard.z": "mstmm_place_at(state, body->parent) + MSTMM_PLACE_Z(0, 0)",
+    "inboard.S": "state->tangents->numbers + mstmm_tangent_at(state->model, body->parent)",
+    "inboard.mass": "state->tangents->numbers + mstmm_tangent_at(state->model, body->parent)",
+    "inboard.place": "state->tangents->numbers + mstmm_place_at(state->model, body->parent)",
+    "inboard.z": "state->tangents->numbers + mstmm_place_at(state->model, body->parent)"
+    " + MSTMM_PLACE_Z(0, 0)",
     "step.rate": "&state->tangents->rate",
     "step.q": "&state->tangents->sq", "step.kappa": "&state->tangents->kappa",
     "body.rho": "state->tangents->rho + body->q",
@@ -166,7 +167,7 @@ VARIABLES: dict[str, tuple[str, tuple[str, ...]]] = {
     "port": ("real *port = section ? state->tangents->numbers + section->tangent : NULL;",
              ("section",)),
     "columns": ("int columns[6];", ()),
-    "speeds": ("const int speeds = mstmm_free_speeds(state, body, columns);",
+    "speeds": ("const int speeds = mstmm_free_speeds(state->memory, body, columns);",
                ("body", "columns")),
 }  # fmt: skip
 #: Variables that have a counterpart in the second workspace, where derivatives lie.

@@ -48,7 +48,7 @@ def sweep_files(specs: Specs) -> dict[str, str]:
     ordinary = [whole for whole in passes() if whole.subject != "link"]
     texts = [function_text(whole, kernels) for whole in ordinary]
     texts += loops()
-    declared = [_signature(whole) + ";" for whole in ordinary if whole in SINGLY]
+    declared = [signature(whole) + ";" for whole in ordinary if whole in SINGLY]
     declared += [f"int mstmm_run_{sweep.name}(mstmm_state *state);" for sweep in SWEEPS]
     links = [function_text(whole, kernels) for whole in passes() if whole.subject == "link"]
     hooks = sorted({run.hook for sweep in SWEEPS for run in sweep.runs if run.hook})
@@ -94,7 +94,7 @@ def _numbers() -> str:
     )
 
 
-def _signature(whole: Pass) -> str:
+def signature(whole: Pass) -> str:
     """Declaration of the function for one subject, without the semicolon."""
     if whole.subject == "link":
         return f"static inline int mstmm_at_{whole.name}(mstmm_link_at at)"
@@ -133,7 +133,7 @@ def function_text(whole: Pass, kernels: Kernels) -> str:
         lines += inside
         before = when
     body = "\n".join([*lines, "    return 0;"])
-    return f"/* {whole.purpose} */\n{_signature(whole)}\n{{\n{body}\n}}\n"
+    return f"/* {whole.purpose} */\n{signature(whole)}\n{{\n{body}\n}}\n"
 
 
 def _opened(last: str, when: str, opposite: bool) -> list[str]:

@@ -14,6 +14,7 @@ from .solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
 from .steps import Pass, Run, Sweep
 from .tangent import (
     APPLIED_SLOPE,
+    BROUGHT,
     DIRECTIONAL,
     LAGGED,
     TANGENT,
@@ -91,7 +92,7 @@ SOLUTION = Sweep(
 )
 
 SWEEPS = (GIVEN, ACCELERATIONS, INVERSE_DYNAMICS, MOTION, POSED, FACTORISATION, SOLUTION,
-          DIRECTIONAL, APPLIED_SLOPE, TANGENT, TANGENT_SOLUTION,
+          DIRECTIONAL, APPLIED_SLOPE, TANGENT, BROUGHT, TANGENT_SOLUTION,
           TANGENT_BEYOND, LAWS_ALONE, LAWS_SOLUTION)  # fmt: skip
 
 #: Passes that the looped engine's own C does for one subject at a time: links and what lies between

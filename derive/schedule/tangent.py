@@ -289,49 +289,68 @@ _NODE = {
 _ROWS = {"K": "local.K", "right": "local.right"}
 _TH = {"Rc": "body.R", "r": "body.r", "w_I": "parent.w", "v": "hinge.v", "w": "hinge.w"}
 
+#: What a body brings, linear in what its unknowns change: nothing here is eliminated.
+_COLUMNS = (
+    *only("modal section", *_section("bend")),
+    *only("moving", *_HINGE, Pick(to="tangent.H", source="hinge.H", rows=6)),
+    *only("outward", *_section("port")),
+)
+_ELIMINATED = (
+    *placed.MODES_OWN,
+    call("tangent.node", n="modes", when="modal section", fails="tangent", H="section.H",
+         **_NODE),
+    call("tangent.node", n="modes", when="modal !section", fails="tangent", H="bend.still",
+         **_NODE),
+    *only("modal", Copy(to="tangent.S", source="local.S_c")),
+    *placed.MODES_REDUCED,
+    *placed.HINGE_ROWS,
+    *only(
+        "moving",
+        call("generic{free}.tangent_rows", H="tangent.H", B="tangent.B", W="tangent.W",
+             S="tangent.S", **_ROWS, D="local.D", one="local.one"),
+        call("tangent.invert", n="free", fails="tangent", D="local.D", one="local.one",
+             inverse="tangent.inverse", work="local.work"),
+        call("generic{free}.tangent_reduce", inverse="tangent.inverse", **_ROWS,
+             G="tangent.G", gain="tangent.gain", V="tangent.V", S="tangent.S"),
+    ),
+    *placed.HINGE_REDUCED,
+    call("frames.tangent_carry", **_TH, S="tangent.S", T="local.T", S_I="inboard.S"),
+    placed.CARRIED,
+    call("tangent.absorb", n="modes", when="outward", Rc="body.R", r="body.r", H="section.H",
+         B="port.B", G="port.G", W="port.W", S="tangent.S", T="local.T", K_x="port.K", **_OWN),
+    placed.ABSORBED,
+)  # fmt: skip
+
 TANGENT_CONDENSE = Pass(
     "tangent_condense", "body", "Unknowns of a body eliminated, the rest carried to the parent.",
-    (
-        *only("modal section", *_section("bend")),
-        *placed.MODES_OWN,
-        call("tangent.node", n="modes", when="modal section", fails="tangent", H="section.H",
-             **_NODE),
-        call("tangent.node", n="modes", when="modal !section", fails="tangent", H="bend.still",
-             **_NODE),
-        *only("modal", Copy(to="tangent.S", source="local.S_c")),
-        *placed.MODES_REDUCED,
-        *only("moving", *_HINGE, Pick(to="tangent.H", source="hinge.H", rows=6)),
-        *placed.HINGE_ROWS,
-        *only(
-            "moving",
-            call("generic{free}.tangent_rows", H="tangent.H", B="tangent.B", W="tangent.W",
-                 S="tangent.S", **_ROWS, D="local.D", one="local.one"),
-            call("tangent.invert", n="free", fails="tangent", D="local.D", one="local.one",
-                 inverse="tangent.inverse", work="local.work"),
-            call("generic{free}.tangent_reduce", inverse="tangent.inverse", **_ROWS,
-                 G="tangent.G", gain="tangent.gain", V="tangent.V", S="tangent.S"),
-        ),
-        *placed.HINGE_REDUCED,
-        *only("outward", *_section("port")),
-        call("frames.tangent_carry", **_TH, S="tangent.S", T="local.T", S_I="inboard.S"),
-        placed.CARRIED,
-        call("tangent.absorb", n="modes", when="outward", Rc="body.R", r="body.r", H="section.H",
-             B="port.B", G="port.G", W="port.W", S="tangent.S", T="local.T", K_x="port.K", **_OWN),
-        placed.ABSORBED,
-    ),
+    (*_COLUMNS, *_ELIMINATED),
     order=TIPS_TO_ROOT, skip="idle",
 )  # fmt: skip
 
+#: The same in two, where many tangents are made of one state: what bodies bring is made once.
+TANGENT_BROUGHT = Pass(
+    "tangent_brought", "body", "What a body brings to the elimination.", _COLUMNS, skip="idle"
+)
+TANGENT_ELIMINATED = replace(
+    TANGENT_CONDENSE, name="tangent_eliminated",
+    purpose="Unknowns of a body eliminated, of what it brings.", steps=_ELIMINATED,
+)  # fmt: skip
+
+_BROUGHT = (
+    Run(whole=TANGENT_OWN),
+    Run(whole=LAW_SLOPES),
+    Run(whole=placed.LOADS_BY_PLACE, when="posed"),
+    Run(whole=placed.FORCES_BY_PLACE, when="posed"),
+)
 TANGENT = Sweep(
     "tangent",
     "Tangent of inverse dynamics factored, behind inverse dynamics itself.",
-    (
-        Run(whole=TANGENT_OWN),
-        Run(whole=LAW_SLOPES),
-        Run(whole=placed.LOADS_BY_PLACE, when="posed"),
-        Run(whole=placed.FORCES_BY_PLACE, when="posed"),
-        Run(whole=TANGENT_CONDENSE),
-    ),
+    (*_BROUGHT, Run(whole=TANGENT_CONDENSE)),
+)
+BROUGHT = Sweep(
+    "tangent_brought",
+    "What the tangent is eliminated from, behind inverse dynamics.",
+    (*_BROUGHT, Run(whole=TANGENT_BROUGHT)),
 )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import textwrap
+from collections.abc import Collection
 
 from ..ir import LOOPS, KernelIR, Port, Solve
 from ..ir.spec import ElementSpec
@@ -183,11 +184,21 @@ def c_outputs(kernel: KernelIR) -> tuple[Port, ...]:
     return (*kernel.outputs, Port(work_name(kernel), (size, size), meaning="factor L, D of solve"))
 
 
-def prototype(kind: str, name: str, kernel: KernelIR, suffix: str = "") -> str:
-    """C declaration of a kernel's function, without the semicolon; `suffix` ends its name."""
+def scalar(port: str, plain: Collection[str]) -> str:
+    """C type of a port's numbers."""
+    return REAL if port in plain else "real"
+
+
+def prototype(
+    kind: str, name: str, kernel: KernelIR, suffix: str = "", plain: Collection[str] = ()
+) -> str:
+    """C declaration of a kernel's function, without the semicolon; `suffix` ends its name, `plain`
+    are inputs that stay `REAL` where other arrays are of another type."""
     names = parameter_names(kernel)
     parameters = ["int n"] if kernel.size_symbol else []
-    parameters += [f"const real *restrict {names[port.name]}" for port in kernel.inputs]
+    parameters += [
+        f"const {scalar(port.name, plain)} *restrict {names[port.name]}" for port in kernel.inputs
+    ]
     parameters += [
         f"real *restrict {names.get(port.name, port.name)}" for port in c_outputs(kernel)
     ]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+
+from numpy.typing import ArrayLike
 
 from mstmm.errors import SceneError
 
@@ -12,6 +15,7 @@ from ..pack.layout import refuse_dense
 from .judged import warnings_of
 from .modes import modes
 from .motions import Modes
+from .response import FrequencyResponse, frequency_response
 from .state_space import StateSpace
 
 
@@ -35,6 +39,26 @@ class Linear(StateSpace):
         if count is None:
             refuse_dense(len(self), "the matrix of all motions")
         return modes(self, count, damped)
+
+    def frequency_response(
+        self,
+        omega: ArrayLike,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+    ) -> FrequencyResponse:
+        """Amplitudes of outputs under harmonic inputs at angular frequencies omega (k,) in rad/s,
+        O(bodies) a frequency.
+
+        `inputs` are names as of `Model.linearize`: those of v where none are named, of w where
+        there are no v.  `outputs` are coordinates ("shoulder.angle"; all of them where none are
+        named), their rates ("shoulder.angle_rate"), and motions of bodies and ends in inertial axes
+        ("boom.tip.position.y", "boom.tip.vy", "boom.tip.angular_velocity.z"), beside the state and,
+        under accelerations of the ground, relative to it.
+
+        Raises SceneError for a name or frequency that does not fit, NumericalFailure at a resonance
+        without damping.
+        """
+        return frequency_response(self, omega, inputs, outputs)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ..linear.linear import Linear
     from ..linear.locus import Critical, Locus
     from ..linear.motions import Modes
+    from ..linear.response import FrequencyResponse
     from ..result.result import Result
     from ..run.batch import BatchResult
     from .derivatives import Derivatives, Differentiation
@@ -222,6 +223,18 @@ class Model(Compiled):
         `Linear.modes`.
         """
         return self.linearize(q, u, t).modes(count, damped)
+
+    def frequency_response(
+        self,
+        omega: ArrayLike,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+        q: ArrayLike | None = None,
+        t: float = 0.0,
+    ) -> FrequencyResponse:
+        """Amplitudes of outputs under harmonic inputs at omega (k,) in rad/s, near rest at `q`, or
+        at the equilibrium.  See `Linear.frequency_response`; without `inputs` the ground moves."""
+        return self.linearize(q, None, t).frequency_response(omega, inputs, outputs)
 
     def locus(
         self,

@@ -174,7 +174,7 @@ def test_a_pass_is_printed_from_its_description_alone() -> None:
     )  # fmt: skip
     text = " ".join(function_text(whole, callees(SPECS)).split())
     assert "mstmm_at_power_of_links(mstmm_state *state, int index, real *given_T)" in text
-    assert "if (mstmm_idle(state, body)) return 0;" in text
+    assert "if (mstmm_idle(state->observed, body)) return 0;" in text
     assert "real v[3]; real P[1];" in text
     assert "if (!body->generic) {" in text
     assert "} else {" in text

@@ -90,17 +90,16 @@ static inline int mstmm_held(const mstmm_force *force)
     return force->body_f < 0 && force->body_t >= 0 ? force->body_t : force->body_f;
 }
 
-/* Numbers by place of a body that is placed, or (-1) of the ground: behind its S. */
-static inline real *mstmm_place_at(const mstmm_state *state, int body)
+/* Where the numbers by place are of a body that is placed, or (-1) of the ground: behind its S. */
+static inline int64_t mstmm_place_at(const mstmm_model *model, int body)
 {
-    const int64_t place = body < 0 ? MSTMM_TANGENT_B(0, 0) : state->model->bodies[body].place;
-    return state->tangents->numbers + place;
+    return body < 0 ? MSTMM_TANGENT_B(0, 0) : model->bodies[body].place;
 }
 
-/* S of the tangent, of a body or (-1) of the ground. */
-static inline real *mstmm_tangent_at(const mstmm_state *state, int body)
+/* Where S of the tangent is, of a body or (-1) of the ground. */
+static inline int64_t mstmm_tangent_at(const mstmm_model *model, int body)
 {
-    return state->tangents->numbers + (body < 0 ? 0 : state->model->bodies[body].tangent);
+    return body < 0 ? 0 : model->bodies[body].tangent;
 }
 
 #endif

@@ -209,10 +209,9 @@ int64_t mstmm_section_numbers(int n);
 
 /* The rest is for the other engine files. */
 
-static inline real *mstmm_block(const mstmm_model *model, real *workspace, int body)
-{
-    return body < 0 ? workspace : workspace + model->bodies[body].block;
-}
+/* Numbers of a body or (-1) of the ground, whatever their type. */
+#define mstmm_block(model, workspace, body)                                                        \
+    ((workspace) + ((body) < 0 ? 0 : (model)->bodies[body].block))
 
 static inline int mstmm_imposed(const mstmm_body *body, const real *memory)
 {
@@ -220,10 +219,7 @@ static inline int mstmm_imposed(const mstmm_body *body, const real *memory)
     return body->release < 0 || !(fabs(memory[body->release]) > 0) ? body->n_imposed : 0;
 }
 
-static inline real *mstmm_of_speeds(real *block, int nu, int which)
-{
-    return block + MSTMM_BLOCK_FIXED + which * nu;
-}
+#define mstmm_of_speeds(block, nu, which) ((block) + MSTMM_BLOCK_FIXED + (which) * (nu))
 
 /* What the tangent of a step keeps. */
 typedef struct mstmm_tangents {
@@ -312,9 +308,9 @@ static inline void mstmm_ground(const mstmm_state *state)
 int mstmm_fail(mstmm_state *state, int reason, int element, int code);
 
 /* Is there nothing to do for this body in this sweep? */
-static inline int mstmm_idle(const mstmm_state *state, const mstmm_body *body)
+static inline int mstmm_idle(int observed, const mstmm_body *body)
 {
-    return body->idle && !state->observed;
+    return body->idle && !observed;
 }
 
 /* The modes that a body or its section belongs to; NULL: none. */
@@ -326,9 +322,9 @@ static inline const mstmm_modal *mstmm_modal_of(const mstmm_body *body)
 static inline int mstmm_modes_of(const mstmm_modal *modal) { return modal ? modal->n : 0; }
 
 /* Number of the speeds of a hinge that nobody imposes, and which they are. */
-static inline int mstmm_free_speeds(const mstmm_state *state, const mstmm_body *body, int *columns)
+static inline int mstmm_free_speeds(const real *memory, const mstmm_body *body, int *columns)
 {
-    const int imposed = mstmm_imposed(body, state->memory);
+    const int imposed = mstmm_imposed(body, memory);
     int n = 0;
     for (int j = 0; j < body->nu; j++)
         if (!imposed || !body->imposed_mask[j]) columns[n++] = j;

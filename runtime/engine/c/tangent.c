@@ -261,13 +261,23 @@ static real *coupled(const mstmm_tangent *at, const mstmm_state *slope, int k)
     return mstmm_values(slope) + all->values[k - 6 * all->n_bodies];
 }
 
-/* The change of every coupling along x and increments that are known (NULL: none). */
+/* The change of every coupling along the direction in `parts`. */
+static int changes_of(mstmm_tangent *at, const mstmm_parts *parts, real *changes)
+{
+    mstmm_state state = known_state(at, parts), slope = slope_of(at, parts, parts->answer);
+    state.slope = &slope;
+    memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real));
+    const int code = mstmm_run_applied_slope(&state);
+    for (int k = 0; !code && k < at->n_coupled; k++) changes[k] = *coupled(at, &slope, k);
+    return code;
+}
+
+/* The same along x and increments that are known (NULL: none). */
 static int coupled_along(mstmm_tangent *at, const real *x, const mstmm_known *known, real *changes)
 {
     const mstmm_model *model = at->model;
     const mstmm_parts parts = parts_of(at);
-    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
-    int code = mstmm_tangent_coordinates(at, x, NULL, parts.change);
+    const int code = mstmm_tangent_coordinates(at, x, NULL, parts.change);
     if (code) return code;
     memcpy(parts.d_q, parts.change, (size_t)model->nq * sizeof(real));
     for (int j = 0; j < model->nu; j++) {
@@ -276,11 +286,19 @@ static int coupled_along(mstmm_tangent *at, const real *x, const mstmm_known *kn
     }
     for (int i = 0; known && i < model->nq; i++) parts.d_q[i] += known->q[i];
     for (int j = 0; known && j < model->nu; j++) parts.d_a[j] += known->a[j];
-    state.slope = &slope;
-    memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real));
-    code = mstmm_run_applied_slope(&state);
-    for (int k = 0; !code && k < at->n_coupled; k++) changes[k] = *coupled(at, &slope, k);
-    return code;
+    return changes_of(at, &parts, changes);
+}
+
+int mstmm_coupled_along(mstmm_tangent *at, const real *x, const real *d_u, const real *d_a,
+                        real *changes)
+{
+    const mstmm_parts parts = parts_of(at);
+    const int code = mstmm_tangent_coordinates(at, x, NULL, parts.change);
+    if (code) return code;
+    memcpy(parts.d_q, parts.change, (size_t)at->model->nq * sizeof(real));
+    memcpy(parts.d_u, d_u, (size_t)at->model->nu * sizeof(real));
+    memcpy(parts.d_a, d_a, (size_t)at->model->nu * sizeof(real));
+    return changes_of(at, &parts, changes);
 }
 
 int mstmm_hook_unit_load(mstmm_state *state)
@@ -344,24 +362,37 @@ static void take_steps(mstmm_tangent *at, real rate, real s, real sq, real kappa
     at->kappa = kappa;
 }
 
-int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
+/* Passes of the tangent from no direction at all; `negative` is that of mstmm_tangents. */
+static int run_tangent(mstmm_tangent *at, int (*run)(mstmm_state *), int *negative)
 {
     const mstmm_model *model = at->model;
     const mstmm_parts parts = parts_of(at);
-    mstmm_tangents step = {.numbers = at->numbers, .rate = rate, .s = s, .sq = sq, .kappa = kappa};
+    mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq,
+                           .kappa = at->kappa, .negative = negative};
     mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
-    take_steps(at, rate, s, sq, kappa);
     at->laws_alone = 0;
     memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
     memset(parts.d_u, 0, (size_t)model->nu * sizeof(real));
     memset(parts.d_a, 0, (size_t)model->nu * sizeof(real));
     memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real)); /* the ground's */
+    return run(&state);
+}
+
+int mstmm_tangent_brought(mstmm_tangent *at, real rate, real s, real sq)
+{
+    take_steps(at, rate, s, sq, 0);
+    return run_tangent(at, mstmm_run_tangent_brought, NULL);
+}
+
+int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
+{
+    take_steps(at, rate, s, sq, kappa);
     /* With couplings left out a body may topple that they hold. */
     int negative = 0;
-    if (at->n_coupled || at->counts) step.negative = &negative;
-    const int code = mstmm_run_tangent(&state);
+    const int code = run_tangent(at, mstmm_run_tangent,
+                                 at->n_coupled || at->counts ? &negative : NULL);
     return code || !at->n_coupled ? code : close_couplings(at, negative);
 }
 
@@ -369,7 +400,6 @@ int mstmm_tangent_pivot(const mstmm_tangent *at, int body, int shapes, real *piv
 {
     const mstmm_body *one = &at->model->bodies[body];
     int columns[6];
-    const mstmm_state state = {.model = at->model, .memory = at->memory};
     if (one->idle) return 0;
     if (shapes) {
         const mstmm_modal *modal = mstmm_modal_of(one);
@@ -377,7 +407,7 @@ int mstmm_tangent_pivot(const mstmm_tangent *at, int body, int shapes, real *piv
         if (n) memcpy(pivot, at->numbers + modal->tangent + MSTMM_BEND_D(n), sizeof(real) * (size_t)(n * n));
         return n;
     }
-    const int n = one->section ? 0 : mstmm_free_speeds(&state, one, columns);
+    const int n = one->section ? 0 : mstmm_free_speeds(at->memory, one, columns);
     const real *tangent = at->numbers + one->tangent;
     memcpy(pivot, tangent + MSTMM_TANGENT_INVERSE(one->nu, one->nq), sizeof(real) * (size_t)(n * n));
     return n;

@@ -56,6 +56,11 @@ void mstmm_rates_slope(const mstmm_tangent *at, real *d_rates);
 /* Factors dR along unknowns x: du = rate x, da = s x, dq = (sq - kappa g_q)^-1 N x, where g_q are the
  * slopes of the coordinates' rates N u by the coordinates. */
 int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa);
+/* What the tangent is eliminated from, in `numbers`, and no more: linear in rate, s and 1 / sq. */
+int mstmm_tangent_brought(mstmm_tangent *at, real rate, real s, real sq);
+/* Change of every coupling along x for the coordinates, d_u and d_a (nu). */
+int mstmm_coupled_along(mstmm_tangent *at, const real *x, const real *d_u, const real *d_a,
+                        real *changes);
 /* What the last factorisation divided by: the pivot (n, n) of a body's shapes, or the inverse of
  * that of its hinge; returns n. */
 int mstmm_tangent_pivot(const mstmm_tangent *at, int body, int shapes, real *pivot);

@@ -1,0 +1,79 @@
+"""The tangent's elimination in complex numbers: the same kernels and passes, printed once more.
+
+Under harmonic pushes the unknowns are complex amplitudes.  What bodies bring is linear in s^2, s
+and 1 and is put together in plain numbers once a state; what is printed here runs for every s.
+Ports that no s changes keep the plain type, so that products with them cost half.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from mstmm.border.elements import REAL
+from mstmm.ir import KernelIR
+from mstmm.ir.spec import ElementSpec
+
+from ..schedule.steps import Call, Pass, inner
+from ..schedule.tangent import (
+    TANGENT_ANSWERED,
+    TANGENT_CARRIED,
+    TANGENT_COLUMN,
+    TANGENT_ELIMINATED,
+)
+from .callers import DIRECT, MOST_SPEEDS, Callee, Specs, callees, caller, tables
+from .sweep import function_text, signature
+
+PASSES: tuple[Pass, ...] = (TANGENT_ELIMINATED, TANGENT_COLUMN, TANGENT_CARRIED, TANGENT_ANSWERED)
+#: Ports of rotations, places, velocities and subspaces of the state.
+PLAIN = frozenset({"Rc", "r", "w_I", "v", "w", "H"})
+#: Variables that point to numbers of the state, and slots of the tangent that are such.
+_STATE = re.compile(r"\breal \*(?=(?:block|parent|laid|modes)\b)")
+_HELD = {
+    "tangent + MSTMM_TANGENT_H(": "state->tangents->held + body->tangent + MSTMM_TANGENT_H(",
+    "bend + MSTMM_BEND_STILL(": "state->tangents->held + modal->tangent + MSTMM_BEND_STILL(",
+}
+_NAMES = re.compile(
+    r"\bmstmm_(?!tangent_at\b|modal_of\b)"
+    r"(?=(?:state|fail|judged|(?:at|sweep|generic|frames|tangent|modal)_\w+)\b)"
+)
+
+
+def _called(specs: Specs) -> dict[str, Callee]:
+    """The kernels that the passes call, by "element.kernel"."""
+    known = callees(specs)
+    steps = (part for whole in PASSES for step in whole.steps for part in inner(step))
+    names = (step.kernel.replace("{free}", "") for step in steps if isinstance(step, Call))
+    return {name: known[name] for name in sorted(set(names))}
+
+
+def complex_kernels(specs: Specs) -> Iterator[tuple[ElementSpec, KernelIR]]:
+    """The kernels behind them, of hinges for every number of speeds."""
+    for name in _called(specs):
+        element, _, kernel = name.partition(".")
+        keys = [DIRECT[element]] if element in DIRECT else [
+            ("sweep", f"generic{n}") for n in range(1, MOST_SPEEDS + 1)
+        ]  # fmt: skip
+        for key in keys:
+            yield specs[key], next(k for k in specs[key].kernels if k.name == kernel)
+
+
+def complex_passes(specs: Specs) -> str:
+    """Calls by the names of ports, and the passes, in the words of the engine's own."""
+    found = _called(specs)
+    wanted = {callee.name for callee in found.values()}
+    parts = [caller(callee, PLAIN) for callee in found.values()]
+    parts += [tables(specs, wanted)]
+    parts += [f"{signature(whole)};" for whole in PASSES]
+    return "\n".join([*parts, *(function_text(whole, found) for whole in PASSES)])
+
+
+def in_complex(text: str) -> str:
+    """C of the real elimination, with the types and names of the complex one."""
+    for plain, held in _HELD.items():
+        text = text.replace(plain, held)
+    text = _STATE.sub(f"{REAL} *", text)
+    text = re.sub(r"\breal\b", "mstmm_complex", text)
+    text = _NAMES.sub("mstmm_complex_", text)
+    text = re.sub(r"^static (?=int mstmm_complex_at_)", "", text, flags=re.MULTILINE)
+    return re.sub(r"\bfabs\(", "mstmm_complex_size(", text)

@@ -1,0 +1,63 @@
+"""Amplitudes of a packed scene under harmonic pushes, by the looped engine in O(bodies).
+
+Z(s) x = r with Z(s) = s^2 M + s C + K, the tangent of the residual in complex numbers
+(derive/print/complex.py): what bodies bring is put together once, every s is one elimination.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arrays import Array
+
+from .tangent import Tangent
+
+if TYPE_CHECKING:
+    from .engine import Engine
+
+Complex = NDArray[np.complex128]
+
+
+class Response:
+    """Z(s) of one scene about one state; each thread needs its own."""
+
+    def __init__(self, engine: Engine, t: float, q: Array, u: Array, a: Array) -> None:
+        self.engine, self.tangent = engine, Tangent(engine)
+        self.tangent.residual(t, q, u, a)
+        nu, m, count = engine.nu, self.tangent.coupled, len(self.tangent.numbers)
+        self._record = record = engine.ffi.new("mstmm_response *")
+        record.at, record.n_numbers = self.tangent.record, count
+        self._kept = {
+            "brought": np.zeros(2 * count),
+            "numbers": np.zeros(2 * count),
+            "workspace": np.zeros(2 * engine.packed.workspace),
+            "column": np.zeros(2 * max(1, nu)),
+            "scratch": np.zeros(3 * nu + 2 * m + 1),
+            "answers": np.zeros(2 * max(1, m * nu)),
+            "closure": np.zeros(2 * m * (4 * m + 2) + 1),
+        }
+        for name, array in self._kept.items():
+            setattr(record, name, engine.pointer(array))
+        if engine.lib.mstmm_response_begin(record):
+            raise engine.failed(self.tangent.record.failure, t, *self.tangent.state)
+
+    def amplitudes(self, s: Complex, columns: Array) -> tuple[Complex, Array, NDArray[np.int32]]:
+        """x (k, n, nu) at every s (k,) in 1/s of n right-hand sides (n, nu), by how much the
+        elimination made inertia larger (k,), and the body where (k,).
+
+        An elimination loses as many digits as inertia grows; where it is singular the growth is
+        infinite, and x is zero.
+        """
+        points, rows = np.ascontiguousarray(s), np.ascontiguousarray(columns, float)
+        x = np.zeros((len(points), len(rows), self.engine.nu), dtype=np.complex128)
+        growth, grown = np.zeros(len(points)), np.zeros(len(points), dtype=np.int32)
+        pointer = self.engine.pointer
+        self.engine.lib.mstmm_response_many(
+            self._record, len(points), pointer(points.view(np.float64)), len(rows), pointer(rows),
+            pointer(x.view(np.float64)), pointer(growth),
+            self.engine.ffi.from_buffer("int[]", grown),
+        )  # fmt: skip
+        return x, growth, grown

@@ -1,0 +1,192 @@
+"""How a linear model answers harmonic pushes: H(i omega), outputs by inputs, O(bodies) each.
+
+The amplitudes of a push r exp(s t) are x = Z(s)^-1 r with Z(s) = s^2 M + s C + K, by one
+elimination from the tips to the root for every s.  A tree can resonate outboard of a hinge that is
+held fast though all of it does not (an absorber), where that elimination has a pole and loses
+digits.  The response is analytic there: its mean over a circle in the plane of s about the
+frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure, SceneError
+
+from ..engine.response import Response
+from .channels import Channel, channel, columns
+from .outputs import Output, outputs_of, rows_of
+
+if TYPE_CHECKING:
+    from .equations import Equations
+
+Complex = NDArray[np.complex128]
+
+#: Numbers of one batch of frequencies.
+_BATCH = 2**20
+#: Growth of inertia in the elimination from which on digits are looked for elsewhere.
+_GROWN = 1e6
+#: Circles in parts of the frequency, and how many points they have.
+_CIRCLES, _POINTS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7), 8
+#: Parts of a response that may be unknown: good enough, and no answer any more.
+_GOOD, _LOST = 1e-11, 1e-3
+_ROUNDING = 2.0**-52
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """Amplitudes of outputs under inputs cos(omega t) of unit amplitude.
+
+    Attributes:
+        omega: (k,) rad/s, as asked for.
+        inputs, outputs: names.
+        input_units, output_units: their units.
+        values: (k, outputs, inputs) complex; an output is Re(values exp(i omega t)).
+    """
+
+    omega: Array
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    input_units: tuple[str, ...] = field(repr=False)
+    output_units: tuple[str, ...] = field(repr=False)
+    values: Complex = field(repr=False)
+
+    @property
+    def frequency(self) -> Array:
+        """(k,) Hz."""
+        return self.omega / (2 * np.pi)
+
+    @property
+    def magnitude(self) -> Array:
+        """(k, outputs, inputs) in units of the output a unit of the input."""
+        return np.abs(self.values)
+
+    @property
+    def phase(self) -> Array:
+        """(k, outputs, inputs) rad in (-pi, pi], negative where the output is behind."""
+        return np.angle(self.values)
+
+
+def frequency_response(
+    linear: Equations,
+    omega: ArrayLike,
+    inputs: Sequence[str] | None,
+    outputs: Sequence[str] | None,
+) -> FrequencyResponse:
+    """See `Linear.frequency_response`."""
+    frequencies = _frequencies(omega)
+    if linear.turning is not None:
+        raise SceneError(
+            "frequency response: the state turns a ball, a free or another hinge whose rates go by "
+            "its coordinates; ask about a state at rest"
+        )
+    pushes = _pushes(linear, inputs)
+    shown = outputs_of(linear, None if outputs is None else _names("outputs", outputs))
+    values = _Sweep(linear, pushes, shown).values(frequencies)
+    return FrequencyResponse(
+        frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
+        tuple(one.unit for one in pushes), tuple(one.unit for one in shown), values,
+    )  # fmt: skip
+
+
+def _frequencies(omega: ArrayLike) -> Array:
+    try:
+        found = np.array(omega, dtype=np.float64).reshape(-1)
+    except (TypeError, ValueError):
+        raise SceneError(f"omega = {omega!r}: expected angular frequencies in rad/s") from None
+    if not found.size:
+        raise SceneError("omega is empty: give angular frequencies in rad/s")
+    wrong = found[~(np.isfinite(found) & (found > 0))]
+    if wrong.size:
+        raise SceneError(
+            f"omega = {wrong[0]:.9g}: expected angular frequencies above 0 in rad/s (of Hz 2 pi "
+            "times as many)"
+        )
+    return found
+
+
+def _names(what: str, names: Sequence[str]) -> Sequence[str]:
+    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+        raise SceneError(f"{what} = {names!r}: expected a list of names")
+    if not names:
+        raise SceneError(f"{what} is empty: leave it out, or name some")
+    return names
+
+
+def _pushes(linear: Equations, inputs: Sequence[str] | None) -> Sequence[Channel]:
+    if inputs is not None:
+        return [channel(linear.model, name) for name in _names("inputs", inputs)]
+    pushes = linear.controls or linear.others
+    if not pushes:
+        raise SceneError("frequency response: the model has no inputs; name some")
+    return pushes
+
+
+class _Sweep:
+    """The response of some outputs to some pushes, s by s."""
+
+    def __init__(
+        self, linear: Equations, pushes: Sequence[Channel], outputs: Sequence[Output]
+    ) -> None:
+        engine, state, free = linear.model.looped, linear.state, list(linear.free)
+        self.engine = engine
+        self.response = Response(engine, state.t, state.q, state.u, state.a)
+        self.columns = np.zeros((len(pushes), engine.nu))
+        self.columns[:, free] = columns(engine, state, pushes, free).T
+        self.free, self.rows = free, rows_of(linear, outputs)
+        self.orders = np.array([one.order for one in outputs])
+
+    def values(self, omega: Array) -> Complex:
+        """(k, outputs, inputs) at angular frequencies (k,)."""
+        batch = max(1, _BATCH // max(1, self.columns.size))
+        parts = [self._batch(omega[k : k + batch]) for k in range(0, len(omega), batch)]
+        return np.concatenate(parts)
+
+    def _batch(self, omega: Array) -> Complex:
+        values, growth, grown = self._at(np.asarray(1j * omega, dtype=np.complex128))
+        for k in np.flatnonzero(~(growth < _GROWN)):
+            values[k] = self._around(float(omega[k]), values[k], growth[k], int(grown[k]))
+        return values
+
+    def _at(self, s: Complex) -> tuple[Complex, Array, NDArray[np.int32]]:
+        x, growth, grown = self.response.amplitudes(s, self.columns)
+        powers = s[:, None] ** self.orders
+        found = powers[:, :, None] * (self.rows @ x[:, :, self.free].swapaxes(1, 2))
+        growth[~np.isfinite(found).all(axis=(1, 2))] = np.inf
+        return found, growth, grown
+
+    def _around(self, omega: float, straight: Complex, growth: float, body: int) -> Complex:
+        """The response where the elimination lost digits: what is known best of it and its means
+        over circles."""
+        best, unknown = straight, _ROUNDING * growth
+        turns = np.exp(2j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
+        for part in _CIRCLES:
+            values, growths, _ = self._at(np.asarray(omega * (1j + part * turns), np.complex128))
+            mean = values.mean(axis=0)
+            # Of what is analytic within, this is what the circle leaves out of a point less.
+            pole = np.abs((values * turns[:, None, None]).mean(axis=0))
+            lost = max(_share(pole, mean), _ROUNDING * float(growths.max()))
+            if lost < unknown:
+                best, unknown = mean, lost
+            if unknown < _GOOD:
+                break
+        if not unknown < _LOST:
+            where = f': hinge "{self.engine.hinge_name(body)}"' if body >= 0 else ""
+            raise NumericalFailure(
+                f"frequency response: omega = {omega:.9g} rad/s is a resonance without damping"
+                f"{where} and what it carries answer without bound; add damping, or leave this "
+                "frequency out"
+            )
+        return best
+
+
+def _share(part: Array, whole: Complex) -> float:
+    size = float(np.abs(whole).max(initial=0))
+    most = float(part.max(initial=0))
+    return most / size if size > 0 else float(most > 0)
