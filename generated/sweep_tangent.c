@@ -47,9 +47,6 @@ int mstmm_sweep_tangent_placed_left(int n, const real *restrict gain, const real
 
 #ifndef MSTMM_SOLVE_LU
 #define MSTMM_SOLVE_LU
-#ifndef MSTMM_BELOW_ZERO /* complex numbers have no sign */
-#define MSTMM_BELOW_ZERO(pivot) ((pivot) < 0)
-#endif
 /* x = a^-1 b by LU with row exchange; a is n x n, b and x are n x m.  `work` (n x n) keeps the factors,
  * 1 / pivot on the diagonal.
  * Returns 1 if a pivot is not above relative_pivot times the magnitude of its column in a (NaN
@@ -57,7 +54,7 @@ int mstmm_sweep_tangent_placed_left(int n, const real *restrict gain, const real
 static inline __attribute__((always_inline))
 int mstmm_solve_lu(
     int n, int m, const real *restrict a, const real *restrict b, real *restrict x,
-    real *restrict work, double relative_pivot)
+    real *restrict work, real relative_pivot)
 {
     int negative = 0;
     for (int i = 0; i < n * n; ++i) work[i] = a[i];
@@ -80,11 +77,11 @@ int mstmm_solve_lu(
                 x[best * m + j] = entry;
             }
         }
-        double size = 0;
+        real size = 0;
         for (int k = 0; k < n; ++k) size += fabs(a[k * n + i]);
         const real pivot = work[i * n + i];
         if (!(fabs(pivot) > relative_pivot * size)) return 1;
-        if (MSTMM_BELOW_ZERO(pivot)) negative = !negative;
+        if (pivot < 0) negative = !negative;
         const real scale = work[i * n + i] = 1 / pivot;
         for (int k = i + 1; k < n; ++k) {
             const real factor = work[k * n + i] * scale;

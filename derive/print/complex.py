@@ -1,8 +1,9 @@
 """The tangent's elimination in complex numbers: the same kernels and passes, printed once more.
 
-Under harmonic pushes the unknowns are complex amplitudes.  What bodies bring is linear in s^2, s
-and 1 and is put together in plain numbers once a state; what is printed here runs for every s.
-Ports that no s changes keep the plain type, so that products with them cost half.
+A number there is one of several frequencies at a time (runtime/engine/c/complex_lanes.h).  Under
+harmonic pushes the unknowns are complex amplitudes.  What bodies bring is linear in s^2, s and 1
+and is put together in plain numbers once a state; what is printed here runs for every s.  Ports
+that no s changes keep the plain type, so that products with them cost half.
 """
 
 from __future__ import annotations
@@ -35,8 +36,15 @@ _HELD = {
 }
 _NAMES = re.compile(
     r"\bmstmm_(?!tangent_at\b|modal_of\b)"
-    r"(?=(?:state|fail|judged|(?:at|sweep|generic|frames|tangent|modal)_\w+)\b)"
+    r"(?=(?:state|fail|judged|solve_lu|(?:at|sweep|generic|frames|tangent|modal)_\w+)\b)"
 )
+
+#: Numbers that begin at zero, and what is added to others.
+_ZERO = re.compile(r"((?:mstmm_complex t\d+|\]) = |^ +: )0;", re.MULTILINE)
+_OWN = re.compile(
+    r"^(?=int mstmm_complex_\w+(?<!_sized)\(|mstmm_complex_\w+_kernel \*const)", re.MULTILINE
+)
+_ADDED = re.compile(r"^( *)(\S.*) ([+-])= (.*);$", re.MULTILINE)
 
 
 def _called(specs: Specs) -> dict[str, Callee]:
@@ -75,5 +83,13 @@ def in_complex(text: str) -> str:
     text = _STATE.sub(f"{REAL} *", text)
     text = re.sub(r"\breal\b", "mstmm_complex", text)
     text = _NAMES.sub("mstmm_complex_", text)
-    text = re.sub(r"^static (?=int mstmm_complex_at_)", "", text, flags=re.MULTILINE)
-    return re.sub(r"\bfabs\(", "mstmm_complex_size(", text)
+    text = _ZERO.sub(r"\1mstmm_complex_plain(0);", text)
+    text = _ADDED.sub(_added, text)
+    text = text.replace("_table[];", f"_table[{MOST_SPEEDS + 1}];").replace("extern ", "")
+    return _OWN.sub("static ", text)
+
+
+def _added(found: re.Match[str]) -> str:
+    indent, to, sign, value = found.groups()
+    word = "plus" if sign == "+" else "minus"
+    return f"{indent}{to} = mstmm_complex_{word}({to}, {value});"

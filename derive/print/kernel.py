@@ -29,6 +29,12 @@ from mstmm.ir import (
 
 from .alike import Alike, Loop, Value
 
+#: Operations on complex numbers as functions of C.
+_COMPLEX = {
+    "add": "mstmm_complex_plus({}, {})", "sub": "mstmm_complex_minus({}, {})",
+    "mul": "mstmm_complex_times({}, {})", "neg": "mstmm_complex_scaled(-1, {})",
+}  # fmt: skip
+
 
 def literal(text: str) -> str:
     """C text of a constant ("3", "-1/3", "pi"): exact where a double is, else correctly rounded.
@@ -70,7 +76,7 @@ class KernelText:
     """C text of one kernel's statements, in the form the templates lay out.
 
     `alike` names outputs whose entries along an axis are printed as a loop (`.alike`); `plain`,
-    where the scalar type of C is another one, ports that stay `REAL`.
+    where arrays are of complex numbers, ports that stay `REAL`.
     """
 
     def __init__(
@@ -85,6 +91,7 @@ class KernelText:
         self.ports = {port.name: port for port in (*kernel.inputs, *kernel.outputs)}
         self._truths: set[int] = set()
         self._plain_ports, self._plain_numbers = plain, set[int]()
+        self._complex = bool(plain)
 
     def statements(self) -> list[dict[str, Any]]:
         """One dictionary a statement; its `kind` is assign, sum, store, guard, solve or alike."""
@@ -183,7 +190,7 @@ class KernelText:
                 "body": [self._inner(a) for a in statement.body],
                 "target": self._entry(port, statement.index),
                 "sign": "+=" if port.accumulate else "=",
-                "value": self.operand(statement.value),
+                "value": self._stored(statement.value),
             }
         if isinstance(statement, Guard):
             condition = self._truth(statement.condition)
@@ -203,7 +210,7 @@ class KernelText:
             "number": statement.number,
             "over": statement.over,
             "body": [self._inner(inner) for inner in statement.body],
-            "value": self.operand(statement.value),
+            "value": self._stored(statement.value),
         }
 
     def _assign(self, assign: Assign) -> dict[str, Any]:
@@ -212,26 +219,46 @@ class KernelText:
             self._truths.add(assign.number)
         else:
             self._truths.discard(assign.number)
+        if self._complex and not self._all_plain(assign.args):
+            return self._complex_assign(assign)
+        self._plain_numbers.add(assign.number)
         words = [self.operand(a) for a in assign.args]
         truths = {f"t{place}": self._truth(a) for place, a in enumerate(assign.args)}
         expression = row.c.format(*words, **truths)
         return {
             "kind": "assign", "number": assign.number, "expression": expression,
-            "scalar": self._scalar(assign),
+            "scalar": REAL if self._complex else "real",
         }  # fmt: skip
 
-    def _scalar(self, assign: Assign) -> str:
-        """Type of what comes of plain numbers alone, and of everything else."""
-        self._plain_numbers.discard(assign.number)
-        known = self._plain_ports and all(
+    # --- complex numbers ------------------------------------------------------------------------
+
+    def _all_plain(self, operands: Sequence[Operand]) -> bool:
+        return all(
             o.number in self._plain_numbers if isinstance(o, Temporary)
             else not isinstance(o, Element) or o.port in self._plain_ports
-            for o in assign.args
+            for o in operands
         )  # fmt: skip
-        if not known:
-            return "real"
-        self._plain_numbers.add(assign.number)
-        return REAL
+
+    def _complex_assign(self, assign: Assign) -> dict[str, Any]:
+        """An operation on complex numbers, or on one and a plain one, by a function."""
+        self._plain_numbers.discard(assign.number)
+        if assign.op == "mul" and any(self._all_plain([a]) for a in assign.args):
+            args = sorted(assign.args, key=lambda a: not self._all_plain([a]))
+            words = [self.operand(a) for a in args]
+            call = "mstmm_complex_scaled({}, {})"
+        else:
+            words = [self._stored(a) for a in assign.args]
+            call = _COMPLEX[assign.op]
+        return {
+            "kind": "assign", "number": assign.number, "expression": call.format(*words),
+            "scalar": "real",
+        }  # fmt: skip
+
+    def _stored(self, operand: Operand) -> str:
+        """C text of an operand in an array's own type."""
+        word = self.operand(operand)
+        plain = self._complex and self._all_plain([operand])
+        return f"mstmm_complex_plain({word})" if plain else word
 
     def _solve(self, solve: Solve) -> dict[str, Any]:
         columns = self.ports[solve.right].shape[1:]

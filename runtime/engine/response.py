@@ -28,16 +28,17 @@ class Response:
         self.engine, self.tangent = engine, Tangent(engine)
         self.tangent.residual(t, q, u, a)
         nu, m, count = engine.nu, self.tangent.coupled, len(self.tangent.numbers)
+        several = 2 * int(engine.lib.MSTMM_MOST_LANES)
         self._record = record = engine.ffi.new("mstmm_response *")
         record.at, record.n_numbers = self.tangent.record, count
         self._kept = {
-            "brought": np.zeros(2 * count),
-            "numbers": np.zeros(2 * count),
-            "workspace": np.zeros(2 * engine.packed.workspace),
-            "column": np.zeros(2 * max(1, nu)),
-            "scratch": np.zeros(3 * nu + 2 * m + 1),
-            "answers": np.zeros(2 * max(1, m * nu)),
-            "closure": np.zeros(2 * m * (4 * m + 2) + 1),
+            "brought": _aligned(2 * count),
+            "numbers": _aligned(several * count),
+            "workspace": _aligned(several * engine.packed.workspace),
+            "vectors": _aligned(several * 2 * nu),
+            "scratch": _aligned(3 * nu + m),
+            "answers": _aligned(several * m * nu),
+            "closure": _aligned(several * m * (4 * m + 2)),
         }
         for name, array in self._kept.items():
             setattr(record, name, engine.pointer(array))
@@ -61,3 +62,10 @@ class Response:
             self.engine.ffi.from_buffer("int[]", grown),
         )  # fmt: skip
         return x, growth, grown
+
+
+def _aligned(count: int) -> Array:
+    """So many zeros that begin where 64 divides the address."""
+    room = np.zeros(count + 8)
+    first = -(room.ctypes.data // 8) % 8
+    return room[first : first + count]

@@ -1,0 +1,143 @@
+/* Complex numbers of MSTMM_LANES frequencies at a time, and what passes in them are at
+ * (complex_steps.c). */
+#ifdef MSTMM_LANES
+#ifndef MSTMM_COMPLEX_LANES_HEADER
+#define MSTMM_COMPLEX_LANES_HEADER
+
+#include "response.h"
+
+typedef double mstmm_lanes __attribute__((vector_size(8 * MSTMM_LANES)));
+typedef struct {
+    mstmm_lanes re, im;
+} mstmm_complex;
+
+#define MSTMM_COMPLEX static inline __attribute__((always_inline))
+
+MSTMM_COMPLEX mstmm_complex mstmm_complex_plus(mstmm_complex a, mstmm_complex b)
+{
+    return (mstmm_complex){a.re + b.re, a.im + b.im};
+}
+
+MSTMM_COMPLEX mstmm_complex mstmm_complex_minus(mstmm_complex a, mstmm_complex b)
+{
+    return (mstmm_complex){a.re - b.re, a.im - b.im};
+}
+
+MSTMM_COMPLEX mstmm_complex mstmm_complex_times(mstmm_complex a, mstmm_complex b)
+{
+    return (mstmm_complex){a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
+}
+
+MSTMM_COMPLEX mstmm_complex mstmm_complex_scaled(double factor, mstmm_complex a)
+{
+    return (mstmm_complex){factor * a.re, factor * a.im};
+}
+
+MSTMM_COMPLEX mstmm_complex mstmm_complex_plain(double number)
+{
+    return (mstmm_complex){number + (mstmm_lanes){0}, (mstmm_lanes){0}};
+}
+
+MSTMM_COMPLEX mstmm_complex mstmm_complex_inverse(mstmm_complex a)
+{
+    const mstmm_lanes square = a.re * a.re + a.im * a.im;
+    return (mstmm_complex){a.re / square, -a.im / square};
+}
+
+/* |re| + |im| of one lane, and of all of them. */
+MSTMM_COMPLEX double mstmm_complex_size(const mstmm_complex *a, int lane)
+{
+    return fabs(a->re[lane]) + fabs(a->im[lane]);
+}
+
+MSTMM_COMPLEX double mstmm_complex_sizes(const mstmm_complex *a)
+{
+    double size = 0;
+    for (int lane = 0; lane < MSTMM_LANES; lane++) size += mstmm_complex_size(a, lane);
+    return size;
+}
+
+/* x = a^-1 b by LU with row exchange, the same in all lanes; arguments and result of mstmm_solve_lu
+ * (templates/solve_lu.c.jinja), singular if one of the lanes is. */
+MSTMM_COMPLEX int mstmm_complex_solve_lu(int n, int m, const mstmm_complex *restrict a,
+                                        const mstmm_complex *restrict b, mstmm_complex *restrict x,
+                                        mstmm_complex *restrict work, double relative_pivot)
+{
+    for (int i = 0; i < n * n; i++) work[i] = a[i];
+    for (int i = 0; i < n * m; i++) x[i] = b[i];
+    for (int i = 0; i < n; i++) {
+        int best = i;
+        for (int k = i + 1; k < n; k++)
+            if (mstmm_complex_sizes(&work[best * n + i]) < mstmm_complex_sizes(&work[k * n + i]))
+                best = k;
+        for (int j = i; best != i && j < n; j++) {
+            const mstmm_complex entry = work[i * n + j];
+            work[i * n + j] = work[best * n + j];
+            work[best * n + j] = entry;
+        }
+        for (int j = 0; best != i && j < m; j++) {
+            const mstmm_complex entry = x[i * m + j];
+            x[i * m + j] = x[best * m + j];
+            x[best * m + j] = entry;
+        }
+        for (int lane = 0; lane < MSTMM_LANES; lane++) {
+            double size = 0;
+            for (int k = 0; k < n; k++) size += mstmm_complex_size(&a[k * n + i], lane);
+            if (!(mstmm_complex_size(&work[i * n + i], lane) > relative_pivot * size)) return 1;
+        }
+        const mstmm_complex scale = work[i * n + i] = mstmm_complex_inverse(work[i * n + i]);
+        for (int k = i + 1; k < n; k++) {
+            const mstmm_complex factor = mstmm_complex_times(work[k * n + i], scale);
+            for (int j = i + 1; j < n; j++)
+                work[k * n + j] = mstmm_complex_minus(
+                    work[k * n + j], mstmm_complex_times(factor, work[i * n + j]));
+            for (int j = 0; j < m; j++)
+                x[k * m + j] = mstmm_complex_minus(x[k * m + j],
+                                                   mstmm_complex_times(factor, x[i * m + j]));
+        }
+    }
+    for (int i = n - 1; i >= 0; i--)
+        for (int j = 0; j < m; j++) {
+            mstmm_complex rest = x[i * m + j];
+            for (int k = i + 1; k < n; k++)
+                rest = mstmm_complex_minus(rest,
+                                           mstmm_complex_times(work[i * n + k], x[k * m + j]));
+            x[i * m + j] = mstmm_complex_times(rest, work[i * n + i]);
+        }
+    return 0;
+}
+
+/* --- what a pass is at: numbers of the state are plain, what moves is complex --- */
+
+typedef struct {
+    mstmm_complex *numbers;
+    const real *held;    /* what no s changes of them */
+} mstmm_complex_tangents;
+
+typedef struct {
+    mstmm_complex *workspace;
+} mstmm_complex_slope;
+
+typedef struct {
+    const mstmm_model *model;
+    real *workspace;
+    const real *memory;
+    const mstmm_complex *column;
+    mstmm_complex *answer;
+    mstmm_complex_slope *slope;
+    mstmm_complex_tangents *tangents;
+    mstmm_failure *failure;
+    int observed;
+} mstmm_complex_state;
+
+MSTMM_COMPLEX int mstmm_complex_fail(mstmm_complex_state *state, int reason, int element, int code)
+{
+    *state->failure = (mstmm_failure){.reason = reason, .element = element, .code = code};
+    return reason;
+}
+
+/* The code of an elimination: determinants have no sign here. */
+#define mstmm_complex_judged(state, code) (code)
+
+#endif
+#endif

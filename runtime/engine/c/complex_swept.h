@@ -1,0 +1,209 @@
+/* Sweeps in complex numbers behind the passes of complex_steps.c, whose end this is. */
+#ifdef MSTMM_LANES
+
+typedef struct {
+    mstmm_complex_state state;
+    mstmm_complex_slope slope;
+    mstmm_complex_tangents tangents;
+    mstmm_complex s, square;
+    double growth[MSTMM_LANES];
+    int grown[MSTMM_LANES];
+} mstmm_lanes_at;
+
+/* Inertia in S: angular accelerations to moments, accelerations to forces. */
+static void inertia(const mstmm_complex *S, int lane, double *sizes)
+{
+    sizes[0] = sizes[1] = 0;
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 3; column++) {
+            sizes[0] += mstmm_complex_size(&S[6 * (3 + row) + 3 + column], lane);
+            sizes[1] += mstmm_complex_size(&S[6 * (6 + row) + column], lane);
+        }
+}
+
+/* What bodies bring at s, of numbers `first` to before `end`. */
+static void bring(const mstmm_response *of, mstmm_lanes_at *with, int64_t first, int64_t end)
+{
+    const real *by_rate = of->brought, *by_square = by_rate + of->n_numbers;
+    mstmm_complex *numbers = with->tangents.numbers;
+    const mstmm_complex s = with->s, square = with->square;
+    for (int64_t k = first; k < end; k++) {
+        numbers[k].re = with->tangents.held[k] + s.re * by_rate[k] + square.re * by_square[k];
+        numbers[k].im = s.im * by_rate[k] + square.im * by_square[k];
+    }
+}
+
+/* Numbers are brought no sooner than a body adds to them or is met, so that the cache has them. */
+static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
+{
+    const mstmm_model *model = of->at->model;
+    int64_t begun = of->n_numbers;
+    for (int lane = 0; lane < MSTMM_LANES; lane++) {
+        with->growth[lane] = 1;
+        with->grown[lane] = -1;
+    }
+    for (int i = model->n_bodies - 1; i >= 0; i--) {
+        const mstmm_body *body = &model->bodies[i];
+        const mstmm_complex *S = with->tangents.numbers + body->tangent;
+        const int64_t first = mstmm_tangent_at(model, body->parent);
+        if (first < begun) {
+            bring(of, with, first, begun);
+            begun = first;
+        }
+        double before[MSTMM_LANES][2], after[2];
+        for (int lane = 0; lane < MSTMM_LANES; lane++) inertia(S, lane, before[lane]);
+        const int code = mstmm_complex_at_tangent_eliminated(&with->state, i);
+        if (code) return code;
+        for (int lane = 0; lane < MSTMM_LANES; lane++) {
+            inertia(S, lane, after);
+            for (int k = 0; k < 2; k++) {
+                if (!(before[lane][k] > 0 && after[k] > with->growth[lane] * before[lane][k]))
+                    continue;
+                with->growth[lane] = after[k] / before[lane][k];
+                with->grown[lane] = i;
+            }
+        }
+    }
+    return 0;
+}
+
+static int solve_alone(mstmm_lanes_at *with, const mstmm_complex *column, mstmm_complex *unit,
+                       mstmm_complex *x)
+{
+    mstmm_complex_state *state = &with->state;
+    const int n = state->model->n_bodies;
+    int code = 0;
+    memset(with->slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(mstmm_complex)); /* the ground's */
+    state->column = column;
+    state->answer = x;
+    for (int i = 0; !code && i < n; i++) code = mstmm_complex_at_tangent_column(state, i);
+    if (unit) *unit = mstmm_complex_plain(1);
+    for (int i = n - 1; !code && i >= 0; i--) code = mstmm_complex_at_tangent_carried(state, i);
+    for (int i = 0; !code && i < n; i++) code = mstmm_complex_at_tangent_answered(state, i);
+    return code;
+}
+
+/* --- across the tree --- */
+
+/* Change of every coupling along x, lane by lane, real and imaginary parts one after the other. */
+static int coupled_along(mstmm_response *of, const mstmm_lanes_at *with, const mstmm_complex *x,
+                         mstmm_complex *changes)
+{
+    const int nu = of->at->model->nu, m = of->at->n_coupled;
+    real *moved = of->scratch, *d_u = moved + nu, *d_a = d_u + nu, *found = d_a + nu;
+    for (int part = 0; part < 2 * MSTMM_LANES; part++) {
+        const int lane = part / 2, imaginary = part % 2;
+        for (int j = 0; j < nu; j++) {
+            const mstmm_complex du = mstmm_complex_times(with->s, x[j]);
+            const mstmm_complex da = mstmm_complex_times(with->square, x[j]);
+            moved[j] = imaginary ? x[j].im[lane] : x[j].re[lane];
+            d_u[j] = imaginary ? du.im[lane] : du.re[lane];
+            d_a[j] = imaginary ? da.im[lane] : da.re[lane];
+        }
+        const int code = mstmm_coupled_along(of->at, moved, d_u, d_a, found);
+        if (code) return code;
+        for (int k = 0; k < m; k++) {
+            if (imaginary) changes[k].im[lane] = found[k];
+            else changes[k].re[lane] = found[k];
+        }
+    }
+    return 0;
+}
+
+/* Answers Y to one of each coupling, and the inverse of 1 - G Y where they are c = G x. */
+static int close_couplings(mstmm_response *of, mstmm_lanes_at *with)
+{
+    const mstmm_couplings *all = of->at->couplings;
+    const mstmm_model *model = of->at->model;
+    const int m = of->at->n_coupled, nu = model->nu, loads = m - all->n_efforts;
+    mstmm_complex *inverse = (mstmm_complex *)of->closure, *matrix = inverse + m * m;
+    mstmm_complex *one = matrix + m * m, *work = one + m * m, *changes = work + m * m;
+    mstmm_complex *column = (mstmm_complex *)of->vectors;
+    memset(column, 0, (size_t)nu * sizeof *column);
+    for (int k = 0; k < m; k++) {
+        mstmm_complex *answer = (mstmm_complex *)of->answers + (int64_t)k * nu, *unit = NULL;
+        if (k < loads)
+            unit = mstmm_block(model, with->slope.workspace, all->bodies[k / 6])
+                   + MSTMM_BLOCK_E + k % 6;
+        else
+            column[all->speeds[k - loads]] = mstmm_complex_plain(1);
+        int code = solve_alone(with, column, unit, answer);
+        if (k >= loads) column[all->speeds[k - loads]] = mstmm_complex_plain(0);
+        if (!code) code = coupled_along(of, with, answer, changes);
+        if (code) return code;
+        for (int i = 0; i < m; i++) {
+            one[i * m + k] = mstmm_complex_plain(i == k);
+            matrix[i * m + k] = mstmm_complex_minus(one[i * m + k], changes[i]);
+        }
+    }
+    const int code = mstmm_complex_sweep_tangent_invert(m, matrix, one, inverse, work);
+    return code ? mstmm_complex_fail(&with->state, MSTMM_FAILED_TANGENT, -1, code) : 0;
+}
+
+static int add_couplings(mstmm_response *of, const mstmm_lanes_at *with, mstmm_complex *x)
+{
+    const int m = of->at->n_coupled, nu = of->at->model->nu;
+    const mstmm_complex *inverse = (mstmm_complex *)of->closure;
+    mstmm_complex *changes = (mstmm_complex *)of->closure + 4 * m * m;
+    const int code = coupled_along(of, with, x, changes);
+    for (int k = 0; !code && k < m; k++) {
+        mstmm_complex amount = mstmm_complex_plain(0);
+        for (int i = 0; i < m; i++)
+            amount = mstmm_complex_plus(amount,
+                                        mstmm_complex_times(inverse[k * m + i], changes[i]));
+        const mstmm_complex *answer = (mstmm_complex *)of->answers + (int64_t)k * nu;
+        for (int j = 0; j < nu; j++)
+            x[j] = mstmm_complex_plus(x[j], mstmm_complex_times(answer[j], amount));
+    }
+    return code;
+}
+
+/* --- several s --- */
+
+static void take(mstmm_response *of, int count, const real *s, mstmm_lanes_at *with)
+{
+    mstmm_tangent *at = of->at;
+    for (int lane = 0; lane < MSTMM_LANES; lane++) { /* the last once more where there are fewer */
+        const int k = lane < count ? lane : count - 1;
+        with->s.re[lane] = s[2 * k];
+        with->s.im[lane] = s[2 * k + 1];
+    }
+    with->square = mstmm_complex_times(with->s, with->s);
+    with->slope.workspace = (mstmm_complex *)of->workspace;
+    with->tangents = (mstmm_complex_tangents){(mstmm_complex *)of->numbers, at->numbers};
+    with->state = (mstmm_complex_state){
+        .model = at->model, .workspace = at->workspace, .memory = at->memory,
+        .slope = &with->slope, .tangents = &with->tangents, .failure = &at->failure};
+}
+
+#define MSTMM_BY_LANES_OF(lanes) mstmm_response_by_##lanes
+#define MSTMM_BY_LANES(lanes) MSTMM_BY_LANES_OF(lanes)
+
+void MSTMM_BY_LANES(MSTMM_LANES)(mstmm_response *of, int count, const real *s, int64_t n,
+                                 const real *columns, real *x, real *growth, int *grown)
+{
+    const int m = of->at->n_coupled, nu = of->at->model->nu;
+    mstmm_complex *column = (mstmm_complex *)of->vectors, *answer = column + nu;
+    mstmm_lanes_at with;
+    take(of, count, s, &with);
+    int code = eliminate(of, &with);
+    if (!code && m) code = close_couplings(of, &with);
+    for (int64_t k = 0; !code && k < n; k++) {
+        for (int j = 0; j < nu; j++) column[j] = mstmm_complex_plain(columns[k * nu + j]);
+        code = solve_alone(&with, column, NULL, answer);
+        if (!code && m) code = add_couplings(of, &with, answer);
+        for (int lane = 0; lane < count; lane++) {
+            real *to = x + 2 * nu * (lane * n + k);
+            for (int j = 0; j < nu; j++) {
+                to[2 * j] = answer[j].re[lane];
+                to[2 * j + 1] = answer[j].im[lane];
+            }
+        }
+    }
+    for (int lane = 0; lane < count; lane++) {
+        growth[lane] = code ? INFINITY : with.growth[lane];
+        grown[lane] = code ? of->at->failure.element : with.grown[lane];
+    }
+}
+
+#endif
