@@ -22,15 +22,20 @@ Complex = NDArray[np.complex128]
 
 
 class Response:
-    """Z(s) of one scene about one state; each thread needs its own."""
+    """Z(s) of one scene about one state; each thread needs its own.
 
-    def __init__(self, engine: Engine, t: float, q: Array, u: Array, a: Array) -> None:
+    `lanes` is how many s go at a time, 2 or 4; 0 for as many as the processor takes.
+    """
+
+    def __init__(
+        self, engine: Engine, t: float, q: Array, u: Array, a: Array, lanes: int = 0
+    ) -> None:
         self.engine, self.tangent = engine, Tangent(engine)
         self.tangent.residual(t, q, u, a)
         nu, m, count = engine.nu, self.tangent.coupled, len(self.tangent.numbers)
         several = 2 * int(engine.lib.MSTMM_MOST_LANES)
         self._record = record = engine.ffi.new("mstmm_response *")
-        record.at, record.n_numbers = self.tangent.record, count
+        record.at, record.lanes, record.n_numbers = self.tangent.record, lanes, count
         self._kept = {
             "brought": _aligned(2 * count),
             "numbers": _aligned(several * count),

@@ -13,6 +13,7 @@ from reference.jets import Array
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.runtime.engine.response import Response
 from mstmm.runtime.linear.linear import Linear
 
 Scene = dict[str, Any]
@@ -80,6 +81,18 @@ def test_a_chain_of_500() -> None:
     check_dense(compiled(chain(500)).linearize(np.zeros(500)))
 
 
+def test_two_and_four_frequencies_at_a_time() -> None:
+    scene = random_scenes.random_scene(5)
+    q, _ = random_scenes.random_state(scene, 5)
+    engine = mstmm.compile(mstmm.Scene(**scene), engine="looped").looped
+    still, columns = np.zeros(engine.nu), np.eye(engine.nu)
+    few, many = (
+        Response(engine, 0.3, q, still, still, lanes).amplitudes(1j * OMEGA, columns)[0]
+        for lanes in (2, 4)
+    )
+    assert np.abs(few - many).max() < 1e-12 * np.abs(few).max()
+
+
 # --- closed forms -----------------------------------------------------------------------------
 
 
@@ -134,10 +147,11 @@ def test_ends_go_along_with_coordinates() -> None:
 def test_an_absorber_at_its_own_frequency(omega: float) -> None:
     """Held fast, what hangs outboard resonates there; the whole scene does not."""
     model = compiled(masses((3.0, 70.0, 0.0), (1.0, 100.0, 0.0), (0.5, 20.0, 0.0)))
-    found = model.frequency_response([omega], ["s0.effort"]).values[0, :, 0]
-    linear = model.linearize()
-    z = linear.K - omega**2 * linear.M
-    np.testing.assert_allclose(found, np.linalg.solve(z, np.eye(3)[0]), rtol=1e-9, atol=1e-13)
+    beside = [3.0, omega, 11.0, 4.0, 7.0]
+    linear = model.linearize(inputs=["s0.effort"])
+    for w, found in zip(beside, linear.frequency_response(beside).values[:, :, 0], strict=True):
+        expected = np.linalg.solve(linear.K - w**2 * linear.M, np.eye(3)[0])
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-13)
     two = compiled(masses((3.0, 70.0, 0.0), (1.0, 100.0, 0.0)))
     first, apart = two.frequency_response([omega], ["s0.effort"]).values[0, :, 0]
     assert abs(first) < 1e-9

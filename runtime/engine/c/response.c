@@ -22,14 +22,15 @@ int mstmm_response_begin(mstmm_response *of)
 }
 
 /* How many frequencies go at a time on this processor, and by what. */
-static int lanes(mstmm_response_few **by)
+static int lanes(const mstmm_response *of, mstmm_response_few **by)
 {
 #ifdef MSTMM_FOUR_LANES
-    if (__builtin_cpu_supports("avx2")) {
+    if (of->lanes != 2 && __builtin_cpu_supports("avx2")) {
         *by = mstmm_response_by_4;
         return 4;
     }
 #endif
+    (void)of;
     *by = mstmm_response_by_2;
     return 2;
 }
@@ -39,7 +40,7 @@ void mstmm_response_many(mstmm_response *of, int64_t count, const real *s, int64
 {
     const int64_t size = 2 * n * of->at->model->nu;
     mstmm_response_few *by;
-    const int most = lanes(&by);
+    const int most = lanes(of, &by);
     for (int64_t k = 0; k < count; k += most) {
         const int some = count - k < most ? (int)(count - k) : most;
         by(of, some, s + 2 * k, n, columns, x + k * size, growth + k, grown + k);

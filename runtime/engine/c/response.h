@@ -14,6 +14,7 @@
  * divides its address.  Complex numbers are 2 MSTMM_MOST_LANES of these. */
 typedef struct {
     mstmm_tangent *at;
+    int lanes;           /* frequencies at a time, 2 or 4; 0: as many as the processor takes */
     int64_t n_numbers;   /* see mstmm_tangent_lay */
     real *brought;       /* 2 n_numbers: what s brings, what s^2 brings; the rest is the tangent's */
     real *numbers;       /* n_numbers complex */
