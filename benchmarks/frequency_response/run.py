@@ -43,8 +43,8 @@ def chain(bodies: int) -> mstmm.Scene:
 def answers(bodies: int) -> tuple[int, dict[str, Callable[[], np.ndarray]]]:
     """How many frequencies, and who computes the response at all of them."""
     model = mstmm.compile(chain(bodies), engine="looped")
-    linear = model.linearize(np.zeros(model.nq), inputs=["rope[0].effort"], disturbances=[])
-    omega = np.linspace(1, 30, max(20, 20_000 // bodies))
+    linear = model.linearize(np.zeros(model.nq), inputs=["rope[0].hinge.effort"], disturbances=())
+    omega = np.linspace(1, 30, max(100, 20_000 // bodies))
     last = [linear.coordinates[-1]]
     work: dict[str, Callable[[], np.ndarray]] = {
         "mstmm": lambda: linear.frequency_response(omega, None, last).values[:, 0, 0]

@@ -49,22 +49,23 @@ def outputs_of(linear: Equations, names: Sequence[str] | None) -> list[Output]:
 
     Raises SceneError for a name that is none of these, or that a moving state does not give.
     """
+    pairs = zip(linear.coordinates, linear.units, strict=True)
+    plain = {name: Output(name, unit, 0, place) for place, (name, unit) in enumerate(pairs)}
     if names is None:
-        pairs = zip(linear.coordinates, linear.units, strict=True)
-        return [Output(name, unit, 0, place) for place, (name, unit) in enumerate(pairs)]
-    known = {one.name: one for one in _of_coordinates(linear)}
-    return [known.get(name) or _of_end(linear, name) for name in names]
+        return list(plain.values())
+    rates = {} if plain.keys() >= set(names) else {one.name: one for one in _rates(linear)}
+    return [plain.get(name) or rates.get(name) or _of_end(linear, name) for name in names]
 
 
-def _of_coordinates(linear: Equations) -> Iterator[Output]:
-    """Coordinates with their rates and accelerations."""
-    for place, (name, unit) in enumerate(zip(linear.coordinates, linear.units, strict=True)):
-        slots = linear.model.layout.hinge_of_speed(linear.free[place])
-        owner, k = name.rpartition(".")[0], linear.free[place] - slots.u
-        speed, per_time = slots.u_names[k], slots.u_units[k]
-        yield Output(name, unit, 0, place)
-        yield Output(f"{owner}.{speed}", per_time, 1, place)
-        yield Output(f"{owner}.{acceleration_name(speed)}", rate_unit(per_time), 2, place)
+def _rates(linear: Equations) -> Iterator[Output]:
+    """Rates and accelerations of coordinates."""
+    layout = linear.model.layout
+    for place, (entry, name) in enumerate(zip(linear.free, linear.coordinates, strict=True)):
+        slots = layout.hinge_of_speed(entry)
+        owner, k = name.rpartition(".")[0], entry - slots.u
+        speed, unit = slots.u_names[k], slots.u_units[k]
+        yield Output(f"{owner}.{speed}", unit, 1, place)
+        yield Output(f"{owner}.{acceleration_name(speed)}", rate_unit(unit), 2, place)
 
 
 def _of_end(linear: Equations, name: str) -> Output:
@@ -95,7 +96,8 @@ def _refuse_in_motion(linear: Equations, name: str, order: int) -> None:
 
 
 def _known(linear: Equations) -> Iterator[str]:
-    yield from (one.name for one in _of_coordinates(linear))
+    yield from linear.coordinates
+    yield from (one.name for one in _rates(linear))
     for end in References(linear.model.scene.skeleton):
         for kind in _KINDS:
             yield from (f"{end}.{kind}.{axis}" for axis in BODY[kind].labels)

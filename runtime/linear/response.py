@@ -128,6 +128,15 @@ def _pushes(linear: Equations, inputs: Sequence[str] | None) -> Sequence[Channel
     return pushes
 
 
+def _efforts(linear: Equations, pushes: Sequence[Channel]) -> Array:
+    """(n, pushes): what a unit of each does; what the model keeps is not made again."""
+    if pushes is linear.controls:
+        return linear.V
+    if pushes is linear.others:
+        return linear.W
+    return columns(linear.model.looped, linear.state, pushes, list(linear.free))
+
+
 class _Sweep:
     """The response of some outputs to some pushes, s by s."""
 
@@ -138,7 +147,7 @@ class _Sweep:
         self.engine = engine
         self.response = Response(engine, state.t, state.q, state.u, state.a)
         self.columns = np.zeros((len(pushes), engine.nu))
-        self.columns[:, free] = columns(engine, state, pushes, free).T
+        self.columns[:, free] = _efforts(linear, pushes).T
         self.free, self.rows = free, rows_of(linear, outputs)
         self.orders = np.array([one.order for one in outputs])
 

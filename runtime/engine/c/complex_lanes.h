@@ -7,6 +7,7 @@
 #include "response.h"
 
 typedef double mstmm_lanes __attribute__((vector_size(8 * MSTMM_LANES)));
+typedef int64_t mstmm_bits __attribute__((vector_size(8 * MSTMM_LANES)));
 typedef struct {
     mstmm_lanes re, im;
 } mstmm_complex;
@@ -44,17 +45,19 @@ MSTMM_COMPLEX mstmm_complex mstmm_complex_inverse(mstmm_complex a)
     return (mstmm_complex){a.re / square, -a.im / square};
 }
 
-/* |re| + |im| of one lane, and of all of them. */
-MSTMM_COMPLEX double mstmm_complex_size(const mstmm_complex *a, int lane)
+/* |re| + |im| of every lane, and of all of them. */
+MSTMM_COMPLEX mstmm_lanes mstmm_complex_size(mstmm_complex a)
 {
-    return fabs(a->re[lane]) + fabs(a->im[lane]);
+    const mstmm_bits all = INT64_MAX + (mstmm_bits){0};
+    return (mstmm_lanes)((mstmm_bits)a.re & all) + (mstmm_lanes)((mstmm_bits)a.im & all);
 }
 
-MSTMM_COMPLEX double mstmm_complex_sizes(const mstmm_complex *a)
+MSTMM_COMPLEX double mstmm_complex_sizes(mstmm_complex a)
 {
-    double size = 0;
-    for (int lane = 0; lane < MSTMM_LANES; lane++) size += mstmm_complex_size(a, lane);
-    return size;
+    const mstmm_lanes size = mstmm_complex_size(a);
+    double sum = 0;
+    for (int lane = 0; lane < MSTMM_LANES; lane++) sum += size[lane];
+    return sum;
 }
 
 /* x = a^-1 b by LU with row exchange, the same in all lanes; arguments and result of mstmm_solve_lu
@@ -68,7 +71,7 @@ MSTMM_COMPLEX int mstmm_complex_solve_lu(int n, int m, const mstmm_complex *rest
     for (int i = 0; i < n; i++) {
         int best = i;
         for (int k = i + 1; k < n; k++)
-            if (mstmm_complex_sizes(&work[best * n + i]) < mstmm_complex_sizes(&work[k * n + i]))
+            if (mstmm_complex_sizes(work[best * n + i]) < mstmm_complex_sizes(work[k * n + i]))
                 best = k;
         for (int j = i; best != i && j < n; j++) {
             const mstmm_complex entry = work[i * n + j];
@@ -80,11 +83,11 @@ MSTMM_COMPLEX int mstmm_complex_solve_lu(int n, int m, const mstmm_complex *rest
             x[i * m + j] = x[best * m + j];
             x[best * m + j] = entry;
         }
-        for (int lane = 0; lane < MSTMM_LANES; lane++) {
-            double size = 0;
-            for (int k = 0; k < n; k++) size += mstmm_complex_size(&a[k * n + i], lane);
-            if (!(mstmm_complex_size(&work[i * n + i], lane) > relative_pivot * size)) return 1;
-        }
+        mstmm_lanes size = {0};
+        for (int k = 0; k < n; k++) size += mstmm_complex_size(a[k * n + i]);
+        const mstmm_bits large = mstmm_complex_size(work[i * n + i]) > relative_pivot * size;
+        for (int lane = 0; lane < MSTMM_LANES; lane++)
+            if (!large[lane]) return 1;
         const mstmm_complex scale = work[i * n + i] = mstmm_complex_inverse(work[i * n + i]);
         for (int k = i + 1; k < n; k++) {
             const mstmm_complex factor = mstmm_complex_times(work[k * n + i], scale);

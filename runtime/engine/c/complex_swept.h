@@ -6,18 +6,18 @@ typedef struct {
     mstmm_complex_slope slope;
     mstmm_complex_tangents tangents;
     mstmm_complex s, square;
-    double growth[MSTMM_LANES];
-    int grown[MSTMM_LANES];
+    mstmm_lanes growth;
+    mstmm_bits grown;
 } mstmm_lanes_at;
 
 /* Inertia in S: angular accelerations to moments, accelerations to forces. */
-static void inertia(const mstmm_complex *S, int lane, double *sizes)
+static inline void inertia(const mstmm_complex *S, mstmm_lanes *sizes)
 {
-    sizes[0] = sizes[1] = 0;
+    sizes[0] = sizes[1] = (mstmm_lanes){0};
     for (int row = 0; row < 3; row++)
         for (int column = 0; column < 3; column++) {
-            sizes[0] += mstmm_complex_size(&S[6 * (3 + row) + 3 + column], lane);
-            sizes[1] += mstmm_complex_size(&S[6 * (6 + row) + column], lane);
+            sizes[0] += mstmm_complex_size(S[6 * (3 + row) + 3 + column]);
+            sizes[1] += mstmm_complex_size(S[6 * (6 + row) + column]);
         }
 }
 
@@ -38,10 +38,8 @@ static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
 {
     const mstmm_model *model = of->at->model;
     int64_t begun = of->n_numbers;
-    for (int lane = 0; lane < MSTMM_LANES; lane++) {
-        with->growth[lane] = 1;
-        with->grown[lane] = -1;
-    }
+    with->growth = 1 + (mstmm_lanes){0};
+    with->grown = -1 + (mstmm_bits){0};
     for (int i = model->n_bodies - 1; i >= 0; i--) {
         const mstmm_body *body = &model->bodies[i];
         const mstmm_complex *S = with->tangents.numbers + body->tangent;
@@ -50,18 +48,16 @@ static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
             bring(of, with, first, begun);
             begun = first;
         }
-        double before[MSTMM_LANES][2], after[2];
-        for (int lane = 0; lane < MSTMM_LANES; lane++) inertia(S, lane, before[lane]);
+        mstmm_lanes before[2], after[2];
+        inertia(S, before);
         const int code = mstmm_complex_at_tangent_eliminated(&with->state, i);
         if (code) return code;
-        for (int lane = 0; lane < MSTMM_LANES; lane++) {
-            inertia(S, lane, after);
-            for (int k = 0; k < 2; k++) {
-                if (!(before[lane][k] > 0 && after[k] > with->growth[lane] * before[lane][k]))
-                    continue;
-                with->growth[lane] = after[k] / before[lane][k];
-                with->grown[lane] = i;
-            }
+        inertia(S, after);
+        for (int k = 0; k < 2; k++) {
+            const mstmm_bits more = (before[k] > 0) & (after[k] > with->growth * before[k]);
+            const mstmm_bits growth = (mstmm_bits)(after[k] / before[k]);
+            with->growth = (mstmm_lanes)((more & growth) | (~more & (mstmm_bits)with->growth));
+            with->grown = (more & i) | (~more & with->grown);
         }
     }
     return 0;
@@ -202,7 +198,7 @@ void MSTMM_BY_LANES(MSTMM_LANES)(mstmm_response *of, int count, const real *s, i
     }
     for (int lane = 0; lane < count; lane++) {
         growth[lane] = code ? INFINITY : with.growth[lane];
-        grown[lane] = code ? of->at->failure.element : with.grown[lane];
+        grown[lane] = code ? of->at->failure.element : (int)with.grown[lane];
     }
 }
 
