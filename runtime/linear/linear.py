@@ -9,6 +9,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
 from ..pack.layout import refuse_dense
@@ -64,6 +65,25 @@ class Linear(StateSpace):
     def warnings(self) -> tuple[str, ...]:
         """What speaks against taking the model for the scene, in sentences."""
         return tuple(warnings_of(self, self.modes()))
+
+    def output_matrices(self, outputs: Sequence[str] | None = None) -> tuple[Array, Array]:
+        """C (outputs, 2 n) and D (outputs, inputs) of y = C (x, x') + D v; `outputs` as
+        `frequency_response` names them, all coordinates unless given."""
+        from .control import output_matrices
+
+        return output_matrices(self, outputs, self.B)[1:]
+
+    def to_control(self, outputs: Sequence[str] | None = None, disturbances: bool = False) -> Any:
+        """`control.StateSpace` of python-control (extra control), its signals named, with _ for
+        every dot; `disturbances` are inputs behind the others.  Discrete time, reduction by
+        balancing or modes, regulators and observers are that library's.
+
+        Raises SceneError where there is no input or an output is unknown, EnvironmentFailure
+        without the extra.
+        """
+        from .control import to_control
+
+        return to_control(self, outputs, disturbances)
 
     def to_dict(self) -> dict[str, Any]:
         """Names, state and matrices, for JSON."""
