@@ -69,6 +69,14 @@ def numbers(name: str, value: ArrayLike) -> Array:
     return array
 
 
+def one_row(name: str, value: ArrayLike) -> Array:
+    """One finite number or more, (n,); SceneError for anything else."""
+    found = numbers(name, value)
+    if found.ndim != 1 or not found.size:
+        raise SceneError(f"{name}: expected one number or more in a row, found {found.shape}")
+    return found
+
+
 def by_name(name: str, value: Any) -> dict[str, Any]:
     """A table of values by their names, not yet looked into."""
     if not isinstance(value, Mapping):

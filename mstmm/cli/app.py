@@ -19,7 +19,7 @@ from .show import show
 from .simulate import simulate
 from .studies.advise import advise
 from .studies.chart import chart
-from .studies.linear import linearize, modes
+from .studies.linear import frf, linearize, modes
 from .studies.stability import stability
 
 
@@ -76,6 +76,7 @@ app.command("chart")(chart)
 app.command("advise")(advise)
 app.command("linearize")(linearize)
 app.command("modes")(modes)
+app.command("frf")(frf)
 app.command("check")(check)
 app.command("list")(list_elements)
 app.command("show")(show)

@@ -37,7 +37,7 @@ class Locus:
     where it is not among those of its value."""
 
     parameter: str
-    values: Array
+    values: Array = field(repr=False)
     eigenvalues: Complex = field(repr=False)
 
     @property
@@ -64,8 +64,6 @@ class Locus:
 
 def traced(at: At, parameter: str, values: Array, count: int | None, damped: bool | None) -> Locus:
     """Motions at each value, those that go on in one column."""
-    if values.ndim != 1 or not values.size or not np.isfinite(values).all():
-        raise SceneError(f"values: expected one finite number or more, found shape {values.shape}")
     found: list[Modes] = []
     for value in values.tolist():
         found.append(at(value).modes(count, damped))

@@ -1,4 +1,4 @@
-"""Pictures of linear models: motions over a parameter."""
+"""Pictures of linear models: motions over a parameter, and answers over the frequency."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from mstmm.errors import SceneError
 from mstmm.extras import missing
 
 from ..host.files import replacing
+
+#: Frequencies that reach further than this stand on a logarithmic scale.
+_DECADES = 30.0
 
 _FORMATS = (".png", ".svg", ".pdf")
 
@@ -66,8 +69,76 @@ def locus(
         below.set_ylim(-1, 1)
     below.set_ylabel("growth in 1/s")
     below.set_xlabel(parameter)
-    for axis in (above, below):
-        axis.grid(alpha=0.3)
-        axis.spines[["top", "right"]].set_visible(False)
+    _settled(above, below)
     write(made, path)
     return made
+
+
+def bode(
+    frequency: Array, values: NDArray[Any], labels: Sequence[str], units: str, path: Path | None
+) -> Any:
+    """Magnitude above, phase below, over the frequency in Hz; a curve for each column of `values`
+    (k, curves)."""
+    made = figure(6.0)
+    above, below = made.subplots(2, 1, sharex=True, height_ratios=[3, 2])
+    order = np.argsort(frequency, kind="stable")
+    x = frequency[order]
+    for curve, label in zip(values[order].T, labels, strict=True):
+        above.loglog(x, np.abs(curve), lw=1.2, label=label)
+        below.semilogx(x, np.degrees(np.unwrap(np.angle(curve))), lw=1.2)
+    above.set_ylabel(f"magnitude in {units}" if units else "magnitude")
+    below.set_ylabel("phase in degrees")
+    below.set_xlabel("frequency in Hz")
+    below.yaxis.set_major_locator(_every_right_angle())
+    if len(labels) > 1 or labels[0]:
+        above.legend(fontsize=8, frameon=False)
+    _settled(above, below)
+    write(made, path)
+    return made
+
+
+def nyquist(values: NDArray[Any], labels: Sequence[str], path: Path | None) -> Any:
+    """Curves (k, curves) in the complex plane."""
+    made = figure(5.5)
+    axis = made.subplots()
+    for curve, label in zip(values.T, labels, strict=True):
+        axis.plot(curve.real, curve.imag, lw=1.2, label=label)
+    axis.axhline(0, color="0.7", lw=0.8)
+    axis.axvline(0, color="0.7", lw=0.8)
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.set_xlabel("real part")
+    axis.set_ylabel("imaginary part")
+    axis.legend(fontsize=8, frameon=False)
+    _settled(axis)
+    write(made, path)
+    return made
+
+
+def waterfall(
+    frequency: Array, rows: Array, values: NDArray[Any], about: str, path: Path | None
+) -> Any:
+    """Magnitudes (rows, k) as colours over the frequency in Hz and another number."""
+    made = figure(5.0)
+    axis = made.subplots()
+    with np.errstate(divide="ignore"):
+        decibels = 20 * np.log10(np.abs(values))
+    colours = axis.pcolormesh(frequency, rows, decibels, cmap="viridis", shading="nearest")
+    made.colorbar(colours, ax=axis, label="magnitude in dB")
+    if frequency.max() > _DECADES * frequency.min():
+        axis.set_xscale("log")
+    axis.set_xlabel("frequency in Hz")
+    axis.set_ylabel(about)
+    write(made, path)
+    return made
+
+
+def _every_right_angle() -> Any:
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(nbins=6, steps=[1, 1.8, 3, 4.5, 9, 10])
+
+
+def _settled(*axes: Any) -> None:
+    for axis in axes:
+        axis.grid(alpha=0.3, which="both", lw=0.5)
+        axis.spines[["top", "right"]].set_visible(False)

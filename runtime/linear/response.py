@@ -9,9 +9,10 @@ frequency.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +21,7 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.response import Response
+from . import files
 from .channels import Channel, channel, columns
 from .outputs import Output, outputs_of, rows_of
 
@@ -50,7 +52,7 @@ class FrequencyResponse:
         values: (k, outputs, inputs) complex; an output is Re(values exp(i omega t)).
     """
 
-    omega: Array
+    omega: Array = field(repr=False)
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     input_units: tuple[str, ...] = field(repr=False)
@@ -71,6 +73,67 @@ class FrequencyResponse:
     def phase(self) -> Array:
         """(k, outputs, inputs) rad in (-pi, pi], negative where the output is behind."""
         return np.angle(self.values)
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """`matplotlib.figure.Figure`, Bode's: magnitude and phase of every output under every
+        input; written to `path` where it is given.
+
+        Raises EnvironmentFailure without the extra `plot`.
+        """
+        from .pictures import bode
+
+        units = {f"{y}/{u}" for y in self.output_units for u in self.input_units}
+        unit = units.pop() if len(units) == 1 else ""
+        return bode(self.frequency, *self._curves(), unit, None if path is None else Path(path))
+
+    def nyquist(self, path: str | Path | None = None) -> Any:
+        """`matplotlib.figure.Figure`, Nyquist's: the same in the complex plane."""
+        from .pictures import nyquist
+
+        return nyquist(*self._curves(), None if path is None else Path(path))
+
+    def _curves(self) -> tuple[Complex, list[str]]:
+        """(k, curves) and what each is."""
+        labels = [f"{y} / {u}" for y in self.outputs for u in self.inputs]
+        return self.values.reshape(len(self.omega), -1), labels
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, for JSON; complex numbers in two parts."""
+        return {
+            "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
+            "inputs": list(self.inputs), "outputs": list(self.outputs),
+            "input_units": list(self.input_units), "output_units": list(self.output_units),
+            "real": self.values.real.tolist(), "imag": self.values.imag.tolist(),
+        }  # fmt: skip
+
+    def to_dataset(self) -> Any:
+        """`xarray.Dataset`, complex numbers in two parts.  EnvironmentFailure without the extra."""
+        along = ("omega", "output", "input")
+        arrays: dict[str, Any] = {
+            "real": (along, self.values.real), "imag": (along, self.values.imag),
+            "magnitude": (along, self.magnitude), "phase": (along, self.phase, {"units": "rad"}),
+        }  # fmt: skip
+        coords: dict[str, Any] = {
+            "omega": ("omega", self.omega, {"units": "rad/s"}),
+            "output": list(self.outputs), "input": list(self.inputs),
+        }  # fmt: skip
+        return files.xarray().Dataset(arrays, coords)
+
+    def _rows(self) -> Iterator[tuple[str, ...]]:
+        """A row for each frequency."""
+        curves, labels = self._curves()
+        parts = [f"{label} {part}" for label in labels for part in ("magnitude", "phase [rad]")]
+        yield "omega [rad/s]", "frequency [Hz]", *parts
+        for omega, row in zip(self.omega.tolist(), curves, strict=True):
+            numbers = [x for value in row for x in (abs(value), np.angle(value))]
+            yield tuple(repr(float(x)) for x in (omega, omega / (2 * np.pi), *numbers))
+
+    def save(self, path: str | Path) -> Path:
+        """All of it: .nc (extra io) or .csv, a row for each frequency.
+
+        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        """
+        return files.save(Path(path), self.to_dataset, self._rows())
 
 
 def frequency_response(

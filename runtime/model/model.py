@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arrays import Array, batch, numbers, one, pair, real
+from mstmm.arrays import Array, batch, one, one_row, pair, real
 from mstmm.arrays import columns as columns_of
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import NumericalFailure
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from ..linear.locus import Critical, Locus
     from ..linear.motions import Modes
     from ..linear.response import FrequencyResponse
+    from ..linear.waterfall import Waterfall
     from ..result.result import Result
     from ..run.batch import BatchResult
     from .derivatives import Derivatives, Differentiation
@@ -252,9 +253,17 @@ class Model(Compiled):
         """
         from ..linear.locus import traced
 
-        return traced(
-            self._linear_at(parameter), parameter, numbers("values", values), count, damped
-        )
+        points = one_row("values", values)
+        return traced(self._linear_at(parameter), parameter, points, count, damped)
+
+    def waterfall(
+        self, parameter: str, values: ArrayLike, omega: ArrayLike, input: str, output: str
+    ) -> Waterfall:
+        """`frequency_response` of one output under one input over a number of the scene too."""
+        from ..linear.waterfall import waterfall
+
+        points = one_row("values", values)
+        return waterfall(self._linear_at(parameter), parameter, points, omega, (input, output))
 
     def critical(self, parameter: str, stable: float, unstable: float) -> Critical:
         """Where between two values of a number of the scene a motion near rest begins to grow: the

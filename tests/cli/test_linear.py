@@ -35,6 +35,19 @@ def test_matrices_are_told_and_written(mstmm: Command, folder: Path) -> None:
     assert ("elastic", "pivot.angle", "pivot.angle") not in numbers
 
 
+def test_answers_are_told_drawn_and_written(mstmm: Command, folder: Path) -> None:
+    pytest.importorskip("matplotlib")
+    done = mstmm("frf", "pendulum.toml", "-i", "pivot.effort", "-q", "rod.tip.vy", "--from", "0.01",
+                 "--to", "0.02", "--points", "3", "-o", "frf.csv", "--plot", "bode.png",
+                 "--set", "pivot.law.damping[0]=0.2")  # fmt: skip
+    assert done.code == 0, done.err
+    assert "rod.tip.velocity.y" in done.out and "m/s / N*m" in done.out
+    assert "drawn: bode.png" in done.out and (folder / "bode.png").stat().st_size > 10_000
+    assert len((folder / "frf.csv").read_text().splitlines()) == 4
+    data = json.loads(mstmm("frf", "pendulum.toml", "--json", "--points", "2", "--to", "7").out)
+    assert data["frequency"] == pytest.approx([0.1, 7.0]) and len(data["inputs"]) == 3
+
+
 def test_json_of_both(mstmm: Command) -> None:
     modes = json.loads(mstmm("modes", "pendulum.toml", "--json", "--count", "5").out)
     assert modes["omega"] == [pytest.approx(OMEGA)] and modes["complete"] is True
@@ -64,6 +77,9 @@ def test_netcdf_of_both(mstmm: Command) -> None:
         (["modes", "pendulum.toml", "--count", "0"], "--count"),
         (["modes", "pendulum.toml", "-o", "modes.txt"], ".nc or .csv"),
         (["modes", "none.toml"], "none.toml"),
+        (["frf", "pendulum.toml", "--from", "5", "--to", "1"], "expected a range that rises"),
+        (["frf", "pendulum.toml", "-q", "pivot.angel"], 'did you mean "pivot.angle"'),
+        (["frf", "pendulum.toml", "--plot", "x.gif"], ".png or .svg or .pdf"),
     ],
 )
 def test_bad_input_is_told_in_a_line(mstmm: Command, arguments: list[str], expected: str) -> None:

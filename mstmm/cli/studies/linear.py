@@ -1,4 +1,5 @@
-"""`mstmm linearize` and `mstmm modes`: a scene near rest, as matrices and as natural motions."""
+"""`mstmm linearize`, `mstmm modes` and `mstmm frf`: a scene near rest, as matrices, natural motions
+and answers to harmonic pushes."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ import typer
 from mstmm.errors import MstmmError
 
 from ..extras import need_for
-from ..options import Elements, Json, at_least, output_file
+from ..options import Elements, Json, at_least, output_file, positive
 from ..simulate import compiled, use_files
 
 if TYPE_CHECKING:
@@ -123,6 +124,79 @@ def modes(
         terminal.say(f"and {len(rows) - _ROWS} more: --count N, or --output FILE.csv")
     terminal.say(_counted(found))
     _where(output, "")
+
+
+def frf(
+    scene: SceneFile,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option("--input", "-i", metavar="NAME", help="Where it is pushed: shoulder.effort, "
+                     "boom.tip.force.x, ground.acceleration.y; may be repeated. The ground's "
+                     "accelerations unless given."),
+    ] = None,
+    outputs: Annotated[
+        list[str] | None,
+        typer.Option("--quantity", "-q", metavar="NAME", help="What answers: shoulder.angle, "
+                     "boom.tip.position.y, boom.tip.ay; may be repeated. All coordinates unless "
+                     "given."),
+    ] = None,
+    least: Annotated[
+        float, typer.Option("--from", metavar="HZ", parser=positive, help="Lowest frequency, Hz.")
+    ] = 0.1,
+    most: Annotated[
+        float, typer.Option("--to", metavar="HZ", parser=positive, help="Highest frequency, Hz.")
+    ] = 100.0,
+    points: Annotated[
+        int, typer.Option("--points", metavar="N", parser=at_least(2), help="How many, evenly on "
+                          "a logarithmic scale.")
+    ] = 201,
+    at_start: AtStart = False,
+    change: Set = None,
+    output: Output = None,
+    plot: Annotated[
+        str | None,
+        typer.Option("--plot", metavar="FILE", help="Bode's picture: .png, .svg or .pdf."),
+    ] = None,
+    hinge: Elements = None,
+    json: Json = False,
+) -> None:  # fmt: skip
+    """How a scene near its rest answers harmonic pushes, frequency by frequency."""
+    import numpy as np
+
+    from .. import output as terminal
+
+    if not most > least:
+        raise MstmmError(f"--from {least:g} --to {most:g}: expected a range that rises")
+    file = _file(output)
+    drawn = None if plot is None else output_file(plot, (".png", ".svg", ".pdf"), "--plot")
+    if drawn is not None:
+        need_for(drawn, "--plot")
+    use_files(hinge or [])
+    linear = _linear(_model(scene, change or []), inputs or [], at_start)
+    omega = 2 * np.pi * np.geomspace(least, most, points)
+    found = linear.frequency_response(omega, outputs=outputs)
+    if file is not None:
+        found.save(file)
+    if drawn is not None:
+        found.plot(drawn)
+    if json:
+        terminal.emit_json({"scene": scene, **found.to_dict(), "file": output, "plot": plot})
+        return
+    _tell_of(linear)
+    head = ["output", "input", "largest magnitude>", "at Hz>"]
+    rows = []
+    for i, y in enumerate(found.outputs):
+        for j, u in enumerate(found.inputs):
+            k = int(found.magnitude[:, i, j].argmax())
+            unit = f"{found.output_units[i]} / {found.input_units[j]}"
+            size = f"{found.magnitude[k, i, j]:.4g} {unit}"
+            rows.append([y, u, size, f"{found.frequency[k]:.5g}"])
+    terminal.console().print(terminal.table("", head, rows[:_ROWS]))
+    if len(rows) > _ROWS:
+        terminal.say(f"and {len(rows) - _ROWS} more")
+    _where(output, "" if plot else "all of it: --output FILE.csv or .nc, --plot FILE.png or --json")
+    if plot is not None:
+        terminal.say(f"drawn: {plot}")
 
 
 def _file(output: str | None) -> Path | None:

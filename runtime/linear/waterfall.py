@@ -1,0 +1,57 @@
+"""One answer of a scene over the frequency and over a number of the scene: a waterfall."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mstmm.arrays import Array
+
+from .motions import Complex
+from .response import frequency_response
+
+if TYPE_CHECKING:
+    from .equations import Equations
+
+
+@dataclass(frozen=True, eq=False)
+class Waterfall:
+    """Amplitudes `values` (m, k) of one output under one input, complex: over a parameter (m,) and
+    omega (k,) in rad/s."""
+
+    parameter: str
+    points: Array = field(repr=False)
+    omega: Array = field(repr=False)
+    input: str
+    output: str
+    values: Complex = field(repr=False)
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """`matplotlib.figure.Figure`: magnitudes in dB as colours; written where `path` is given.
+
+        Raises EnvironmentFailure without the extra `plot`.
+        """
+        from .pictures import waterfall
+
+        to = None if path is None else Path(path)
+        return waterfall(self.omega / (2 * np.pi), self.points, self.values, self.parameter, to)
+
+
+def waterfall(
+    at: Callable[[float], Equations],
+    parameter: str,
+    points: Array,
+    omega: ArrayLike,
+    names: Sequence[str],
+) -> Waterfall:
+    """The answer at each value of the parameter; `names` of input and output."""
+    pushed, shown = names
+    found = [frequency_response(at(x), omega, [pushed], [shown]) for x in points.tolist()]
+    rows = np.array([one.values[:, 0, 0] for one in found])
+    first = found[0]
+    return Waterfall(parameter, points, first.omega, first.inputs[0], first.outputs[0], rows)
