@@ -30,7 +30,7 @@ _MOST_WITH_SLOPES = 8
 #: Guard code of all these kernels: the looped engine names what fails.
 _FAILED = 1
 #: Drives have no say in it: coordinates are what they are.
-_RATES = Sweep("rates", "Rates of the coordinates.", (Run(whole=PRESCRIBED), Run(whole=FORWARD)))
+RATES = Sweep("rates", "Rates of the coordinates.", (Run(whole=PRESCRIBED), Run(whole=FORWARD)))
 
 
 def fuse_implicit(structure: Structure, kernels: Kernels) -> Fused:
@@ -109,7 +109,7 @@ class _Lag:
         self.graph, q, u = state.graph, state.q, state.u
         self._driven = _driven(state.structure)
         self.replay = replay = Replay(state, staged=False)
-        replay.sweep(_RATES)
+        replay.sweep(RATES)
         s, sq, kappa = self.graph.vector("steps", 3)
         self.s, self._sq, self._kappa = s, sq, kappa
         self._straight: dict[int, int] = {}

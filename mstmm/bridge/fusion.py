@@ -30,6 +30,8 @@ from ..runtime.pack.structure import structure_of
 if TYPE_CHECKING:
     from ..derive.fuse.scene import Fused
     from ..runtime.engine.live import Places
+    from ..runtime.linear.equations import Equations
+    from ..runtime.linear.symbolic import Symbolic
     from ..runtime.pack.elements import Known
     from ..runtime.pack.packed import Packed
 
@@ -242,6 +244,12 @@ class Fusion:
         from ..derive.fuse.implicit import fuse_implicit
 
         return fuse_implicit(structure, kernels_of(self._definitions))
+
+    def symbolic(self, linear: Equations, keep: Sequence[str]) -> Symbolic:
+        """See `Equations.symbolic`; no compiler."""
+        from .symbolic import symbolic
+
+        return symbolic(linear, keep, kernels_of(self._definitions))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,8 @@ The code that turns the numbers of a scene into those of its kernels (frames, ma
 runs unchanged on Dual numbers.  Values are computed by the same operations in the same order, so
 they are bit for bit those of plain floats.
 
-A Dual is no float: `float(dual)`, and with it an array of doubles or of C, refuses it.
+A Dual is no float: `float(dual)`, and with it an array of doubles or of C, refuses it.  The same
+code runs on Formulas (`formula`), which the functions below take for Duals too.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
+
+from .formula import Formula, formula, function, length_of, total
 
 #: Slopes by number of the parameter; those that are exactly zero are left out.
 Slopes = Mapping[int, float]
@@ -86,18 +89,20 @@ class Dual:
         return chained(ratio, [(self, -ratio / self.value)])
 
 
-# Below, numbers are typed as floats: a Dual stands in for one wherever scene numbers go.
+# Below, numbers are typed as floats: a Dual or Formula stands in for one wherever scene numbers go.
+
+_MOVING = frozenset({Dual, Formula})
 
 
 def value_of(number: Any) -> float:
     """The number itself, as a float."""
-    return number.value if isinstance(number, Dual) else float(number)
+    return number.value if isinstance(number, (Dual, Formula)) else float(number)
 
 
 def real(number: Any) -> float:
-    """A float; a Dual stays what it is."""
+    """A float; a Dual or Formula stays what it is."""
     kept: Any = number
-    return kept if type(number) in (float, Dual) else float(number)
+    return kept if type(number) in (float, Dual, Formula) else float(number)
 
 
 def chained(value: float, partials: Iterable[tuple[Any, float]]) -> Any:
@@ -113,8 +118,13 @@ def chained(value: float, partials: Iterable[tuple[Any, float]]) -> Any:
 
 
 def moving(numbers: Iterable[object]) -> bool:
-    """Whether any of the numbers is a Dual."""
-    return Dual in map(type, numbers)  # ten times faster than a loop here
+    """Whether any of the numbers is a Dual or a Formula."""
+    return not _MOVING.isdisjoint(map(type, numbers))  # far faster than a loop here
+
+
+def formulas(numbers: Iterable[object]) -> bool:
+    """Whether any of the numbers is a Formula."""
+    return Formula in map(type, numbers)
 
 
 def hypot(v: Sequence[float]) -> float:
@@ -122,6 +132,8 @@ def hypot(v: Sequence[float]) -> float:
     if not moving(v):
         return math.hypot(*v)
     length = math.hypot(*map(value_of, v))
+    if formulas(v):
+        return length_of(v, length)
     partials = [(x, value_of(x) / length if length else 0.0) for x in v]
     return chained(length, partials)
 
@@ -130,13 +142,17 @@ def fsum(numbers: Sequence[float]) -> float:
     """Sum, rounded once."""
     if not moving(numbers):
         return math.fsum(numbers)
-    total = math.fsum(map(value_of, numbers))
-    return chained(total, [(x, 1.0) for x in numbers])
+    value = math.fsum(map(value_of, numbers))
+    if formulas(numbers):
+        return total(numbers, value)
+    return chained(value, [(x, 1.0) for x in numbers])
 
 
 def atan2(y: float, x: float) -> float:
     """Angle of the point (x, y), rad."""
     a, b = value_of(y), value_of(x)
+    if formulas([y, x]):
+        return function("atan2", (formula(y), formula(x)), math.atan2(a, b))
     square = a * a + b * b
     partials = [(y, b / square), (x, -a / square)]
     return chained(math.atan2(a, b), partials)

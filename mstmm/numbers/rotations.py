@@ -1,6 +1,6 @@
 """Rotations as plain numbers: roll-pitch-yaw, quaternions (w, x, y, z) and matrices.  No numpy.
 
-Every function but `to_quaternion` takes Duals for floats: their slopes are exact.
+Every function but `to_quaternion` takes Duals for floats: their slopes are exact; and Formulas.
 """
 
 from __future__ import annotations
@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .dual import chained, fsum, hypot, moving, real, value_of
+from .dual import chained, formulas, fsum, hypot, moving, real, value_of
+from .formula import direction, formula, turn
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -46,6 +47,8 @@ def _moving_unit(v: Sequence[float]) -> tuple[float, ...]:
     """d(v/|v|) = (1 - n n^T) dv / |v|, where v has unit length to rounding as well."""
     values = [value_of(x) for x in v]
     n, length = unit(values), norm(values)
+    if formulas(v):
+        return direction(v, n)
     return tuple(
         chained(n[i], [(v[j], ((i == j) - n[i] * n[j]) / length) for j in range(len(v))])
         for i in range(len(v))
@@ -116,10 +119,12 @@ def from_quaternion(q: Sequence[float]) -> Matrix:
     )
 
 
-def _cos_sin(angle: float) -> tuple[float, float]:
+def cos_sin(angle: float) -> tuple[float, float]:
     """cos and sin, exact where the angle is the double nearest to a multiple of pi/2."""
     if moving([angle]):
-        c, s = _cos_sin(value_of(angle))
+        c, s = cos_sin(value_of(angle))
+        if formulas([angle]):
+            return turn(formula(angle), c, s)
         return chained(c, [(angle, -s)]), chained(s, [(angle, c)])
     quarter = round(angle / (math.pi / 2)) if abs(angle) < 1e6 else 0
     if quarter != 0 and angle == quarter * (math.pi / 2):
@@ -135,7 +140,7 @@ def from_rpy(angles: Sequence[float]) -> Matrix:
     """
     if tuple(angles) == (0.0, 0.0, 0.0):
         return IDENTITY
-    (cr, sr), (cp, sp), (cy, sy) = (_cos_sin(angle) for angle in angles)
+    (cr, sr), (cp, sp), (cy, sy) = (cos_sin(angle) for angle in angles)
     return (
         (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
         (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
@@ -151,7 +156,7 @@ def from_orientation(orientation: Sequence[float]) -> Matrix:
 def about(axis: Sequence[float], angle: float) -> Matrix:
     """Rotation by `angle` (rad) about `axis` (normalised first)."""
     x, y, z = unit(axis)
-    c, s = _cos_sin(angle)
+    c, s = cos_sin(angle)
     k = 1 - c
     return (
         (c + x * x * k, x * y * k - z * s, x * z * k + y * s),

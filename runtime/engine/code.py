@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -25,7 +25,7 @@ class Fusing(Protocol):
     library came from, `obstacle` why there can be none.  `ready(n)` gives a library if it is there
     or if n evaluations are worth a compiler run; `find()` only looks; `build()` raises
     EnvironmentFailure where there can be none; `follow(other)` takes over the libraries of the same
-    scene with other numbers.
+    scene with other numbers.  `symbolic` is a linear model as formulas.
     """
 
     library: FusedLibrary | None
@@ -47,6 +47,7 @@ class Fusing(Protocol):
         self, structure: Any, kernels: Callable[[], Any], what: str, build: bool
     ) -> ColumnsLibrary | None: ...
     def solution(self, build: bool) -> ColumnsLibrary | None: ...
+    def symbolic(self, linear: Any, keep: Sequence[str]) -> Any: ...
 
 
 @dataclass
@@ -89,3 +90,6 @@ class NotFused:
 
     def solution(self, build: bool) -> None:
         return None
+
+    def symbolic(self, linear: Any, keep: Sequence[str]) -> Any:
+        return self.build()

@@ -20,6 +20,7 @@ from .standing import standing, with_held_springs
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
+    from .symbolic import Symbolic
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +158,22 @@ class Equations:
         for name, slots in self.model.layout.modal.items():
             found[slots.u_slice, slots.u_slice] = matrix(self.model.flexible[name])
         return found[np.ix_(self.free, self.free)]
+
+    def symbolic(self, keep: Sequence[str]) -> Symbolic:
+        """The same M, C, K, V and W as SymPy expressions in names that are kept: numbers of the
+        scene as in `with_parameters` ("rod1.mass", "gravity[1]"), and coordinates and speeds of
+        hinges ("shoulder.angle").
+
+        The schedule that makes the numbers is run on symbols.  What is not kept goes in as the
+        number that it is, as a fraction where that is a short decimal: the state and its
+        accelerations too, so that an equilibrium that depends on kept numbers stays where it is,
+        and a law that changes its branch keeps the one that it has there.
+
+        Raises SceneError for a name that is none of these, for numbers of flexible bodies, and for
+        scenes and expressions that are too large.
+        """
+        found: Symbolic = self.model.fusion.symbolic(self, keep)
+        return found
 
     @cached_property
     def pencil(self) -> Pencil:

@@ -1,7 +1,8 @@
 """Named numbers of a scene as Duals, and what they do to the numbers p of the fused kernel.
 
 The way from a scene to p (frames, mass moments, axes) is not differentiated by hand: the same code
-runs once more on a scene whose chosen numbers are Duals, and p comes out with exact slopes.
+runs once more on a scene whose chosen numbers are Duals, and p comes out with exact slopes.  Other
+numbers than Duals may stand in their places (`seeded`): Formulas give p as formulas.
 """
 
 from __future__ import annotations
@@ -27,11 +28,15 @@ from mstmm.scene import Hinge, Scene
 
 from . import parameters
 from .elements import Known
+from .frames import Frames
 from .internal import system_of
 from .structure import structure_and_numbers, structure_of
+from .system import System
 from .values import MOVING
 
-Change = Callable[[float], Any]
+Change = Callable[[Any], Any]
+#: (number of the scene, number of its name) -> what stands for it.
+Seed = Callable[[Any, int], Any]
 
 #: Largest difference that another order of a sum of three products makes, relative above 1.
 _ROUNDING = 1e-12
@@ -45,14 +50,14 @@ def slopes(scene: Scene, known: Known, names: Sequence[str]) -> tuple[Structure,
     moves is a place in p.  Raises SceneError for a name that the scene does not have, and for the
     numbers of flexible bodies.
     """
-    _refuse_folded(scene, parameters.resolved(scene, names))
-    seeded, moving = _seeded(scene, names)
-    # without aligning: frames that are chosen by cases have no slopes
-    plain, frames = system_of(scene, known, align=False)
-    system, _ = system_of(seeded, known, align=False, flexible=frames.modal, moving=moving)
+    refuse_folded(scene, names, "exact derivative; take a difference of two models")
+
+    def dual(value: Any, k: int) -> Dual:
+        return Dual(value_of(value), {**getattr(value, "slope", {}), k: 1.0})
+
+    system, _ = seeded(scene, known, names, dual)
     structure, found = structure_and_numbers(system, known)
     values = np.array([value_of(x) for x in found])
-    _check(structure_of(plain, known)[1].tolist(), values.tolist())
     moved = np.zeros((len(found), len(names)))
     for place, dual in enumerate(found):
         if isinstance(dual, Dual):
@@ -61,31 +66,44 @@ def slopes(scene: Scene, known: Known, names: Sequence[str]) -> tuple[Structure,
     return structure, values, moved
 
 
-def _refuse_folded(scene: Scene, names: Sequence[str]) -> None:
+def seeded(scene: Scene, known: Known, names: Sequence[str], seed: Seed) -> tuple[System, Frames]:
+    """The system of a scene with `seed(number, k)` in place of the number of names[k].
+
+    Frames are not aligned: those that are chosen by cases follow no formula.
+    """
+    changed, moving = _with_seeds(scene, names, seed)
+    plain, frames = system_of(scene, known, align=False)
+    system, found = system_of(changed, known, align=False, flexible=frames.modal, moving=moving)
+    numbers = [value_of(x) for x in structure_and_numbers(system, known)[1]]
+    _check(structure_of(plain, known)[1].tolist(), numbers)
+    return system, found
+
+
+def refuse_folded(scene: Scene, names: Sequence[str], lacking: str) -> None:
     """Named constants, and numbers that go into the shapes of flexible bodies, by quadrature and
-    eigenvalues."""
+    eigenvalues, and names that the scene does not have: SceneError, which says what they are
+    `lacking` and what to do instead."""
     flexible = {body.name for body in (*scene.beam, *scene.elastic)}
-    for name in names:
+    for name in parameters.resolved(scene, names):
         if name.startswith("constants."):
             raise SceneError(
                 f'parameter "{name}": named constants go into numbers and expressions before they '
-                "reach the kernels, and have no exact derivative; take a difference of two models "
-                "(with_parameters)"
+                f"reach the kernels, and have no {lacking} (with_parameters)"
             )
         owner, _, rest = name.partition(".")
         spread = rest.startswith(("force_per_length", "span"))
         if owner in flexible or spread:
             raise SceneError(
                 f'parameter "{name}": numbers of flexible bodies, and of loads along them, have no '
-                "exact derivative; take a difference of two models (with_parameters)"
+                f"{lacking} (with_parameters)"
             )
 
 
 def _check(plain: Sequence[float], found: Sequence[float]) -> None:
-    """Every number of the scene must be there again, bit for bit: a Dual that something else than
+    """Every number of the scene must be there again, bit for bit: a seed that something else than
     its own arithmetic has read would show here.
 
-    Sections of flexible bodies are turned by numpy, which sums Duals in another order than floats:
+    Sections of flexible bodies are turned by numpy, which sums seeds in another order than floats:
     there a number may differ by rounding.
     """
     lost = Counter(plain) - Counter(found)
@@ -102,7 +120,7 @@ def _check(plain: Sequence[float], found: Sequence[float]) -> None:
 class _Moving(Expression):
     """A number of the port "moving" in place of a constant expression."""
 
-    number: Dual
+    number: Any
     place: int
 
     @property
@@ -115,20 +133,20 @@ class _Moving(Expression):
         return graph.element(MOVING, self.place)
 
 
-def _seeded(scene: Scene, names: Sequence[str]) -> tuple[Scene, dict[int, Dual]]:
-    """The scene, not validated again, with a Dual of slope 1 in place of every named number, and
-    those of expressions by their places."""
-    moving: dict[int, Dual] = {}
+def _with_seeds(scene: Scene, names: Sequence[str], seed: Seed) -> tuple[Scene, dict[int, Any]]:
+    """The scene, not validated again, with a seed in place of every named number, and those of
+    expressions by their places."""
+    moving: dict[int, Any] = {}
     for k, name in enumerate(parameters.resolved(scene, names)):
 
-        def dual(value: Any, k: int = k) -> Any:
+        def change(value: Any, k: int = k) -> Any:
             if isinstance(value, Expression):
                 known = value.number if isinstance(value, _Moving) else value.evaluate(_unknown)
-                moving[k] = dual(known)
+                moving[k] = seed(known, k)
                 return _Moving(value.text, (), (), -1, moving[k], k)
-            return Dual(value_of(value), {**getattr(value, "slope", {}), k: 1.0})
+            return seed(value, k)
 
-        scene = _changed(scene, name, dual)
+        scene = _changed(scene, name, change)
     return scene, moving
 
 
@@ -169,8 +187,8 @@ def _refuse_in_expression(hinge: Hinge, parameter: str) -> None:
     if any(name.quantity == parameter for effort in hinge.law.effort for name in effort.names):
         raise SceneError(
             f'parameter "{hinge.name}.parameters.{parameter}": an effort of the hinge is written '
-            "with it, and numbers inside expressions have no derivative; take a difference of two "
-            "models (with_parameters)"
+            "with it, and numbers inside expressions have neither derivative nor formula; compare "
+            "two models (with_parameters)"
         )
 
 

@@ -1,0 +1,83 @@
+"""Formulas as SymPy expressions, without the terms that are rounding alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import sympy as sp
+from sympy.simplify.fu import TR10i
+
+from ..ir.operations import OPERATIONS
+from ..numbers.formula import Atom, Formula, Monomial, exact
+
+#: Terms beside the largest of their row and column that are rounding.
+_ROUNDING = 1e-14
+#: Operations in an entry up to which sines and cosines of sums are looked for.
+_SHORT = 100
+
+
+class Writer:
+    """Writes formulas of one book; every atom once."""
+
+    def __init__(self) -> None:
+        self._written: dict[Atom, sp.Expr] = {}
+
+    def symbol(self, formula: Formula) -> Any:
+        """The symbol that a formula is."""
+        return self._expression(formula)
+
+    def matrix(self, rows: Sequence[Sequence[Formula]]) -> sp.ImmutableMatrix:
+        """A matrix, simplified as far as that is cheap."""
+        sizes = [[_size(entry) for entry in row] for row in rows]
+        along = [max(row, default=0.0) for row in sizes]
+        across = [max(column, default=0.0) for column in zip(*sizes, strict=True)]
+        entries = [
+            [
+                self._simple(entry, _ROUNDING * math.sqrt(along[i] * across[j]))
+                for j, entry in enumerate(row)
+            ]
+            for i, row in enumerate(rows)
+        ]
+        return sp.ImmutableMatrix(len(rows), len(across), [x for row in entries for x in row])
+
+    def _simple(self, formula: Formula, least: float) -> sp.Expr:
+        kept = {m: c for m, c in formula.terms.items() if math.fabs(c) * _weight(m) > least}
+        found = self._expression(Formula(formula.value, kept))
+        if found.has(sp.sin) and found.count_ops() <= _SHORT:
+            return TR10i(found)
+        return found
+
+    def _expression(self, formula: Formula) -> sp.Expr:
+        return sp.Add(*(self._term(m, c) for m, c in formula.terms.items()))
+
+    def _term(self, monomial: Monomial, c: Any) -> sp.Expr:
+        near = exact(float(c)) if isinstance(c, float) else c
+        number = sp.Float(near) if isinstance(near, float) else sp.Rational(near)
+        return sp.Mul(number, *(self._atom(atom) ** power for atom, power in monomial))
+
+    def _atom(self, atom: Atom) -> sp.Expr:
+        if atom not in self._written:
+            self._written[atom] = self._made(atom)
+        return self._written[atom]
+
+    def _made(self, atom: Atom) -> sp.Expr:
+        if atom.op == "symbol":
+            return sp.Symbol(atom.name, real=True)
+        args = [self._expression(arg) for arg in atom.args]
+        plain = {"inverse": lambda x: 1 / x, "sqrt": sp.sqrt, "pow": sp.Pow}
+        function = plain.get(atom.op) or getattr(sp, OPERATIONS[atom.op].sympy)
+        return function(*args)
+
+
+def _weight(monomial: Monomial) -> float:
+    """The size of a product at the scene's numbers, zeros aside."""
+    size = 1.0
+    for atom, power in monomial:
+        size *= abs(atom.value or 1.0) ** power
+    return size
+
+
+def _size(formula: Formula) -> float:
+    return sum(math.fabs(c) * _weight(m) for m, c in formula.terms.items())

@@ -1,0 +1,77 @@
+"""The names that a symbolic linear model keeps: numbers of the scene, coordinates and speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from ..errors import SceneError
+from ..runtime.pack import parameters
+from ..scene.rules.messages import near
+
+if TYPE_CHECKING:
+    from ..runtime.linear.equations import Equations
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What the user calls numbers of the scene, by their full names, and coordinates and speeds, by
+    their places."""
+
+    parameters: dict[str, str] = field(default_factory=dict)
+    coordinates: dict[int, str] = field(default_factory=dict)
+    speeds: dict[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """A coordinate or speed: where its name goes, its place, and whether it is free."""
+
+    among: dict[int, str]
+    place: int
+    free: bool
+
+
+def kept(linear: Equations, keep: Sequence[str]) -> Kept:
+    """What the names stand for.
+
+    Raises SceneError for a name that stands for nothing or comes twice, and for coordinates that a
+    drive imposes or whose rates are not their speeds, as those of quaternions.
+    """
+    if isinstance(keep, str) or not all(isinstance(name, str) for name in keep):
+        raise SceneError(f'keep = {keep!r}: expected a list of names such as ["rod1.mass"]')
+    found = Kept()
+    motions = dict(_motions(linear, found))
+    numbers = parameters.read(linear.model.scene)
+    for name in keep:
+        if name in motions:
+            motion = motions[name]
+            if not motion.free:
+                raise SceneError(
+                    f'keep "{name}": a drive imposes it, or it is no integral of a speed; keep '
+                    "coordinates and speeds whose rates they are, or leave it a number"
+                )
+            twice = motion.among.setdefault(motion.place, name) != name
+        elif name in numbers or f"{name}[0]" in numbers:
+            (full,) = parameters.resolved(linear.model.scene, [name])
+            twice = found.parameters.setdefault(full, name) != name
+        else:
+            raise SceneError(
+                f'keep "{name}": expected a number, coordinate or speed of the scene'
+                f"{near(name, [*numbers, *motions])}"
+            )
+        if twice:
+            raise SceneError(f'keep "{name}": this number has been named already; name it once')
+    return found
+
+
+def _motions(linear: Equations, found: Kept) -> Iterator[tuple[str, _Motion]]:
+    """Every coordinate and speed by its name."""
+    for slots in linear.model.layout.owners:
+        for k, name in enumerate(slots.q_names):
+            free = slots.straight and slots.u + k in linear.free
+            yield f"{slots.name}.{name}", _Motion(found.coordinates, slots.q + k, free)
+        for k, name in enumerate(slots.u_names):
+            free = slots.straight and slots.u + k in linear.free
+            yield f"{slots.name}.{name}", _Motion(found.speeds, slots.u + k, free)

@@ -1,0 +1,234 @@
+"""A linear model as SymPy expressions: the schedule that makes its numbers, run on formulas.
+
+The numbers that are kept go through packing as formulas; the residual of the scene is replayed and
+differentiated as for fused code, and its kernel evaluated on formulas.  No second derivation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..derive.fuse.linear import fuse_linear, fuse_required
+from ..errors import SceneError
+from ..ir import KernelIR, Port
+from ..ir.formulas import FormulaArithmetic
+from ..ir.graph import Graph
+from ..ir.replay import run
+from ..ir.structure import Key
+from ..numbers.formula import Book, Formula, formula, share
+from ..numbers.pieces import COUNT
+from ..runtime.linear.channels import Channel
+from ..runtime.linear.standing import INERTIAL
+from ..runtime.linear.symbolic import Symbolic
+from ..runtime.pack.slopes import refuse_folded, seeded
+from ..runtime.pack.structure import structure_and_numbers
+from ..runtime.pack.system import LoadNumbers, System
+from ..runtime.pack.values import MOVING, state_ports
+from .expressions import Writer
+from .kept import Kept, kept
+
+if TYPE_CHECKING:
+    from ..runtime.linear.equations import Equations
+
+Kernels = Callable[[Key, str], KernelIR]
+Rows = list[list[Formula]]
+
+#: More coordinates than this are refused, and more products of terms (some seconds), for which a
+#: term that is written as an expression counts too, this often.
+MOST_COORDINATES, MOST_PRODUCTS, _WRITTEN = 24, 300_000, 10
+#: By how much an equilibrium may miss a quarter turn, or a 1 of a quaternion.
+_ROUNDING = 1e-13
+#: Accelerations beside those that stiffness and damping give to motions of order one that are none.
+_NO_ACCELERATION = 1e-12
+
+
+def symbolic(linear: Equations, keep: Sequence[str], kernels: Kernels) -> Symbolic:
+    """See `Equations.symbolic`."""
+    _refuse(linear)
+    names = kept(linear, keep)
+    lacking = "formula; linearize models of other values"
+    refuse_folded(linear.model.scene, list(names.parameters), lacking)
+    equations = _Equations(linear, names, kernels)
+    writer = Writer()
+    symbols = {name: writer.symbol(equations.symbols[name]) for name in keep}
+    m, c, k = map(writer.matrix, equations.counted(equations.second_order()))
+    pushed = [equations.pushed(pushes) for pushes in (linear.controls, linear.others)]
+    v, w = map(writer.matrix, equations.counted(pushed))
+    numbers = {symbols[name]: found.value for name, found in equations.symbols.items()}
+    return Symbolic(
+        m, c, k, v, w, symbols, numbers, linear.coordinates, linear.inputs, linear.disturbances
+    )
+
+
+def _refuse(linear: Equations) -> None:
+    if len(linear) > MOST_COORDINATES:
+        raise SceneError(
+            f"symbolic: the scene has {len(linear)} coordinates; the limit is {MOST_COORDINATES}; "
+            "take M, C and K of linearize, after with_parameters for other values"
+        )
+    if linear.model.packed.releases:
+        names = ", ".join(f'"{name}"' for name in linear.model.packed.releases)
+        raise SceneError(
+            f"symbolic: hinge {names} is released during the run, so that the equations change "
+            "their form; take the release out"
+        )
+
+
+class _Equations:
+    """The equations of one linear model on formulas; `symbols` are those of the names kept."""
+
+    def __init__(self, linear: Equations, names: Kept, kernels: Kernels) -> None:
+        self._linear, self._kernels, self._book = linear, kernels, Book(MOST_PRODUCTS)
+        self.symbols: dict[str, Formula] = {}
+        model, state = linear.model, linear.state
+        self._known = model.known or {}
+        #: What a unit of each input that pushes adds to R, once that is found.
+        self._inputs: dict[int, list[Formula]] = {
+            one.input: [] for one in (*linear.controls, *linear.others) if one.input >= 0
+        }
+        values = model.parameters
+        seeds = [self._symbol(name, values[full]) for full, name in names.parameters.items()]
+        self._system, self._frames = seeded(
+            model.scene, self._known, list(names.parameters), lambda _, k: seeds[k]
+        )
+        self._q = [_rounded(x) for x in state.q.tolist()]
+        self._u = [formula(x) for x in state.u.tolist()]
+        for entries, kept_ones in ((self._q, names.coordinates), (self._u, names.speeds)):
+            for place, name in kept_ones.items():
+                entries[place] = self._symbol(name, entries[place].value)
+
+    def _symbol(self, name: str, value: float) -> Formula:
+        self.symbols[name] = found = self._book.symbol(name, value)
+        return found
+
+    def counted(self, matrices: Sequence[Rows]) -> Sequence[Rows]:
+        """The same, whose terms are about to be written."""
+        terms = sum(len(x.terms) for rows in matrices for row in rows for x in row)
+        self._book.count(_WRITTEN * terms)
+        return matrices
+
+    def second_order(self) -> tuple[Rows, Rows, Rows]:
+        """M, C and K."""
+        linear = self._linear
+        structure, p = structure_and_numbers(self._system, self._known)
+        given = self._system.inputs_at(linear.state.t).tolist()
+        places = dict(structure.inputs)
+        for one, place in places.items():
+            p[place] = given[one]
+        read = {i: places[COUNT * i + 1] for i in self._inputs if COUNT * i + 1 in places}
+        kernel = fuse_linear(structure, self._kernels, linear.free, list(read.values()))
+        found = self._run(kernel, p, self._u, self._accelerations())
+        self._inputs |= {one: found["P"][k :: len(read)] for k, one in enumerate(read)}
+        m, c, k = (_rows(found[name], len(linear)) for name in "MCK")
+        if linear.turning is None:
+            return m, c, k
+        if not all(x.fixed for x in found["N"]):
+            raise SceneError(
+                "symbolic: kept numbers decide how coordinates of a hinge follow its speeds; "
+                "linearize at rest, or leave them numbers"
+            )
+        g = [[formula(x) for x in row] for row in linear.turning.tolist()]
+        return m, _less(c, m, g), _less(k, c, g)
+
+    def _entry(self, push: Channel, symbol: Formula, required: list[Formula], row: int) -> Formula:
+        """Effort in a free speed of a unit of a push."""
+        speed = self._linear.free[row]
+        if push.input >= 0:
+            column = self._inputs[push.input]
+            return -column[row] if column else formula(0.0)
+        if push.speed >= 0:
+            return formula(float(push.speed == speed))
+        found = share(required[speed], symbol)
+        return -found if push.end else found
+
+    def _accelerations(self) -> list[Formula]:
+        linear = self._linear
+        scale = np.abs(np.linalg.solve(linear.M, np.hstack([linear.K, linear.C]))).max(initial=0)
+        still = np.abs(linear.state.a) <= _NO_ACCELERATION * scale
+        return [formula(x) for x in np.where(still, 0.0, linear.state.a).tolist()]
+
+    def pushed(self, pushes: Sequence[Channel]) -> Rows:
+        """V or W: the tree at rest under a symbol for each push alone, to which its efforts are in
+        proportion."""
+        n = len(self._linear.free)
+        if not pushes:
+            return [[] for _ in range(n)]
+        symbols = [self._book.symbol(push.name, 1.0) for push in pushes]
+        structure, p = structure_and_numbers(self._under(pushes, symbols), self._known)
+        still = [formula(0.0)] * len(self._u)
+        kernel = fuse_required(structure, self._kernels)
+        required = self._run(kernel, p, still, still)["required"]
+        return [
+            [
+                self._entry(push, symbol, required, row)
+                for push, symbol in zip(pushes, symbols, strict=True)
+            ]
+            for row in range(n)
+        ]
+
+    def _under(self, pushes: Sequence[Channel], symbols: Sequence[Formula]) -> System:
+        """The tree under gravity and loads that are the symbols of their pushes."""
+        gravity: list[Any] = [0.0, 0.0, 0.0]
+        loads = []
+        for place, (push, symbol) in enumerate(zip(pushes, symbols, strict=True)):
+            if push.end:
+                loads.append(self._load(push, place))
+            elif push.speed < 0 and push.input < 0:
+                gravity[push.axis] = gravity[push.axis] + symbol
+        return replace(
+            self._system, gravity=tuple(gravity), laws=(), forces=(), loads=tuple(loads),
+            values=self._values(len(pushes)) if loads else None, drives=None, driven=(),
+            moving=dict(enumerate(symbols)),
+        )  # fmt: skip
+
+    def _load(self, push: Channel, place: int) -> LoadNumbers:
+        body, _, offset = self._frames.end(push.end)
+        along = tuple(place if axis == push.axis else -1 for axis in range(3))
+        nothing = (-1, -1, -1)
+        force, moment = (along, nothing) if push.kind == "force" else (nothing, along)
+        return LoadNumbers(body, -1, INERTIAL, offset, force, moment)
+
+    def _values(self, count: int) -> KernelIR:
+        """The symbols themselves, as values of expressions."""
+        graph = Graph()
+        ports = [*state_ports(self._frames.layout), Port(MOVING, (count,))]
+        values: dict[str, object] = {"values": graph.vector(MOVING, count)}
+        return graph.kernel("values", ports, [Port("values", (count,))], values)
+
+    def _run(
+        self, kernel: KernelIR, p: list[Any], u: list[Formula], a: list[Formula]
+    ) -> dict[str, list[Formula]]:
+        memory = next(port for port in kernel.inputs if port.name == "memory").length()
+        given = {
+            "p": p, "t": [self._linear.state.t], "q": self._q, "u": u, "a": a,
+            "memory": [0.0] * memory,
+        }  # fmt: skip
+        return run(kernel, given, FormulaArithmetic(), None)
+
+
+def _rounded(x: float) -> Formula:
+    """A coordinate, or the quarter turn or 1 that it misses by rounding."""
+    for exact in (round(x / (math.pi / 2)) * (math.pi / 2), math.copysign(1.0, x)):
+        if abs(x - exact) <= _ROUNDING:
+            return formula(exact)
+    return formula(x)
+
+
+def _rows(entries: list[Formula], n: int) -> Rows:
+    return [entries[n * i : n * i + n] for i in range(n)]
+
+
+def _less(a: Rows, b: Rows, c: Rows) -> Rows:
+    """a - b c."""
+    return [
+        [
+            sum((-x * row[j] for x, row in zip(left, c, strict=True)), entry)
+            for j, entry in enumerate(own)
+        ]
+        for own, left in zip(a, b, strict=True)
+    ]

@@ -1,0 +1,79 @@
+"""The operations of the IR on numbers that carry formulas (`numbers.formula`).
+
+Where an operation takes branches (select, min, abs, comparisons) the values decide, so that what
+comes out is the formula of the branch that is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from ..numbers.formula import Formula, formula, function, root, turn
+from ..numbers.rotations import cos_sin
+from .operations import OPERATIONS, true
+from .replay import Operations
+from .statements import Constant
+
+#: Powers that are multiplied out.
+_WHOLE = 16
+
+
+class FormulaArithmetic:
+    """Arithmetic of `ir.replay.run` on Formulas."""
+
+    def __init__(self) -> None:
+        every = {op: partial(_function, op) for op in OPERATIONS}
+        self.operations: Operations = every | _OPERATIONS
+
+    def number(self, value: Any) -> Formula:
+        return formula(value)
+
+    def constant(self, constant: Constant) -> Formula:
+        return formula(constant.number)
+
+    def true(self, value: Formula) -> bool:
+        return true(value.value)
+
+
+def _function(op: str, *args: Formula) -> Formula:
+    return function(op, args, OPERATIONS[op].value(*(x.value for x in args)))
+
+
+def _decided(op: str, *args: Formula) -> Formula:
+    """0, 1 or another number that the values alone decide."""
+    return formula(OPERATIONS[op].value(*(x.value for x in args)))
+
+
+def _power(base: Formula, exponent: Formula) -> Formula:
+    """Whole powers multiplied out."""
+    if not exponent.fixed or exponent.value % 1 or abs(exponent.value) > _WHOLE:
+        return _function("pow", base, exponent)
+    found = formula(1.0)
+    for _ in range(abs(int(exponent.value))):
+        found = found * base
+    found = 1 / found if exponent.value < 0 else found
+    return Formula(OPERATIONS["pow"].value(base.value, exponent.value), found.terms)
+
+
+def _turn(angle: Formula) -> tuple[Formula, Formula]:
+    return turn(angle, *cos_sin(angle.value))
+
+
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    "neg": lambda a: -a,
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "pow": _power,
+    "sqrt": root,
+    "cos": lambda a: _turn(a)[0],
+    "sin": lambda a: _turn(a)[1],
+    "abs": abs,
+    "min": lambda a, b: a if OPERATIONS["min"].value(a.value, b.value) == a.value else b,
+    "max": lambda a, b: a if OPERATIONS["max"].value(a.value, b.value) == a.value else b,
+    "select": lambda c, a, b: a if true(c.value) else b,
+    **{op: partial(_decided, op) for op in ("sign", "floor", "lt", "le", "eq", "and", "or", "not")},
+}  # fmt: skip

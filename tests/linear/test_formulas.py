@@ -1,0 +1,116 @@
+"""Numbers that carry formulas: every operation of the IR, written as SymPy expressions, against
+doubles at other values of the symbols."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import pytest
+
+from mstmm.bridge.expressions import Writer
+from mstmm.errors import SceneError
+from mstmm.ir import KernelIR, Port
+from mstmm.ir.formulas import FormulaArithmetic
+from mstmm.ir.graph import Graph
+from mstmm.ir.operations import OPERATIONS
+from mstmm.ir.replay import evaluate_floats, run
+from mstmm.numbers.dual import atan2, hypot
+from mstmm.numbers.formula import Book, Formula, exact, root
+from mstmm.numbers.rotations import from_quaternion, from_rpy, unit
+
+AT, ELSEWHERE = (0.3, 0.55, 0.8), (0.35, 0.5, 0.9)
+
+
+def kernel_of(op: str) -> KernelIR:
+    """One operation on sums and products of three numbers, in the branch x < y < z."""
+    graph = Graph()
+    x, y, z = graph.vector("p", 3)
+    operands = [x * y + z / 4, z * z - y, y / z][: OPERATIONS[op].arity]
+    if op == "acos":
+        operands = [x * y]
+    node = graph.call(op, *operands) * x - y
+    return graph.kernel("one", [Port("p", (3,))], [Port("r", (1,))], {"r": [node]})
+
+
+def symbols(most: int = 100_000) -> list[Formula]:
+    book = Book(most)
+    return [book.symbol(name, value) for name, value in zip("xyz", AT, strict=True)]
+
+
+def at(found: Formula, given: list[Formula], values: tuple[float, ...]) -> float:
+    """The formula at other values of its symbols."""
+    writer = Writer()
+    names = [writer.symbol(one) for one in given]
+    expression: Any = writer.matrix([[found]])[0, 0]
+    return float(expression.subs(dict(zip(names, values, strict=True))))
+
+
+@pytest.mark.parametrize("op", OPERATIONS)
+def test_every_operation(op: str) -> None:
+    kernel, given = kernel_of(op), symbols()
+    (found,) = run(kernel, {"p": given}, FormulaArithmetic(), None)["r"]
+    assert found.value == evaluate_floats(kernel, {"p": list(AT)})["r"][0]
+    for values in (AT, ELSEWHERE):
+        (wanted,) = evaluate_floats(kernel, {"p": list(values)})["r"]
+        assert at(found, given, values) == pytest.approx(wanted, rel=1e-13, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda v: from_rpy(v)[1],
+        lambda v: from_quaternion([*v, 0.2])[2],
+        unit,
+        lambda v: (hypot(v), atan2(v[0], v[1]), 1 / (v[0] + 2 * v[1]) - abs(-v[2])),
+    ],
+)
+def test_what_packing_asks_of_numbers(function: Any) -> None:
+    """Values to the bit, formulas at other values to rounding."""
+    given = symbols()
+    found = function(given)
+    assert [one.value for one in found] == list(function(list(AT)))
+    for one, wanted in zip(found, function(list(ELSEWHERE)), strict=True):
+        assert at(one, given, ELSEWHERE) == pytest.approx(wanted, rel=1e-13)
+
+
+def test_what_cancels_is_gone() -> None:
+    x, y, z = symbols()
+    assert ((x + y) * (x - y) - x * x + y * y).terms == {}
+    assert (root(x * y + z) * root(x * y + z) - z - y * x).terms == {}
+    assert root(x * x * y * y * 4).terms == (2 * x * y).terms
+    assert ((x + y) / (2 * z) * z).terms == (x / 2 + y / 2).terms
+    turned: Any = from_rpy([x, 0.0, 0.0])  # type: ignore[list-item]
+    assert turned[0][0] == 1.0
+    assert (turned[1][1] * turned[1][1] + turned[1][2] * turned[1][2]).terms == {(): 1}
+
+
+def test_a_zero_in_symbols_is_no_zero() -> None:
+    book = Book(10)
+    zero = book.symbol("zero", 0.0)
+    assert zero and zero != 0 and zero <= 0 and zero >= 0 and not zero < 0 and not zero > 0
+    assert zero - zero == 0 and not (zero - zero)
+    assert hash(zero) == hash(0.0)
+    for wrong in (zero, zero - zero):
+        with pytest.raises(TypeError):
+            float(wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("double", "taken"),
+    [(0.1, Fraction(1, 10)), (0.1 + 0.2, Fraction(3, 10)), (1 / 3, Fraction(1, 3)),
+     (1e-20, Fraction(1, 10**20)), (2.0**1000, 2.0**1000), (math.pi, math.pi),
+     (math.inf, math.inf)],
+)  # fmt: skip
+def test_doubles_that_stand_for_fractions(double: float, taken: Fraction | float) -> None:
+    assert exact(double) == taken
+    assert type(exact(double)) is type(taken)
+
+
+def test_long_formulas_end_at_the_limit() -> None:
+    x, y, z = symbols(most=1000)
+    found = x + y + z
+    with pytest.raises(SceneError, match=r"the limit is 1000; keep fewer names"):
+        for _ in range(20):
+            found = found * (x + y + z)
