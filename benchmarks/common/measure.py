@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-PEERS = ("numpy", "scipy", "casadi", "pin", "mujoco", "drake", "exudyn", "scikit-sundae")
+PEERS = ("numpy", "scipy", "casadi", "pin", "mujoco", "drake", "exudyn", "scikit-sundae", "control")
 
 
 def machine() -> dict[str, Any]:
