@@ -50,11 +50,12 @@ def test_trees_with_springs_between_bodies(seed: int) -> None:
     check_dense(at(scene, random_scenes.random_state(scene, seed)[0]))
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, 3, 5, 6])
+@pytest.mark.parametrize("seed", range(8))
 def test_flexible_bodies(seed: int) -> None:
     scene, q, _ = engine_scenes.drawn(seed, False, 3)
     for hinge in scene["hinge"]:
-        hinge.pop("drive", None)
+        if "drive" in hinge:
+            hinge["drive"] = [x if x == "free" else "0.4" for x in hinge["drive"]]
     check_dense(at(scene, q))
 
 
