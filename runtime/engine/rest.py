@@ -149,7 +149,8 @@ def _newton(
 
 
 def _is_skew(slope: Array, scale: Array) -> bool:
-    skew = np.abs(slope - slope.T) / np.sqrt(np.outer(scale, scale))
+    root = np.sqrt(scale)
+    skew = np.abs(slope - slope.T) / np.outer(root, root)
     return float(skew.max(initial=0.0)) > _SKEW
 
 

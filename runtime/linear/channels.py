@@ -11,7 +11,7 @@ at a unit's rate, less that where it stands still.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -54,6 +54,22 @@ class Channel:
     kind: str = ""
     axis: int = 0
     input: int = -1
+
+
+def names_of(what: str, names: Sequence[str]) -> Sequence[str]:
+    """A list of names; SceneError for anything else."""
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise SceneError(f'{what} = {names!r}: expected a list of names, such as ["{names}"]')
+    if not all(isinstance(name, str) for name in names):
+        raise SceneError(f"{what} = {names!r}: expected a list of names")
+    return names
+
+
+def some_names(what: str, names: Sequence[str]) -> Sequence[str]:
+    """The same with at least one."""
+    if not names_of(what, names):
+        raise SceneError(f"{what} is empty: leave it out, or name some")
+    return names
 
 
 def channel(model: Compiled, name: str) -> Channel:

@@ -46,6 +46,12 @@ class Equations:
     others: tuple[Channel, ...] = ()
     turning: Array | None = field(default=None, repr=False)
 
+    def __repr__(self) -> str:
+        return (
+            f"<{type(self).__name__}: {len(self)} coordinates, {len(self.controls)} inputs, "
+            f"{len(self.others)} disturbances, at t = {self.state.t:g} s>"
+        )
+
     def __len__(self) -> int:
         return len(self.free)
 

@@ -33,6 +33,10 @@ class Linear(StateSpace):
         Raises SceneError for a count that makes no sense, NumericalFailure where a motion moves no
         inertia or the iteration does not converge.
         """
+        if damped not in (None, True, False):
+            raise SceneError(f"damped = {damped!r}: expected True, False or None")
+        if count is not None and not len(self):
+            raise SceneError(f"count = {count!r}: nothing moves in this scene")
         if count is not None and (isinstance(count, bool) or not 0 < count <= len(self)):
             raise SceneError(
                 f"count = {count!r}: expected a number of motions from 1 to {len(self)}"

@@ -39,6 +39,11 @@ class Modes:
     shapes: NDArray[Any] = field(repr=False)
     complete: bool | None
 
+    def __repr__(self) -> str:
+        if not len(self):
+            return "<Modes: none>"
+        return f"<Modes: {len(self)}, {self.omega[0]:.6g} to {self.omega[-1]:.6g} rad/s>"
+
     def __len__(self) -> int:
         return len(self.eigenvalues)
 

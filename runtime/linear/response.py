@@ -22,7 +22,7 @@ from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.response import Response
 from . import files
-from .channels import Channel, channel, columns
+from .channels import Channel, channel, columns, some_names
 from .outputs import Output, outputs_of, rows_of
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ def frequency_response(
             "its coordinates; ask about a state at rest"
         )
     pushes = _pushes(linear, inputs)
-    shown = outputs_of(linear, None if outputs is None else _names("outputs", outputs))
+    shown = outputs_of(linear, None if outputs is None else some_names("outputs", outputs))
     values = _Sweep(linear, pushes, shown).values(frequencies)
     return FrequencyResponse(
         frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
@@ -174,17 +174,9 @@ def _frequencies(omega: ArrayLike) -> Array:
     return found
 
 
-def _names(what: str, names: Sequence[str]) -> Sequence[str]:
-    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
-        raise SceneError(f"{what} = {names!r}: expected a list of names")
-    if not names:
-        raise SceneError(f"{what} is empty: leave it out, or name some")
-    return names
-
-
 def _pushes(linear: Equations, inputs: Sequence[str] | None) -> Sequence[Channel]:
     if inputs is not None:
-        return [channel(linear.model, name) for name in _names("inputs", inputs)]
+        return [channel(linear.model, name) for name in some_names("inputs", inputs)]
     pushes = linear.controls or linear.others
     if not pushes:
         raise SceneError("frequency response: the model has no inputs; name some")

@@ -11,7 +11,7 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
 from ..engine.sizes import speed_sizes
-from ..linear.channels import GROUND, channel
+from ..linear.channels import GROUND, channel, names_of
 from ..linear.linear import Linear
 from ..linear.matrices import State, matrices
 from ..run.start import initial_state
@@ -37,8 +37,8 @@ def linearize(
     disturbances: Sequence[str] | None,
 ) -> Linear:
     """See `Model.linearize`."""
-    pushes = tuple(channel(model, name) for name in inputs)
-    named = GROUND if disturbances is None else disturbances
+    pushes = tuple(channel(model, name) for name in names_of("inputs", inputs))
+    named = GROUND if disturbances is None else names_of("disturbances", disturbances)
     others = tuple(channel(model, name) for name in named)
     state = _state(model, q, u, t)
     return Linear(model, state, pushes, others, _turning(model, state))

@@ -154,12 +154,40 @@ def test_what_makes_no_sense() -> None:
         model.linearize(inputs=["pivot.efort"])
     with pytest.raises(SceneError, match=r"bob\.tip\.force\.w"):
         model.linearize(inputs=["bob.tip.force.w"])
-    with pytest.raises(SceneError, match="q"):
+    for names, found in (
+        ("pivot.effort", r'such as \["pivot.effort"\]'),
+        ([None], "list of names"),
+    ):
+        with pytest.raises(SceneError, match=found):
+            model.linearize(inputs=names)  # type: ignore[arg-type]
+        with pytest.raises(SceneError, match=found):
+            model.linearize(disturbances=names)  # type: ignore[arg-type]
+    with pytest.raises(SceneError, match="expected True, False or None"):
+        model.modes(damped="no")  # type: ignore[arg-type]
+    with pytest.raises(SceneError, match="q has shape"):
         model.linearize([0.0, 1.0])
     with pytest.raises(NumericalFailure, match="no equilibrium"):
         of(pendulum(law={"effort": 100.0})).linearize()
     with pytest.raises(NumericalFailure, match="no equilibrium"):
         of(pendulum(law={"effort": 100.0})).modes()
+
+
+def test_scenes_in_which_nothing_moves_or_rests(recwarn: pytest.WarningsRecorder) -> None:
+    body = {"name": "block", "mass": 1.0, "inertia": [1, 1, 1]}
+    hinge = {"name": "on", "inboard": "ground", "outboard": "block"}
+
+    def scene(**more: object) -> mstmm.Model:
+        return of(mstmm.Scene(gravity=(0, 0, -9.81), body=[body], hinge=[hinge | more]))
+
+    for still in (scene(type="fixed"), scene(type="pin", drive="sin(t)")):
+        assert len(still.modes()) == 0 and not still.linearize().warnings
+        assert still.frequency_response([1.0]).values.shape == (1, 0, 3)
+        assert repr(still.modes()) == "<Modes: none>"
+        with pytest.raises(SceneError, match="nothing moves"):
+            still.modes(1)
+    with pytest.raises(NumericalFailure, match=r"no equilibrium|undetermined"):
+        scene(type="free").modes()
+    assert not recwarn.list
 
 
 def test_the_names_of_a_ball() -> None:
