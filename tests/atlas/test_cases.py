@@ -53,6 +53,8 @@ EXPECTED = {
     "one-way": ((5.0, 100.0), 0.1),
     # eps e^beta is some thousandths, beta = (n - 1/2) pi
     "mode-shapes": ((9, 13), 1000),
+    # eps e^beta is 1 at beta = 36, the twelfth mode
+    "determinant-search": ((9, 13), 200),
     "end-moment": ((4, 20), 2),
     # h omega_n = sqrt 8 with omega_n = beta^2 sqrt(EI): beta = 20.0, between 17.28 and 20.42
     "rk4-shapes": ((6, 7), 20),

@@ -1,0 +1,38 @@
+"""Frequencies of a clamped-free beam by the signs of a determinant of transfer matrices."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from scipy.optimize import brentq
+
+from ...derive.classical.harmonic_beam import BETA, LENGTH, field_matrix
+
+#: Values of the determinant in the window of one mode.
+_POINTS = 41
+
+
+@cache
+def _field() -> Any:
+    return sp.lambdify([BETA, LENGTH], field_matrix(), "numpy")
+
+
+def determinant(beta: float, parts: int) -> float:
+    """Of the free end's conditions, for a beam of length 1 in `parts`: rows of moment and shear,
+    columns of the clamped end's."""
+    chain = np.linalg.matrix_power(np.asarray(_field()(beta, 1 / parts)), parts)
+    return float(chain[2, 2] * chain[3, 3] - chain[2, 3] * chain[3, 2])
+
+
+def clamped_free(number: int, parts: int) -> float:
+    """beta L of a mode; nan where the determinant does not change its sign once in its window."""
+    window = np.linspace((number - 1) * np.pi, number * np.pi, _POINTS) + 0.1
+    values = np.array([determinant(float(beta), parts) for beta in window])
+    changes = np.flatnonzero(values[:-1] * values[1:] < 0)
+    if len(changes) != 1:
+        return float("nan")
+    first = int(changes[0])
+    return float(brentq(determinant, window[first], window[first + 1], args=(parts,), xtol=1e-13))
