@@ -61,6 +61,10 @@ def compile_scene(
     leave a motion of the start undetermined, and outputs of what results do not have;
     EnvironmentFailure if engine="fused" and there is no compiler or it fails.
     """
+    if not isinstance(scene, Scene):
+        raise SceneError(
+            f"{scene!r:.60}: expected a Scene: mstmm.load_scene(...) of a file, or mstmm.Scene(...)"
+        )
     model = compile_level(scene, engine, sweep, accuracy, bake, flexibility)
     if flexibility is None:
         model.refuse_unknown_outputs()

@@ -113,8 +113,8 @@ def _refuse_drive(model: Compiled, name: str) -> None:
     for one in acting(model.scene):
         if one.drive and name in one.inputs:
             raise SceneError(
-                f'"{name}": the {one.what} follows this input, which is a motion and no push; take '
-                "the effort of that hinge as an input instead"
+                f'"{name}": the {one.what} follows this input, which is a motion and no push; '
+                "push somewhere else, or take the drive out"
             )
 
 
@@ -124,6 +124,11 @@ def _effort(model: Compiled, name: str, hinge: str, last: str) -> Channel:
     if last not in names:
         raise SceneError(f'"{name}": hinge "{hinge}" has {", ".join(names) or "no speeds"}')
     k = names.index(last)
+    if slots.u + k not in model.free_speeds:
+        raise SceneError(
+            f'"{name}": hinge "{hinge}" is driven there, so that an effort moves nothing; push '
+            "somewhere else, or take the drive out"
+        )
     return Channel(name, effort_unit(slots.u_units[k]), speed=slots.u + k)
 
 
@@ -188,19 +193,20 @@ def _under(
     unit: Sequence[float] = (),
 ) -> Engine:
     """The tree under gravity and one push alone."""
-    packed = engine.packed
+    packed, system = engine.packed, engine.packed.system
     loads: tuple[LoadNumbers, ...] = ()
     if push is not None:
         body, _, offset = packed.end(push.end)
+        system = system.awake(body)  # nothing else may hang or act on this end
         nothing, own = (-1, -1, -1), (0, 1, 2)
         force = push.kind == "force"
         load = LoadNumbers(
             body, -1, INERTIAL, offset, own if force else nothing, nothing if force else own
         )
         loads = (load,)
-    values = constant_kernel("values", packed.system, list(unit)) if loads else None
+    values = constant_kernel("values", system, list(unit)) if loads else None
     system = replace(
-        packed.system, gravity=tuple(gravity), laws=(), forces=(), loads=loads, values=values,
+        system, gravity=tuple(gravity), laws=(), forces=(), loads=loads, values=values,
         drives=None, driven=(), moving={},
     )  # fmt: skip
     return Engine(packed_system(system, packed))

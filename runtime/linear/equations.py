@@ -16,7 +16,7 @@ from ..run.system import SceneSystem
 from .channels import Channel, columns
 from .matrices import Matrices, State, matrices
 from .pencil import Pencil
-from .standing import standing, with_held_springs
+from .standing import standing, with_held_springs, without_laws
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
@@ -123,6 +123,13 @@ class Equations:
     def elastic(self) -> Array:
         """(n, n) of K: slopes of the laws of hinges and springs, and the stiffness of shapes."""
         return self.K - self._held.K + self._of_shapes(lambda body: body.K)
+
+    @cached_property
+    def sprung(self) -> Array:
+        """(n, n) of `elastic`: slopes of the laws of springs between ends."""
+        engine = without_laws(self.model.looped)
+        lawless = self._second_order(matrices(engine, self.state, list(self.free)))
+        return lawless.K - self._held.K
 
     @property
     def load(self) -> Array:

@@ -39,6 +39,9 @@ def warnings_of(linear: Equations, found: Modes) -> Iterator[str]:
             "the matrices change along the motion of this state: frequencies and growth of one "
             "moment are not those of the motion"
         )
+    for name, column in zip(linear.inputs, linear.V.T, strict=True):
+        if len(linear) and not column.any():
+            yield f"input {name} moves nothing at this state"
     if linear.model.packed.system.timed:
         yield f"what acts goes by time: the model is that of t = {linear.state.t:g} s"
     growing = found.eigenvalues.real.max(initial=0)

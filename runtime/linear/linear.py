@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array
@@ -33,6 +34,8 @@ class Linear(StateSpace):
         Raises SceneError for a count that makes no sense, NumericalFailure where a motion moves no
         inertia or the iteration does not converge.
         """
+        if count is not None and not isinstance(count, (int, np.integer)):
+            raise SceneError(f"count = {count!r}: expected a whole number of motions")
         if damped not in (None, True, False):
             raise SceneError(f"damped = {damped!r}: expected True, False or None")
         if count is not None and not len(self):

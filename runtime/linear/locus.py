@@ -7,16 +7,17 @@ other number of the scene its root locus.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 
-from mstmm.arrays import Array, Integers
+from mstmm.arrays import Array, Integers, numbers
 from mstmm.errors import NumericalFailure, SceneError
 
 from .motions import Complex, Modes
@@ -50,7 +51,7 @@ class Locus:
         """(m, k), 1/s; negative of what decays."""
         return np.asarray(self.eigenvalues.real)
 
-    def plot(self, path: str | Path | None = None, orders: Sequence[float] = ()) -> Any:
+    def plot(self, path: str | Path | None = None, orders: ArrayLike = ()) -> Any:
         """`matplotlib.figure.Figure`: frequencies and growth over the parameter, with lines at
         `orders` times a parameter that is a spin in rad/s; written to `path` where it is given.
 
@@ -58,8 +59,10 @@ class Locus:
         """
         from .pictures import locus
 
+        lines = np.atleast_1d(numbers("orders", orders)).tolist()
+
         to = None if path is None else Path(path)
-        return locus(self.parameter, self.values, self.eigenvalues, to, orders)
+        return locus(self.parameter, self.values, self.eigenvalues, to, lines)
 
 
 def traced(at: At, parameter: str, values: Array, count: int | None, damped: bool | None) -> Locus:
@@ -68,6 +71,8 @@ def traced(at: At, parameter: str, values: Array, count: int | None, damped: boo
     for value in values.tolist():
         found.append(at(value).modes(count, damped))
     width = max(len(one) for one in found)
+    if not width:
+        raise SceneError("nothing moves in this scene, so it has no motions to follow")
     rows = np.full((len(found), width), np.nan + 0j)
     order: Integers = np.arange(len(found[0]))
     rows[0, order] = found[0].eigenvalues
@@ -138,6 +143,8 @@ def _growing(at: At, value: float) -> tuple[complex, tuple[str, ...]] | None:
     except NumericalFailure:
         return 0j, ()
     modes = linear.modes()
+    if not len(modes):
+        raise SceneError("nothing moves in this scene, so that nothing grows")
     k = int(modes.eigenvalues.real.argmax())
     if modes.eigenvalues[k].real <= 0:
         return None

@@ -16,7 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
 
+from ..engine.culprit import steep
 from ..engine.engine import Engine
 from ..engine.tangent import Tangent
 
@@ -50,5 +52,15 @@ def matrices(engine: Engine, state: State, free: list[int]) -> Matrices:
     d_q, d_u, d_a = np.zeros((3 * n, engine.nq)), np.zeros((3 * n, nu)), np.zeros((3 * n, nu))
     d_a[:n], d_u[n : 2 * n] = units, units
     d_q[2 * n :] = np.array(moves).reshape(n, engine.nq)
-    m, c, k = np.split(tangent.slopes(d_q, d_u, d_a)[:, free], 3)
+    found = tangent.slopes(d_q, d_u, d_a)[:, free]
+    if not np.isfinite(found).all():
+        raise _no_slope(engine, state)
+    m, c, k = np.split(found, 3)
     return Matrices(m.T, c.T, k.T)
+
+
+def _no_slope(engine: Engine, state: State) -> NumericalFailure:
+    cause = steep(engine, state.t, state.q, state.u)
+    return NumericalFailure(
+        f"the scene is not linear near this state: {cause or 'a slope of its efforts is no number'}"
+    )

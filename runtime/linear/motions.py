@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.arrays import Array
+from mstmm.arrays import Array, real
+from mstmm.errors import SceneError
 
 from . import files
 
@@ -96,15 +97,20 @@ class Modes:
         return np.asarray(np.abs(self.participation) ** 2 * self._units[:, None])
 
     def strain(self) -> dict[str, Array]:
-        """Owner of coordinates -> (k,): its part of the elastic energy of each shape, which laws
-        of hinges and flexible bodies store; that of springs goes by the coordinates that strain
-        them.  nan where a shape strains nothing."""
+        """Owner -> (k,): its part of the elastic energy of each shape: hinges with their laws,
+        flexible bodies, and "springs", all of them together, where there are any.  nan where a
+        shape strains nothing."""
         linear = self.linear
-        works = np.real(np.conj(self.shapes) * (linear.elastic @ self.shapes))
-        total = works.sum(axis=0)
+        own, springs = (
+            np.real(np.conj(self.shapes) * (matrix @ self.shapes))
+            for matrix in (linear.elastic - linear.sprung, linear.sprung)
+        )
+        total = (own + springs).sum(axis=0)
         with np.errstate(all="ignore"):
-            shares = np.where(np.abs(total) > 0, works / total, np.nan)
+            shares = np.where(np.abs(total) > 0, own / total, np.nan)
         found: dict[str, Array] = {}
+        if linear.model.scene.spring:
+            found["springs"] = 1.0 - shares.sum(axis=0)
         for name, row in zip(linear.coordinates, shares, strict=True):
             owner = name.rpartition(".")[0]
             found[owner] = found.get(owner, 0.0) + row
@@ -112,11 +118,16 @@ class Modes:
 
     def displaced(self, k: int, amplitude: float) -> Array:
         """q (nq,) of the state moved by `amplitude` times the real part of shape k."""
-        return self.linear.displaced(amplitude * np.real(self.shapes[:, k]))
+        return self.linear.displaced(real("amplitude", amplitude) * np.real(self._shape(k)))
+
+    def _shape(self, k: int) -> NDArray[Any]:
+        if isinstance(k, bool) or not isinstance(k, (int, np.integer)) or not 0 <= k < len(self):
+            raise SceneError(f"shape {k!r}: there are {len(self)}, counted from 0")
+        return self.shapes[:, k]
 
     def moving(self, k: int) -> list[str]:
         """Coordinates that move most in shape k, a tenth of the largest and more, largest first."""
-        size = np.abs(self.shapes[:, k])
+        size = np.abs(self._shape(k))
         places = np.flatnonzero(size > 0.1 * size.max(initial=0))
         order = places[np.argsort(-size[places], kind="stable")]
         return [self.linear.coordinates[j] for j in order]

@@ -18,8 +18,9 @@ from mstmm.errors import SceneError
 from mstmm.scene.rules.messages import near
 
 from ..result.observed import References
+from ..result.outputs import one_quantity
 from ..result.quantities import BODY, acceleration_name, rate_unit
-from .channels import Channel, columns
+from .channels import Channel, columns, names_of
 
 if TYPE_CHECKING:
     from .equations import Equations
@@ -49,12 +50,28 @@ def outputs_of(linear: Equations, names: Sequence[str] | None) -> list[Output]:
 
     Raises SceneError for a name that is none of these, or that a moving state does not give.
     """
+    if names is not None:
+        names = [_meant(linear, name) for name in names_of("outputs", names)]
     pairs = zip(linear.coordinates, linear.units, strict=True)
     plain = {name: Output(name, unit, 0, place) for place, (name, unit) in enumerate(pairs)}
     if names is None:
         return list(plain.values())
     rates = {} if plain.keys() >= set(names) else {one.name: one for one in _rates(linear)}
     return [plain.get(name) or rates.get(name) or _of_end(linear, name) for name in names]
+
+
+def _meant(linear: Equations, name: str) -> str:
+    """The quantity that an output of the scene is; other names as they are."""
+    given = next((one for one in linear.model.scene.output if one.name == name), None)
+    if given is None:
+        return name
+    source = one_quantity(given)
+    if not source:
+        raise SceneError(
+            f'output "{name}" is an expression ("{given.of.text}"), which linear models do not '
+            "take; name the quantities in it"
+        )
+    return source
 
 
 def _rates(linear: Equations) -> Iterator[Output]:

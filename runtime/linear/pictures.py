@@ -74,11 +74,17 @@ def locus(
     return made
 
 
+def _refuse_none(values: NDArray[Any]) -> None:
+    if not values.shape[1]:
+        raise SceneError("nothing moves in this scene, so that there is nothing to draw")
+
+
 def bode(
     frequency: Array, values: NDArray[Any], labels: Sequence[str], units: str, path: Path | None
 ) -> Any:
     """Magnitude above, phase below, over the frequency in Hz; a curve for each column of `values`
     (k, curves)."""
+    _refuse_none(values)
     made = figure(6.0)
     above, below = made.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     order = np.argsort(frequency, kind="stable")
@@ -99,6 +105,7 @@ def bode(
 
 def nyquist(values: NDArray[Any], labels: Sequence[str], path: Path | None) -> Any:
     """Curves (k, curves) in the complex plane."""
+    _refuse_none(values)
     made = figure(5.5)
     axis = made.subplots()
     for curve, label in zip(values.T, labels, strict=True):

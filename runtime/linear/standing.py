@@ -24,6 +24,11 @@ from .matrices import State
 INERTIAL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
+def without_laws(engine: Engine) -> Engine:
+    """The same without laws of hinges."""
+    return Engine(packed_system(replace(engine.packed.system, laws=()), engine.packed))
+
+
 def with_held_springs(engine: Engine, state: State) -> Engine:
     """The same with springs that keep their tension and no laws of hinges: their efforts act along
     the hinges' own speeds, so that standing ones change nothing.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -233,6 +233,15 @@ class System:
     inputs: tuple[Pieces, ...]
     by_time: bool
     moving: Mapping[int, Any]
+
+    def awake(self, place: int) -> System:
+        """The same where the body at a place of the tree is none that is idle."""
+        found = tuple(
+            replace(run, alike=(replace(run.alike[0], idle=False),))
+            if run.place == place and run.count == 1 else run
+            for run in self.bodies
+        )  # fmt: skip
+        return replace(self, bodies=found)
 
     @property
     def count(self) -> int:

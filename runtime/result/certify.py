@@ -14,6 +14,7 @@ from .control import control
 from .flexible import certify
 from .narrow import passed_over
 from .record import Record
+from .risks import of_outputs
 
 
 def certificate(result: Record, error: ErrorEstimate | None, step: StepCheck | None) -> Certificate:
@@ -41,6 +42,6 @@ def certificate(result: Record, error: ErrorEstimate | None, step: StepCheck | N
         give=gives.stiffest(result),
         failures=() if result.success else (result.message,),
         models=result._outside(),
-        known=(*run.risks, *passed_over(result.model, run)),
+        known=(*run.risks, *passed_over(result.model, run), *of_outputs(run, result.outputs())),
         reached=run.reached,
     )

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+import numpy as np
+
+from mstmm.arrays import Array
 from mstmm.risk import RUN, Risk
 
 from ..integrate.reached import ReachedError
+from ..run.trajectory import Trajectory
 from .control import Control
 from .evidence import Drift
 
@@ -31,6 +35,21 @@ def of_numbers(finite: bool, reached: ReachedError | None) -> Iterator[Risk]:
         )  # fmt: skip
     if reached is not None and reached.risk is not None:
         yield reached.risk
+
+
+def of_outputs(run: Trajectory, outputs: Mapping[str, Array]) -> Iterator[Risk]:
+    """Outputs of the scene that are no numbers where the states are."""
+    known = np.asarray(np.isfinite(np.hstack([run.q, run.u]))).reshape(len(run.t), -1).all(axis=1)
+    for name, values in outputs.items():
+        wrong = known & ~np.isfinite(values.reshape(len(run.t), -1)).all(axis=1)
+        if wrong.any():
+            at = float(run.t[int(np.argmax(wrong))])
+            yield Risk(
+                "not-finite", f'output "{name}"',
+                f'output "{name}" is not finite at {int(wrong.sum())} of {len(run.t)} samples, '
+                f"first at t = {at:.6g} s",
+                "keep what it divides by and takes roots and logarithms of within their range",
+            )  # fmt: skip
 
 
 def of_balances(drifts: Sequence[Drift], control: Control) -> Iterator[Risk]:

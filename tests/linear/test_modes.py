@@ -147,9 +147,15 @@ def test_states_that_do_not_last_are_told() -> None:
 def test_what_makes_no_sense() -> None:
     model = of(pendulum())
     linear = model.linearize()
-    for count in (0, 2, True, 1.5):
+    for count in (0, 2, True):
         with pytest.raises(SceneError, match="expected a number of motions from 1 to 1"):
-            linear.modes(count)  # type: ignore[arg-type]
+            linear.modes(count)
+    for wrong in (1.5, "a"):
+        with pytest.raises(SceneError, match="expected a whole number of motions"):
+            linear.modes(wrong)  # type: ignore[arg-type]
+    for k in (1, -1, True, "a"):
+        with pytest.raises(SceneError, match="counted from 0"):
+            linear.modes().moving(k)  # type: ignore[arg-type]
     with pytest.raises(SceneError, match=r'"pivot.efort".*did you mean "?pivot.effort'):
         model.linearize(inputs=["pivot.efort"])
     with pytest.raises(SceneError, match=r"bob\.tip\.force\.w"):
@@ -185,6 +191,12 @@ def test_scenes_in_which_nothing_moves_or_rests(recwarn: pytest.WarningsRecorder
         assert repr(still.modes()) == "<Modes: none>"
         with pytest.raises(SceneError, match="nothing moves"):
             still.modes(1)
+        with pytest.raises(SceneError, match="nothing moves"):
+            still.locus("block.mass", [1.0, 2.0])
+        with pytest.raises(SceneError, match="nothing moves"):
+            still.critical("block.mass", 1.0, 2.0)
+        with pytest.raises(SceneError, match="nothing to draw"):
+            still.frequency_response([1.0]).plot()
     with pytest.raises(NumericalFailure, match=r"no equilibrium|undetermined"):
         scene(type="free").modes()
     assert not recwarn.list

@@ -194,3 +194,16 @@ def test_names_of_four_parts_are_of_outputs_alone() -> None:
     event = {"when": "rod1.tip.velocity.x > 1", "do": "stop"}
     with pytest.raises(SceneError, match=r"has no end 'tip\.velocity'"):
         scene(event=[event])
+
+
+@pytest.mark.parametrize("formula", ["sqrt(0 - 1 - t)", "1/(t - t)", "log(t)"])
+def test_an_output_that_is_no_number_is_told(formula: str) -> None:
+    scene = mstmm.Scene(
+        gravity=(0, -9.81, 0), output=[{"name": "lost", "of": formula}],
+        body=[{"name": "bob", "mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [1, 1, 1]}],
+        hinge=[{"name": "pin", "type": "pin", "inboard": "ground", "outboard": "bob"}],
+    )  # fmt: skip
+    run = mstmm.compile(scene).simulate(0.1, certify=True)
+    (risk,) = (one for one in run.risks if one.name == "not-finite")
+    assert risk.element == 'output "lost"' and "first at t = 0 s" in risk.means
+    assert run.success and not run.trusted and any("lost" in text for text in run.warnings)

@@ -104,9 +104,8 @@ def modes(
     file = _file(output)
     use_files(hinge or [])
     linear = _linear(_model(scene, change or []), [], at_start)
-    found = linear.modes(
-        None if count is None else min(count, len(linear)), False if undamped else None
-    )
+    most = None if count is None or not len(linear) else min(count, len(linear))
+    found = linear.modes(most, False if undamped else None)
     if file is not None:
         found.save(file)
     if json:
@@ -122,7 +121,7 @@ def modes(
     terminal.console().print(terminal.table("", head, rows[:_ROWS]))
     if len(rows) > _ROWS:
         terminal.say(f"and {len(rows) - _ROWS} more: --count N, or --output FILE.csv")
-    terminal.say(_counted(found))
+    terminal.say(_counted(found) if len(found) else "nothing moves in this scene")
     _where(output, "")
 
 

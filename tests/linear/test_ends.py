@@ -1,0 +1,114 @@
+"""Forces on ends, and motions of ends, where nothing else hangs or acts on them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from linear.scenes import UNIT
+
+import mstmm
+from mstmm.errors import NumericalFailure, SceneError
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def cantilever(**more: object) -> mstmm.Model:
+    scene = mstmm.Scene(
+        gravity=(0, 0, 0), beam=[{"name": "beam", **UNIT, "modes": {"y": 4}}],
+        hinge=[{"name": "foot", "type": "fixed", "inboard": "ground", "outboard": "beam"}],
+        **more,
+    )  # fmt: skip
+    return mstmm.compile(scene, engine="looped")
+
+
+def test_a_tip_gives_way_by_a_third() -> None:
+    """F L^3 / 3 E I, pushed almost at rest, and a moment M L / E I for the slope."""
+    model = cantilever()
+    found = model.frequency_response([1e-3], ["beam.tip.fy", "beam.tip.mz"], ["beam.tip.y"])
+    np.testing.assert_allclose(found.values[0, 0], [1 / 3, 1 / 2], rtol=1e-2)
+    loaded = cantilever(load=[{"on": "beam.tip", "force": [0, 0, 0]}])
+    ours, theirs = (x.linearize(inputs=["beam.tip.fy"]).V for x in (model, loaded))
+    np.testing.assert_allclose(ours, theirs, atol=1e-14)
+
+
+def test_the_tip_of_a_hinged_beam_goes_round_with_it() -> None:
+    """Two metres behind the pin a force of 1 N has a moment of 2 N m."""
+    scene = mstmm.Scene(
+        gravity=(0, -9.81, 0), beam=[{"name": "boom", **UNIT, "length": 2.0, "modes": {"y": 2}}],
+        hinge=[{"name": "pin", "type": "pin", "inboard": "ground", "outboard": "boom",
+                "law": {"stiffness": 1e5}}],
+    )  # fmt: skip
+    linear = mstmm.compile(scene).linearize([0, 0, 0], inputs=["boom.tip.fy"])
+    assert linear.V[0, 0] == pytest.approx(2.0)
+    assert linear.output_matrices(["boom.tip.vy"])[0][0, 3] == pytest.approx(2.0)
+
+
+def test_the_tip_of_a_body_of_finite_elements() -> None:
+    model = mstmm.compile(mstmm.load_scene(EXAMPLES / "satellite_panels" / "scene.toml"))
+    linear = model.linearize(inputs=["east.tip.fy"])
+    assert np.abs(linear.V).max() > 0.5
+
+
+def test_an_output_of_the_scene_is_the_quantity_that_it_names() -> None:
+    outputs = [{"name": "sway", "of": "beam.tip.y"}, {"name": "twice", "of": "2*beam.tip.y"}]
+    linear = cantilever(output=outputs).linearize(inputs=["beam.tip.fy"])
+    ours = linear.frequency_response([1.0], outputs=["sway"]).values
+    np.testing.assert_allclose(
+        ours, linear.frequency_response([1.0], outputs=["beam.tip.y"]).values
+    )
+    with pytest.raises(SceneError, match="is an expression"):
+        linear.frequency_response([1.0], outputs=["twice"])
+    with pytest.raises(SceneError, match="expected a list of names"):
+        linear.output_matrices("sway")
+
+
+def two_masses() -> mstmm.Scene:
+    slide = {"type": "prismatic", "axis": [1, 0, 0], "inboard": "ground"}
+    law = {"stiffness": 5.0, "rest": 1.0}
+    return mstmm.Scene(
+        gravity=(0, 0, 0),
+        body=[{"name": name, "mass": mass, "inertia": [1, 1, 1]}
+              for name, mass in (("a", 1.0), ("c", 2.0))],
+        hinge=[{**slide, "name": "on_a", "outboard": "a", "law": {"stiffness": 10.0}},
+               {**slide, "name": "on_c", "outboard": "c", "position": [1, 0, 0]}],
+        spring=[{"name": "between", "from": "a", "to": "c", "law": law}],
+    )  # fmt: skip
+
+
+def test_springs_have_their_own_part_of_the_strain() -> None:
+    modes = mstmm.compile(two_masses()).modes()
+    strain, shape = modes.strain(), modes.shapes
+    held, between = 10 * shape[0] ** 2, 5 * (shape[1] - shape[0]) ** 2
+    np.testing.assert_allclose(strain["springs"], between / (held + between), atol=1e-12)
+    np.testing.assert_allclose(strain["on_a"], held / (held + between), atol=1e-12)
+    np.testing.assert_allclose(strain["on_c"], 0.0, atol=1e-12)
+
+
+def rod(law: dict[str, object], **more: object) -> mstmm.Model:
+    pin = {"name": "pivot", "type": "pin", "inboard": "ground", "outboard": "rod", "law": law}
+    body = {"name": "rod", "mass": 1.0, "center_of_mass": [0, -0.5, 0], "inertia": [1, 1, 1]}
+    return mstmm.compile(mstmm.Scene(gravity=(0, 0, 0), body=[body], hinge=[pin], **more))
+
+
+def test_a_law_without_slope_is_named() -> None:
+    linear = rod({"effort": "-sqrt(q)"}).linearize([0.0])
+    for ask in (linear.modes, lambda: linear.K):
+        with pytest.raises(NumericalFailure, match=r'"pivot": law.effort\[0\].*no finite slope'):
+            ask()
+
+
+def test_pushes_that_move_nothing() -> None:
+    driven = {"name": "turn", "type": "pin", "inboard": "ground", "outboard": "arm", "drive": "t"}
+    hung = {"name": "pivot", "type": "pin", "inboard": "arm.tip", "outboard": "bob"}
+    scene = mstmm.Scene(
+        gravity=(0, 0, 0), hinge=[driven, hung], input=[{"name": "idle"}],
+        body=[{"name": name, "mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [1, 1, 1],
+               "ends": {"tip": [1, 0, 0]}} for name in ("arm", "bob")],
+    )  # fmt: skip
+    model = mstmm.compile(scene, engine="looped")
+    with pytest.raises(SceneError, match='hinge "turn" is driven there'):
+        model.linearize(inputs=["turn.effort"])
+    linear = model.linearize([0, 0], inputs=["idle"])
+    assert any("input idle moves nothing" in text for text in linear.warnings)
