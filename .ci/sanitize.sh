@@ -13,7 +13,13 @@ echo "--- warnings as errors: clang"
 clang "${strict[@]}" -fsyntax-only "${sources[@]}"
 
 echo "--- warnings as errors: gcc; every kernel, sanitized"
-gcc "${strict[@]}" -g -O1 "${sanitize[@]}" "${sources[@]}" .ci/sanitize_kernels.c -lm -o "$scratch/kernels"
+mkdir "$scratch/objects"
+# the largest functions are beyond what gcc tracks the variables of, and compiled twice where it tries
+printf '#!/bin/sh\nexec gcc %s -c "$1" -o "%s/$(echo "$1" | tr /. __).o"\n' \
+    "${strict[*]} -g -fno-var-tracking-assignments -O1 ${sanitize[*]}" "$scratch/objects" >"$scratch/compile"
+chmod +x "$scratch/compile"
+printf '%s\0' "${sources[@]}" .ci/sanitize_kernels.c | xargs -0 -n 1 -P "$(nproc)" "$scratch/compile"
+gcc "${sanitize[@]}" "$scratch"/objects/*.o -lm -o "$scratch/kernels"
 "$scratch/kernels"
 
 echo "--- the engine under its tests, sanitized"

@@ -45,7 +45,7 @@ def test_the_tip_of_a_hinged_beam_goes_round_with_it() -> None:
     assert linear.output_matrices(["boom.tip.vy"])[0][0, 3] == pytest.approx(2.0)
 
 
-def test_the_tip_of_a_body_of_finite_elements() -> None:
+def test_the_tip_of_a_panel() -> None:
     model = mstmm.compile(mstmm.load_scene(EXAMPLES / "satellite_panels" / "scene.toml"))
     linear = model.linearize(inputs=["east.tip.fy"])
     assert np.abs(linear.V).max() > 0.5
