@@ -39,7 +39,9 @@ def of_numbers(finite: bool, reached: ReachedError | None) -> Iterator[Risk]:
 
 def of_outputs(run: Trajectory, outputs: Mapping[str, Array]) -> Iterator[Risk]:
     """Outputs of the scene that are no numbers where the states are."""
-    known = np.asarray(np.isfinite(np.hstack([run.q, run.u]))).reshape(len(run.t), -1).all(axis=1)
+    if not len(run.t):
+        return
+    known = np.asarray(np.isfinite(np.hstack([run.q, run.u])).all(axis=1))
     for name, values in outputs.items():
         wrong = known & ~np.isfinite(values.reshape(len(run.t), -1)).all(axis=1)
         if wrong.any():

@@ -207,3 +207,13 @@ def test_an_output_that_is_no_number_is_told(formula: str) -> None:
     (risk,) = (one for one in run.risks if one.name == "not-finite")
     assert risk.element == 'output "lost"' and "first at t = 0 s" in risk.means
     assert run.success and not run.trusted and any("lost" in text for text in run.warnings)
+
+
+def test_a_result_without_samples_has_outputs_of_none() -> None:
+    scene = mstmm.Scene(
+        gravity=(0, -9.81, 0), output=[{"name": "twice", "of": "2*pin.angle"}],
+        body=[{"name": "bob", "mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [1, 1, 1]}],
+        hinge=[{"name": "pin", "type": "pin", "inboard": "ground", "outboard": "bob"}],
+    )  # fmt: skip
+    run = mstmm.compile(scene).simulate(0.1, output_times=[])
+    assert run.outputs()["twice"].shape == (0,) and not [x for x in run.risks if x.doubt]
