@@ -26,6 +26,8 @@ from .pencil import Pencil
 _BEYOND = 4
 #: Parts of the fastest omega^2 by which a scene that nothing holds is shifted.
 _SHIFT = 1e-12
+#: Parts of that shift that are rounding: omega^2 of motions that nothing holds.
+_ROUNDING = 1e-2
 _TRIALS = 4
 #: omega^2 that are told apart by a count, in parts of the larger.
 _GAP = 1e-9
@@ -44,9 +46,11 @@ class Slowest:
 def undamped(pencil: Pencil, count: int) -> Slowest:
     """The `count` motions of least omega^2 of M and a symmetric K."""
     n, sigma = len(pencil), _shift(pencil)
+    rounding = _ROUNDING * abs(sigma)
     wanted = min(count + _BEYOND, n - 1)
     for trial in range(_TRIALS):
         values, shapes = _lanczos(pencil, wanted, sigma, trial)
+        values = np.where(np.abs(values) <= rounding, 0.0, values)
         kept, edge = _gap(values, count)
         pencil_count = pencil.count_below(edge)
         if pencil_count is None or pencil_count == kept:

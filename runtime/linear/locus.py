@@ -1,8 +1,8 @@
 """Natural motions along a parameter of a scene, and the value at which a scene loses its stability.
 
-The motions are paired from one to the next by their eigenvalues and
-shapes, so that curves may cross: with the spin of a shaft they are Campbell's diagram, with any
-other number of the scene its root locus.
+The motions are paired from one value to the next by their eigenvalues and shapes, so that curves
+may cross: with the spin of a shaft they are Campbell's diagram, with any other number of the scene
+its root locus.
 """
 
 from __future__ import annotations
@@ -60,7 +60,6 @@ class Locus:
         from .pictures import locus
 
         lines = np.atleast_1d(numbers("orders", orders)).tolist()
-
         to = None if path is None else Path(path)
         return locus(self.parameter, self.values, self.eigenvalues, to, lines)
 

@@ -86,6 +86,22 @@ def test_a_free_body_has_motions_of_frequency_zero() -> None:
     np.testing.assert_allclose(strain["east"][6:] + strain["west"][6:], 1.0)
 
 
+def test_many_bodies_that_float_have_motions_of_frequency_zero() -> None:
+    """And none of them grows by rounding."""
+    rod = {"mass": 0.01, "center_of_mass": [0.005, 0, 0], "inertia": [1e-9, 1e-7, 1e-7],
+           "ends": {"tip": [0.01, 0, 0]}}  # fmt: skip
+    scene = mstmm.Scene(
+        gravity=(0, 0, 0), body=[{"name": "hub", "mass": 0.02, "inertia": [1e-6] * 3}],
+        hinge=[{"name": "space", "type": "free", "inboard": "ground", "outboard": "hub"}],
+        chain=[{"name": "tail", "count": 420, "inboard": "hub", "body": rod, "end": "tip",
+                "hinge": {"type": "pin", "law": {"stiffness": 50.0}}}],
+    )  # fmt: skip
+    linear = of(scene).linearize(disturbances=())
+    few, every = linear.modes(9), linear.modes()
+    assert few.complete and not few.omega[:6].any() and not few.growing.any()
+    np.testing.assert_allclose(few.omega[6:], every.omega[6:9], rtol=1e-6)
+
+
 def test_effective_masses_add_up() -> None:
     modes = of(hanging(30)).modes()
     linear = modes.linear
