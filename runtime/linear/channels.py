@@ -30,6 +30,7 @@ from ..pack.pack import packed_system
 from ..pack.system import LoadNumbers
 from ..pack.values import constant_kernel
 from ..result.observed import References
+from ..result.quantities import effort_names
 from .matrices import State
 from .standing import INERTIAL
 
@@ -120,7 +121,7 @@ def _refuse_drive(model: Compiled, name: str) -> None:
 
 def _effort(model: Compiled, name: str, hinge: str, last: str) -> Channel:
     slots = model.layout.hinges[hinge]
-    names = efforts_of(slots.u_names)
+    names = effort_names(slots.u_names)
     if last not in names:
         raise SceneError(f'"{name}": hinge "{hinge}" has {", ".join(names) or "no speeds"}')
     k = names.index(last)
@@ -132,16 +133,9 @@ def _effort(model: Compiled, name: str, hinge: str, last: str) -> Channel:
     return Channel(name, effort_unit(slots.u_units[k]), speed=slots.u + k)
 
 
-def efforts_of(speeds: Sequence[str]) -> list[str]:
-    """Names of the efforts along the speeds of a hinge."""
-    if len(speeds) == 1:
-        return ["effort"]
-    return [f"effort_{name.removesuffix('_rate')}" for name in speeds]
-
-
 def _efforts(model: Compiled) -> list[str]:
     hinges = model.layout.hinges
-    return [f"{name}.{effort}" for name in hinges for effort in efforts_of(hinges[name].u_names)]
+    return [f"{name}.{effort}" for name in hinges for effort in effort_names(hinges[name].u_names)]
 
 
 def columns(engine: Engine, state: State, channels: Sequence[Channel], free: list[int]) -> Array:

@@ -264,8 +264,7 @@ class Quantities:
     def _hinge(self, table: Table, hinge: HingeSlots) -> None:
         """q, u, their rates and efforts by the hinge's own names and by number; loads."""
         q, u = hinge.q_slice, hinge.u_slice
-        efforts = [f"effort_{name.removesuffix('_rate')}" for name in hinge.u_names]
-        efforts = ["effort"] if len(efforts) == 1 else efforts
+        efforts = effort_names(hinge.u_names)
         units = [effort_unit(unit) for unit in hinge.u_units]
         rate_units = [rate_unit(unit) for unit in hinge.u_units]
         accelerations = [acceleration_name(name) for name in hinge.u_names]
@@ -317,6 +316,13 @@ class _Group:
             self.table.entries[f"{self.hinge}.{short}[{k}]"] = self.table.entries[full]
         if len(names) == 1 and names[0] != short:
             self.table.entries[f"{self.hinge}.{short}"] = self.table.entries[full]
+
+
+def effort_names(speeds: Sequence[str]) -> list[str]:
+    """Names of the efforts along the speeds of a hinge: effort, or effort_wx and so on."""
+    if len(speeds) == 1:
+        return ["effort"]
+    return [f"effort_{name.removesuffix('_rate')}" for name in speeds]
 
 
 def acceleration_name(speed: str) -> str:
