@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
@@ -31,8 +32,8 @@ FLAGS = (
 
 def compile_library(sources: Iterable[Path], target: Path, *flags: str) -> Path:
     """A shared library of the C files; the compiler's own words on failure."""
-    compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
-    command = [compiler, *FLAGS, *flags, "-shared", "-o", str(target), *map(str, sources), "-lm"]
+    compiler = shlex.split(os.environ.get("CC") or "") or [shutil.which("cc") or "gcc"]
+    command = [*compiler, *FLAGS, *flags, "-shared", "-o", str(target), *map(str, sources), "-lm"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return target

@@ -13,15 +13,9 @@ static const real *parameters(const mstmm_scene_run *run, real t)
     return run->implicit_code.p;
 }
 
-/* Parts of the numbers: the base point (t, q, u, a), steps, slopes, factors, known increments. */
-typedef struct {
-    real *t, *q, *u, *a, *steps, *slopes, *factors, *still_q, *still_u, *known_q, *known_a, *right;
-    int64_t used;
-} mstmm_parts;
-
-static mstmm_parts cut(int64_t nq, int64_t nu, real *numbers)
+static mstmm_implicit_parts cut(int64_t nq, int64_t nu, real *numbers)
 {
-    mstmm_parts at = {.used = 0};
+    mstmm_implicit_parts at = {.used = 0};
     const struct { real **to; int64_t count; } all[] = {
         {&at.t, 1}, {&at.q, nq}, {&at.u, nu}, {&at.a, nu}, {&at.steps, 3},
         {&at.slopes, nu * (nq + nu)}, {&at.factors, nu * nu}, {&at.still_q, nq}, {&at.still_u, nu},
@@ -35,11 +29,6 @@ static mstmm_parts cut(int64_t nq, int64_t nu, real *numbers)
 }
 
 int64_t mstmm_implicit_code_size(const mstmm_fused *fused) { return cut(fused->nq, fused->nu, NULL).used; }
-
-static mstmm_parts parts_of(const mstmm_scene_run *run)
-{
-    return cut(CODE(run)->nq, CODE(run)->nu, run->implicit_code.numbers);
-}
 
 static int residual(void *context, double t, const double *y, const double *a, double *r,
                     double *work)
@@ -80,7 +69,7 @@ static int tangent(void *context, double t, const double *y, const double *a, do
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *code = CODE(run);
-    const mstmm_parts at = parts_of(run);
+    const mstmm_implicit_parts at = run->implicit_code.parts;
     *at.t = t;
     memcpy(at.q, y, (size_t)(code->nq + code->nu) * sizeof(real)); /* u stands behind q */
     memcpy(at.a, a, (size_t)code->nu * sizeof(real));
@@ -107,7 +96,7 @@ static int laws(void *context, double t, const double *y, const double *a, doubl
     return run->implicit_code.looped.laws(run, t, y, a, s, sq, kappa);
 }
 
-static int coordinates(const mstmm_scene_run *run, const mstmm_parts *at, const real *x,
+static int coordinates(const mstmm_scene_run *run, const mstmm_implicit_parts *at, const real *x,
                        const real *rho, real *dq)
 {
     return CODE(run)->coordinates(parameters(run, *at->t), at->t, at->q, at->u, run->memory, at->a,
@@ -115,7 +104,7 @@ static int coordinates(const mstmm_scene_run *run, const mstmm_parts *at, const 
 }
 
 /* What is known of the increments moves to the right: dq_0 of rho_q, -rho_u of the accelerations. */
-static int without_known(const mstmm_scene_run *run, const mstmm_parts *at, const double *rho_q,
+static int without_known(const mstmm_scene_run *run, const mstmm_implicit_parts *at, const double *rho_q,
                          const double *rho_u, const double *r)
 {
     const mstmm_fused *code = CODE(run);
@@ -133,7 +122,7 @@ static int solve(void *context, const double *r, const double *rho_q, const doub
     mstmm_scene_run *run = context;
     const mstmm_fused *code = CODE(run);
     const mstmm_implicit *looped = &run->implicit_code.looped;
-    const mstmm_parts at = parts_of(run);
+    const mstmm_implicit_parts at = run->implicit_code.parts;
     if (run->implicit_code.looped_tangent) return looped->solve(run, r, rho_q, rho_u, dq, du, da);
     const real *rho = rho_q ? rho_q : at.still_q;
     int failed = 0;
@@ -156,8 +145,8 @@ static int solve(void *context, const double *r, const double *rho_q, const doub
 void mstmm_implicit_by_code(mstmm_scene_run *run, const mstmm_fused *fused, real *p,
                             real *numbers)
 {
-    run->implicit_code = (mstmm_implicit_code){.fused = fused, .p = p, .numbers = numbers,
-                                               .looped = run->implicit};
+    run->implicit_code = (mstmm_implicit_code){.fused = fused, .p = p, .looped = run->implicit,
+                                               .parts = cut(fused->nq, fused->nu, numbers)};
     run->implicit.residual = residual;
     run->implicit.residual_rate = residual_rate;
     if (run->implicit.rates) run->implicit.rates = rates;

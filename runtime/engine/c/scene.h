@@ -48,11 +48,18 @@ typedef struct {
     int release;
 } mstmm_event_action;
 
+/* Parts of what that code works on: the base point (t, q, u, a), steps, slopes, factors, known
+ * increments. */
+typedef struct {
+    real *t, *q, *u, *a, *steps, *slopes, *factors, *still_q, *still_u, *known_q, *known_a, *right;
+    int64_t used;
+} mstmm_implicit_parts;
+
 /* Code compiled for what implicit methods ask, and the looped engine's way, its last resort */
 typedef struct {
     const mstmm_fused *fused; /* NULL: there is none */
     real *p;
-    real *numbers; /* mstmm_implicit_code_size */
+    mstmm_implicit_parts parts; /* mstmm_implicit_code_size */
     mstmm_implicit looped;
     int looped_tangent; /* the last tangent was factored there */
 } mstmm_implicit_code;

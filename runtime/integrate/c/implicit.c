@@ -180,30 +180,40 @@ int mstmm_implicit_finish(const mstmm_work *work, int wants_dense) {
 
 /* ---- norms ---- */
 
-static double tolerance(const mstmm_work *work, const double *other, int64_t i) {
-  const double size = fmax(fabs(work->y[i]), fabs(other[i]));
-  return work->atol[i] + work->run->rtol * size;
+MSTMM_INLINE double tolerance(const mstmm_work *work, const double *other, int64_t i) {
+  const double here = fabs(work->y[i]), there = fabs(other[i]);
+  return work->atol[i] + work->run->rtol * (there > here ? there : here); /* fmax were a call */
 }
 
 /* Size of error e of component i in units of its tolerance, which goes with the size of the state
- * here or at the other end.  Speeds are weighed by what they move in
- * a step: the vibration of a stiff spring is fast and small, and nobody asked for its speed. */
-static double scaled(const mstmm_work *work, const double *other, int64_t i, double e) {
-  const int n_q = work->implicit->n_q, *coordinates = work->implicit->coordinates;
-  const double h = work->run->real.h;
-  double unit = tolerance(work, other, i);
-  if (i >= n_q && i < n_q + work->implicit->n_u) {
-    unit = tolerance(work, other, coordinates ? coordinates[i - n_q] : i - n_q) + 0.1 * h * unit;
-    e *= h;
-  }
+ * here or at the other end. */
+MSTMM_INLINE double scaled_plain(const mstmm_work *work, const double *other, int64_t i, double e) {
+  const double unit = tolerance(work, other, i);
   return unit > 0.0 ? fabs(e) / unit : 0.0;
 }
 
-static double rms(const mstmm_work *work, const double *other, int64_t first, int64_t last) {
+/* The same of speed i - n_q: it is weighed by what it moves in a step, for the vibration of a stiff
+ * spring is fast and small, and nobody asked for its speed. */
+MSTMM_INLINE double scaled_speed(const mstmm_work *work, const double *other, int64_t i, double e) {
+  const int *coordinates = work->implicit->coordinates;
+  const int64_t j = i - work->implicit->n_q;
+  const double h = work->run->real.h;
+  const double unit = tolerance(work, other, coordinates ? coordinates[j] : j) +
+                      0.1 * h * tolerance(work, other, i);
+  return unit > 0.0 ? fabs(e * h) / unit : 0.0;
+}
+
+MSTMM_INLINE int is_speed(const mstmm_work *work, int64_t i) {
+  return i >= work->implicit->n_q && i < work->implicit->n_q + work->implicit->n_u;
+}
+
+MSTMM_INLINE double rms(const mstmm_work *work, const double *other, int64_t first, int64_t last,
+                        int speeds) {
   double sum = 0.0;
   if (last > work->system->n_error) last = work->system->n_error;
   for (int64_t i = first; i < last; i++) {
-    const double e = scaled(work, other, i, work->error[i]);
+    const double e = speeds ? scaled_speed(work, other, i, work->error[i])
+                            : scaled_plain(work, other, i, work->error[i]);
     sum += e * e;
   }
   return last > first ? sqrt(sum / (double)(last - first)) : 0.0;
@@ -218,8 +228,8 @@ static double largest(double a, double b, double c) {
 /* Size of what stands in work->error */
 static double norm(const mstmm_work *work, const double *other) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
-  return largest(rms(work, other, 0, n_q), rms(work, other, n_q, n_q + n_u),
-                 rms(work, other, n_q + n_u, work->system->n_state));
+  return largest(rms(work, other, 0, n_q, 0), rms(work, other, n_q, n_q + n_u, 1),
+                 rms(work, other, n_q + n_u, work->system->n_state, 0));
 }
 
 static void estimate(const mstmm_work *work) {
@@ -237,7 +247,7 @@ double mstmm_implicit_norm(const mstmm_work *work, double *absolute) {
   double sum = 0.0; /* of the motion alone: quadratures have units of their own */
   estimate(work);
   for (int i = 0; i < n; i++) {
-    const double e = work->error[i] * (i >= n_q && i < n_q + n_u ? work->run->real.h : 1.0);
+    const double e = work->error[i] * (is_speed(work, i) ? work->run->real.h : 1.0);
     sum += e * e;
   }
   *absolute = n ? sqrt(sum / n) : 0.0;
@@ -257,7 +267,8 @@ static int64_t worst_of(const mstmm_work *work, const double *other, int64_t n) 
   int64_t worst = -1;
   double most = -1.0;
   for (int64_t i = 0; i < n; i++) {
-    const double e = scaled(work, other, i, work->error[i]);
+    const double e = is_speed(work, i) ? scaled_speed(work, other, i, work->error[i])
+                                       : scaled_plain(work, other, i, work->error[i]);
     if (e > most || e != e) {
       most = e == e ? e : INFINITY;
       worst = i;
