@@ -20,7 +20,14 @@ from mstmm.atlas.scenes import (
     rod,
     spinning_top,
 )
-from mstmm.atlas.variants import held_places, inertial_axes, raw_quaternions, textbook_shapes
+from mstmm.atlas.variants import (
+    held_places,
+    inertial_axes,
+    plain_charts,
+    raw_quaternions,
+    ros3p,
+    textbook_shapes,
+)
 from mstmm.atlas.variants.plain_rosenbrock import Steps
 from mstmm.runtime.flexible.beam.shapes import Eigenfunction
 
@@ -45,6 +52,15 @@ def test_a_raw_quaternion_turns_as_the_good_one_does() -> None:
     raw = raw_quaternions.end_of(model, 0.01, 500)
     good = model.simulate(5.0, rtol=1e-12, atol=1e-14, output_times=[5.0]).q[-1]
     assert np.abs(raw / np.linalg.norm(raw) * np.sign(raw @ good) - good).max() < 1e-6
+
+
+def test_plain_charts_are_of_second_order() -> None:
+    """By a method of fourth; towards the same attitude."""
+    top = spinning_top("ball", (0.4, 1.6, 1.1))
+    exact = top.simulate(1.0, rtol=1e-12, atol=1e-14, output_times=[1.0]).q[-1]
+    errors = [np.abs(plain_charts.end_of(top, 1 / n, n) - exact).max() for n in (40, 80)]
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(2, abs=0.1)
+    assert errors[1] < 1e-4
 
 
 @pytest.mark.parametrize("number", [1, 2, 5])
@@ -113,6 +129,17 @@ def test_without_the_slope_in_time_the_order_falls(method: str, order: int) -> N
         for n in (40, 80)
     ]
     assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
+
+
+def test_ros3p_is_what_its_authors_say() -> None:
+    """Of third order, with an estimate of second; sqrt(3) - 1 of infinitely fast motion stays."""
+    pulled, table = driven_rod(), ros3p.tableau()
+    exact = pulled.simulate(1.0, rtol=1e-12, atol=1e-14, output_times=[1.0]).q[-1]
+    errors = [np.abs(Steps(pulled, table).fixed(1 / n, n)[-1, 0] - exact).max() for n in (40, 80)]
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(3, abs=0.2)
+    needed = [Steps(pulled, table).needed(1.0, rtol, 1e-2 * rtol, 100_000) for rtol in (1e-4, 1e-7)]
+    assert needed[1] / needed[0] == pytest.approx(10, rel=0.3)  # the cube root of 1000
+    assert abs(table.amplification([1e8j])[0]) == pytest.approx(math.sqrt(3) - 1, abs=1e-6)
 
 
 @pytest.mark.parametrize("method", ["rodas4", "rodas4p2", "rodas5p"])

@@ -1,9 +1,10 @@
 """Rosenbrock steps without what the steps of a run take care of besides.
 
-Their stages are those of a run: its table, its residual and tangent, accelerations as unknowns.
-What may be left out is the slope of the equations in time (Hairer, Wanner, Solving Ordinary
-Differential Equations II, 1996, IV.7); and errors are judged by the usual norm (IV.8), in which
-those of speeds weigh by themselves and not by what they move within the step.
+Their stages are those of a run: its residual and tangent, accelerations as unknowns.  The table
+may be one that no run offers.  What may be left out is the slope of the equations in time (Hairer,
+Wanner, Solving Ordinary Differential Equations II, 1996, IV.7), and the accelerations that belong
+to the start; and errors are judged by the usual norm (IV.8), in which those of speeds weigh by
+themselves and not by what they move within the step.
 """
 
 from __future__ import annotations
@@ -24,14 +25,21 @@ _SAFETY, _LEAST, _MOST = 0.9, 0.2, 6.0
 class Steps:
     """Steps on states (3, n) of coordinates, of speeds that are their rates, and accelerations."""
 
-    def __init__(self, model: Model, method: str, time_slope: bool = True) -> None:
-        table = get(method)
+    def __init__(
+        self,
+        model: Model,
+        method: str | Rosenbrock,
+        time_slope: bool = True,
+        accelerations: Array | None = None,
+    ) -> None:
+        table = get(method) if isinstance(method, str) else method
         assert isinstance(table, Rosenbrock) and table.E is not None
         self._table, self._estimate = table, table.E[:-1]
         self._base, self._stage = Tangent(model.looped), Tangent(model.looped)
         self._late = table.d if time_slope else np.zeros_like(table.d)
         q, u = model.initial_state()
-        self._start = np.array([q, u, model.accelerations(q, u)])
+        known = model.accelerations(q, u) if accelerations is None else accelerations
+        self._start = np.array([q, u, known])
 
     def fixed(self, step: float, steps: int) -> Array:
         """States (steps + 1, 3, n) of steps of one length (s)."""
