@@ -51,6 +51,16 @@ def hanging(count: int, length: float = 1.0) -> Scene:
     )  # fmt: skip
 
 
+def beads(count: int, spacing: float = 0.2) -> Scene:
+    """Point masses of 1 kg in a row on rods without mass that hang on pins."""
+    body = {"mass": 1.0, "center_of_mass": [0, -spacing, 0], "ends": {"on": [0, -spacing, 0]}}
+    return Scene(
+        gravity=(0, -9.81, 0),
+        chain=[{"name": "string", "count": count, "inboard": "ground", "body": body,
+                "hinge": {"type": "pin", "axis": [0, 0, 1]}, "end": "on"}],
+    )  # fmt: skip
+
+
 def column(load: float, axes: str, shapes: int) -> Scene:
     """A clamped beam under a compressing load at its tip."""
     return Scene(
@@ -71,12 +81,15 @@ def hanging_beam(stiffness: float, shapes: int = 8) -> Scene:
     )  # fmt: skip
 
 
-def rotor_blade(spin: float) -> Scene:
-    """A beam clamped to an axis that turns with `spin`."""
+def rotor_blade(spin: float, hub: float = 0.0, shapes: int = 8) -> Scene:
+    """A beam clamped to an axis that turns with `spin`, at a distance `hub` from it."""
+    turning = {"type": "pin", "axis": [0, 0, 1], "inboard": "ground", "drive": f"{spin}*t"}
+    rim = {"name": "rim", "mass": 1.0, "inertia": [1, 1, 1], "ends": {"blade": [hub, 0, 0]}}
     return Scene(
-        gravity=(0, 0, 0), beam=[{"name": "blade", **UNIT, "modes": {"y": 8, "z": 8}}],
-        hinge=[{"name": "axis", "type": "pin", "axis": [0, 0, 1], "inboard": "ground",
-                "outboard": "blade", "drive": f"{spin}*t"}],
+        gravity=(0, 0, 0), body=[rim],
+        beam=[{"name": "blade", **UNIT, "modes": {"y": shapes, "z": shapes}}],
+        hinge=[{"name": "axis", "outboard": "rim", **turning},
+               {"name": "root", "type": "fixed", "inboard": "rim.blade", "outboard": "blade"}],
     )  # fmt: skip
 
 

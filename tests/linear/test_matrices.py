@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from flexible.reference.finite_elements import rotating
 from linear.scenes import column, hanging_beam, pendulum, rotor_blade, top
+from scipy.linalg import eigvalsh
 
 import mstmm
 from mstmm.runtime.linear.linear import Linear
@@ -45,7 +47,7 @@ def test_matrices_are_those_of_the_differentiated_accelerations(name: str) -> No
     np.testing.assert_allclose(linear.M, model.mass_matrix(state.q)[np.ix_(free, free)], atol=1e-13)
 
 
-@pytest.mark.parametrize("name", ["flexible_arm", "elastic_link", "branched_tree"])
+@pytest.mark.parametrize("name", ["flexible_arm", "elastic_link", "branched_tree", "spray_boom"])
 def test_stiffness_is_the_slope_of_the_efforts(name: str) -> None:
     """By central differences of the swept residual."""
     model = example(name)
@@ -146,6 +148,21 @@ def test_a_rotating_beam_stiffens(spin: int) -> None:
     np.testing.assert_allclose(np.sort(flap.real)[:2], FLAP[spin], rtol=1e-4)
     lag = np.sqrt(np.sort(flap.real) ** 2 - spin**2)
     assert min(abs(omega - lag[0])) < 1e-9 * lag[0]
+
+
+@pytest.mark.parametrize(
+    ("spin", "hub", "apart"),
+    [(6.0, 0.0, 4e-6), (2.0, 1.0, 3e-7), (10.0, 1.0, 6e-5), (10.0, 5.0, 3e-4)],
+)
+def test_a_blade_on_a_hub(spin: float, hub: float, apart: float) -> None:
+    """Both planes, against finite elements; the more the pull bends the shapes, the more of them
+    there have to be."""
+    linear = mstmm.compile(rotor_blade(spin, hub, 12)).linearize()
+    for plane, lag in ((".z", False), (".y", True)):
+        expected = rotating(hub, spin, lag, 2)
+        here = [k for k, name in enumerate(linear.coordinates) if plane in name]
+        squares = eigvalsh(linear.K[np.ix_(here, here)], linear.M[np.ix_(here, here)])
+        np.testing.assert_allclose(np.sqrt(squares[:2]), expected, rtol=apart)
 
 
 @pytest.mark.parametrize("spin", [40.0, 65.0])

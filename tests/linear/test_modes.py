@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from linear.scenes import column, hanging, hanging_beam, masses, pendulum
+from linear.scenes import beads, column, hanging, hanging_beam, masses, pendulum
+from scipy.linalg import eigvalsh_tridiagonal
 from scipy.special import jn_zeros
 
 import mstmm
@@ -28,6 +29,17 @@ def test_masses_in_a_row(count: int) -> None:
     np.testing.assert_allclose(modes.omega, expected, rtol=1e-8)
     assert modes.complete and modes.undamped and not modes.damping.any()
     np.testing.assert_allclose(modes.frequency * 2 * np.pi, modes.omega)
+
+
+@pytest.mark.parametrize("count", [5, 50, 500])
+def test_beads_on_a_string(count: int) -> None:
+    """omega^2 l/g are the zeros of Laguerre's polynomial L_N (Euler), the eigenvalues of its
+    recurrence: all of few, the first ten of many."""
+    modes = of(beads(count)).modes(min(count, 10))
+    zeros = eigvalsh_tridiagonal(2.0 * np.arange(count) + 1, np.arange(1.0, count))
+    expected = np.sqrt(9.81 / 0.2 * zeros[: len(modes)])
+    np.testing.assert_allclose(modes.omega, expected, rtol=1e-8)
+    assert modes.complete
 
 
 def test_few_of_many_are_those_of_the_matrices() -> None:

@@ -10,10 +10,12 @@ import pytest
 from flexible import engine_scenes
 from reference import random_scenes
 from reference.jets import Array
+from support.work import calls
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.engine.response import Response
+from mstmm.runtime.engine.tangent import Tangent
 from mstmm.runtime.linear.linear import Linear
 
 Scene = dict[str, Any]
@@ -80,6 +82,26 @@ def chain(count: int, damping: float = 0.5) -> Scene:
 
 def test_a_chain_of_500() -> None:
     check_dense(compiled(chain(500)).linearize(np.zeros(500)))
+
+
+def test_a_frequency_costs_a_fixed_share_a_body() -> None:
+    """No matrix: as many numbers for each of many bodies as of few, and no Python for any."""
+    kept, called = [], []
+    for count in (50, 2000):
+        linear = compiled(chain(count)).linearize(np.zeros(count), disturbances=())
+        outputs = [linear.coordinates[-1]]
+
+        def asked(points: int, linear: Linear = linear, outputs: list[str] = outputs) -> int:
+            omega = np.linspace(1, 2, points)
+            return calls(
+                lambda: linear.frequency_response(omega, ["rope[0].hinge.effort"], outputs)
+            )
+
+        engine = linear.model.looped
+        numbers = len(Tangent(engine).numbers) + engine.packed.workspace
+        kept.append(numbers / count)
+        called.append(asked(9) - asked(1))
+    assert kept[1] <= kept[0] and called[0] == called[1] == 0
 
 
 def test_two_and_four_frequencies_at_a_time() -> None:
