@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array
+from mstmm.errors import SceneError
 
 from .motions import Complex
 from .response import frequency_response
@@ -49,8 +50,14 @@ def waterfall(
     omega: ArrayLike,
     names: Sequence[str],
 ) -> Waterfall:
-    """The answer at each value of the parameter; `names` of input and output."""
+    """The answer at each value of the parameter; `names` of input and output.
+
+    Raises SceneError for what is not one name.
+    """
     pushed, shown = names
+    for what, name in (("input", pushed), ("output", shown)):
+        if not isinstance(name, str):
+            raise SceneError(f"{what} = {name!r}: expected one name, not a list of them")
     found = [frequency_response(at(x), omega, [pushed], [shown]) for x in points.tolist()]
     rows = np.array([one.values[:, 0, 0] for one in found])
     first = found[0]

@@ -19,6 +19,7 @@ from mstmm.scene import Scene
 from mstmm.scene.checks.types import inherit
 from mstmm.scene.files.write import to_toml
 from mstmm.scene.rules.text import to_expression
+from mstmm.scene.rules.values import Refused
 from mstmm.scene.rules.written import known
 from mstmm.scene.tables.constants import evaluated
 
@@ -96,7 +97,11 @@ def made_of(data: dict[str, Any], scene: Scene, where: str = "scene") -> Scene:
 
 def _begin_driven(data: dict[str, Any]) -> None:
     """Start values of driven coordinates follow the drives, which may have changed."""
-    with known(evaluated(data.get("constants", {}))):
+    try:
+        constants = evaluated(data.get("constants", {}))
+    except Refused:
+        return  # as the scene will be, which says where
+    with known(constants):
         for table in data.get("hinge", []):
             start = table.get("initial", {})
             for k, drive in enumerate(table.get("drive", ())):
@@ -123,7 +128,8 @@ def resolved(scene: Scene, names: Sequence[str]) -> list[str]:
 
 
 def _unknown(name: str, known: Mapping[str, float]) -> SceneError:
-    near = difflib.get_close_matches(name, known, 1, 0.5)
+    whole = [one for one in known if one.endswith(f".{name}")]
+    near = whole or difflib.get_close_matches(name, known, 1, 0.5)
     hint = f'; did you mean "{near[0]}"?' if near else ""
     return SceneError(f'parameter "{name}": there is no such number in the scene{hint}')
 

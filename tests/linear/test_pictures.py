@@ -57,6 +57,8 @@ def test_a_waterfall_is_a_row_of_answers(tmp_path: Path) -> None:
     k = np.array(stiffness)[:, None] + 9.81
     expected = 1 / (k + 0.3j * OMEGA - 0.53 * OMEGA**2)
     np.testing.assert_allclose(found.values, expected, rtol=1e-9)
+    with pytest.raises(SceneError, match=r"output = \['pivot.angle'\]: expected one name"):
+        model.waterfall("pivot.law.stiffness[0]", stiffness, OMEGA, names[0], [names[1]])  # type: ignore[arg-type]
     pytest.importorskip("matplotlib")
     found.plot(tmp_path / "waterfall.png")
     assert (tmp_path / "waterfall.png").stat().st_size > 10_000

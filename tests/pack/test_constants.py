@@ -56,6 +56,18 @@ def test_trajectories_side_by_side_end_steps_at_their_own_times() -> None:
         assert batch.q[i, -1] == pytest.approx(run.q[-1], abs=3e-7)
 
 
+def test_a_constant_that_others_cannot_follow_is_named() -> None:
+    """The others are said where they stand, as if the file had them so."""
+    there = rod().model_dump(by_alias=True)
+    model = mstmm.compile(Scene.from_data({**there, "constants": {"half": 0.5, "w": "1/half"}}))
+    with pytest.raises(SceneError, match=r"scene: constants\.w: expected a number.*by zero"):
+        model.with_parameters({"constants.half": 0.0})
+    with pytest.raises(
+        SceneError, match=r'"half": there is no such.*did you mean "constants.half"'
+    ):
+        model.with_parameters({"half": 0.6})
+
+
 def test_a_number_may_be_set_in_spite_of_its_constant() -> None:
     changed = mstmm.compile(rod()).with_parameters({"rod1.mass": 3.0})
     assert changed.parameters["rod1.mass"] == 3.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -113,6 +114,19 @@ def test_nodes_with_rotations() -> None:
     tip = found.ports["tip"]
     assert abs(tip.theta[1, 0] / tip.phi[2, 0]) == pytest.approx(1.3765, rel=1e-3)
     assert found.mass == pytest.approx(bar.MASS)
+
+
+def test_masses_in_nodes_with_rotations() -> None:
+    """Where rotations of nodes carry no mass, sums over the nodes are all moments."""
+    free = beam_model(elements=4)
+    lumps = np.array([0.5, 1, 2, 1, 0.5])
+    mass = sparse.csr_array(np.kron(np.diag(lumps), np.diag([1.0, 1, 1, 0, 0, 0])))
+    shapes = np.random.default_rng(6).normal(size=(30, 2))
+    found = moments(replace(free, mass=mass), shapes)
+    assert "all moments exact" in found.how and "not scalar" in moments(free, shapes).how
+    moved = shapes.reshape(5, 6, 2)[:, :3]
+    assert np.allclose(found.E, np.einsum("i,ia,ibk->abk", lumps, free.nodes, moved))
+    assert np.allclose(found.F, np.einsum("i,iak,ibl->abkl", lumps, moved, moved))
 
 
 def beam_model(elements: int) -> ElasticModel:
