@@ -42,7 +42,7 @@ def _function(op: str, *args: Formula) -> Formula:
 
 
 def _decided(op: str, *args: Formula) -> Formula:
-    """0, 1 or another number that the values alone decide."""
+    """0, 1 or another number that the values alone decide, as of branches that are not taken."""
     return formula(OPERATIONS[op].value(*(x.value for x in args)))
 
 
@@ -53,8 +53,16 @@ def _power(base: Formula, exponent: Formula) -> Formula:
     found = formula(1.0)
     for _ in range(abs(int(exponent.value))):
         found = found * base
-    found = 1 / found if exponent.value < 0 else found
+    found = _quotient(formula(1.0), found) if exponent.value < 0 else found
     return Formula(OPERATIONS["pow"].value(base.value, exponent.value), found.terms)
+
+
+def _quotient(a: Formula, b: Formula) -> Formula:
+    return a / b if b.value else _decided("div", a, b)
+
+
+def _root(x: Formula) -> Formula:
+    return root(x) if x.value >= 0 else _decided("sqrt", x)
 
 
 def _turn(angle: Formula) -> tuple[Formula, Formula]:
@@ -66,9 +74,9 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
     "mul": lambda a, b: a * b,
-    "div": lambda a, b: a / b,
+    "div": _quotient,
     "pow": _power,
-    "sqrt": root,
+    "sqrt": _root,
     "cos": lambda a: _turn(a)[0],
     "sin": lambda a: _turn(a)[1],
     "abs": abs,

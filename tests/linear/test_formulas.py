@@ -8,7 +8,9 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
+import sympy
 
+import mstmm
 from mstmm.bridge.expressions import Writer
 from mstmm.errors import SceneError
 from mstmm.ir import KernelIR, Port
@@ -95,6 +97,31 @@ def test_a_zero_in_symbols_is_no_zero() -> None:
     for wrong in (zero, zero - zero):
         with pytest.raises(TypeError):
             float(wrong)  # type: ignore[arg-type]
+
+
+def test_a_branch_that_is_not_taken_may_divide_by_zero() -> None:
+    """As doubles do: sin(x)/x and its like are series near 0, chosen by a comparison."""
+    graph = Graph()
+    x, y = graph.vector("p", 2)
+    near = graph.call("lt", x * x, 1e-8)
+    found = graph.call("select", near, y * 2, graph.call("sqrt", -y) / x)
+    kernel = graph.kernel("one", [Port("p", (2,))], [Port("r", (1,))], {"r": [found]})
+    y_symbol = Book(10).symbol("y", 3.0)
+    (taken,) = run(kernel, {"p": [0.0, y_symbol]}, FormulaArithmetic(), None)["r"]
+    assert taken == y_symbol * 2
+
+
+@pytest.mark.parametrize("hinge", ["ball", "elastic"])
+def test_springs_of_a_ball_at_rest(hinge: str) -> None:
+    """Swing and twist from a potential, at the place where its angle is 0."""
+    stiffness = [1.0, 1.5, 2.0, 2.0, 3.0, 4.0][-3 if hinge == "ball" else -6 :]
+    head = {"name": "head", "mass": 2.0, "center_of_mass": [0, 0, 0.5], "inertia": [1, 1, 1]}
+    neck = {"name": "neck", "type": hinge, "inboard": "ground", "outboard": "head",
+            "law": {"stiffness": stiffness}}  # fmt: skip
+    scene = mstmm.Scene(gravity=[0, 0, 0], body=[head], hinge=[neck])
+    names = [f"neck.law.stiffness[{k}]" for k in range(len(stiffness))]
+    found = mstmm.compile(scene, engine="looped").linearize().symbolic(names)
+    assert sympy.diag(*found.symbols.values()) == found.K
 
 
 @pytest.mark.parametrize(
