@@ -72,6 +72,22 @@ class Engine(Calls):
             raise self.not_finite(f"the effort of {name}", t, q, u)
         return efforts
 
+    def kinetic_energies(self, q: Array, speeds: Array) -> Array:
+        """(n, bodies) in J by place in the topology, rotors with the hinge's outboard, at q (nq,)
+        and n speeds (n, nu), O(bodies) each; drives are left out."""
+        engine, n, still = self.inertia_alone, len(speeds), np.zeros(self.nu)
+        energies = np.empty((n, self.packed.topology.count))
+        failure = self.ffi.new("mstmm_failure *")
+        given = (np.ascontiguousarray(x, dtype=np.float64) for x in (q, speeds))
+        memory, efforts = engine.start_memory(), np.empty(self.nu)
+        code = self.lib.mstmm_kinetic_energies(
+            engine.packed.model, engine.workspace(), n,
+            *map(self.pointer, (*given, memory, still, efforts, energies)), failure,
+        )  # fmt: skip
+        if code:
+            raise engine.failed(failure, 0.0, q, still)
+        return energies
+
     def mass_matrix(self, q: Array) -> Array:
         """(nu, nu) symmetric, of one state; driven coordinates as if free."""
         engine, still = self.inertia_alone, np.zeros(self.nu)

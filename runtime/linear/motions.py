@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from mstmm.arrays import Array, real
 from mstmm.errors import SceneError
 
-from . import files
+from . import files, shares
 
 if TYPE_CHECKING:
     from .equations import Equations
-    from .pencil import Pencil
 
 Complex = NDArray[np.complex128]
 
@@ -72,15 +71,8 @@ class Modes:
     @cached_property
     def _units(self) -> Array:
         """(k,) modal masses x* M x of the shapes."""
-        moved = self._weighed(lambda pencil: pencil.mass)
+        moved = shares.along(self.linear.pencil.mass, self.shapes)
         return np.real(np.einsum("ik,ik->k", np.conj(self.shapes), moved))
-
-    def _weighed(self, product: Callable[[Pencil], Callable[[Array], Array]]) -> NDArray[Any]:
-        """(n, k): an operator times every shape."""
-        times = product(self.linear.pencil)
-        columns = [times(x.real) + (1j * times(x.imag) if np.iscomplexobj(x) else 0.0)
-                   for x in self.shapes.T]  # fmt: skip
-        return np.array(columns).reshape(len(columns), len(self.linear)).T
 
     @cached_property
     def participation(self) -> NDArray[Any]:
@@ -96,25 +88,16 @@ class Modes:
         Over all undamped modes of a scene it adds up to the mass that moves."""
         return np.asarray(np.abs(self.participation) ** 2 * self._units[:, None])
 
+    def kinetic(self) -> dict[str, Array]:
+        """Body -> (k,): its part of the kinetic energy of each shape, x* M x; the rotors of a hinge
+        move with its outboard body."""
+        return shares.kinetic(self.linear, self.shapes)
+
     def strain(self) -> dict[str, Array]:
         """Owner -> (k,): its part of the elastic energy of each shape: hinges with their laws,
         flexible bodies, and "springs", all of them together, where there are any.  nan where a
         shape strains nothing."""
-        linear = self.linear
-        own, springs = (
-            np.real(np.conj(self.shapes) * (matrix @ self.shapes))
-            for matrix in (linear.elastic - linear.sprung, linear.sprung)
-        )
-        total = (own + springs).sum(axis=0)
-        with np.errstate(all="ignore"):
-            shares = np.where(np.abs(total) > 0, own / total, np.nan)
-        found: dict[str, Array] = {}
-        if linear.model.scene.spring:
-            found["springs"] = 1.0 - shares.sum(axis=0)
-        for name, row in zip(linear.coordinates, shares, strict=True):
-            owner = name.rpartition(".")[0]
-            found[owner] = found.get(owner, 0.0) + row
-        return found
+        return shares.strain(self.linear, self.shapes)
 
     def displaced(self, k: int, amplitude: float) -> Array:
         """q (nq,) of the state moved by `amplitude` times the real part of shape k."""
@@ -141,10 +124,14 @@ class Modes:
             "coordinates": list(self.linear.coordinates), "units": list(self.linear.units),
             "shapes": {"real": np.real(self.shapes).T.tolist(),
                        "imag": np.imag(self.shapes).T.tolist()},
+            "kinetic": {name: row.tolist() for name, row in self.kinetic().items()},
+            "strain": {name: [None if np.isnan(x) else x for x in row.tolist()]
+                       for name, row in self.strain().items()},
         }  # fmt: skip
 
     def to_dataset(self) -> Any:
         """`xarray.Dataset`, complex numbers in two parts.  EnvironmentFailure without the extra."""
+        kinetic, strain = self.kinetic(), self.strain()
         arrays: dict[str, Any] = {
             "omega": ("mode", self.omega, {"units": "rad/s"}),
             "frequency": ("mode", self.frequency, {"units": "Hz"}),
@@ -152,8 +139,13 @@ class Modes:
             "growth": ("mode", self.eigenvalues.real, {"units": "1/s"}),
             "shape": (("coordinate", "mode"), np.real(self.shapes)),
             "shape_imaginary": (("coordinate", "mode"), np.imag(self.shapes)),
+            "kinetic": (("body", "mode"), np.array(list(kinetic.values()))),
+            "strain": (("owner", "mode"), np.array(list(strain.values()))),
         }
-        names = {"mode": np.arange(1, len(self) + 1), "coordinate": list(self.linear.coordinates)}
+        names = {
+            "mode": np.arange(1, len(self) + 1), "coordinate": list(self.linear.coordinates),
+            "body": list(kinetic), "owner": list(strain),
+        }  # fmt: skip
         return files.xarray().Dataset(arrays, names, {"complete": str(self.complete)})
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
@@ -161,14 +153,18 @@ class Modes:
         parts = [np.real] if self.undamped else [np.real, np.imag]
         named = [name + " imaginary" * (part is np.imag) for part in parts
                  for name in self.linear.coordinates]  # fmt: skip
-        yield "mode", "omega [rad/s]", "frequency [Hz]", "damping", "growth [1/s]", *named
+        whose = ("kinetic energy", self.kinetic()), ("strain energy", self.strain())
+        shared = [f"{kind} of {name}" for kind, part in whose for name in part]
+        yield "mode", "omega [rad/s]", "frequency [Hz]", "damping", "growth [1/s]", *named, *shared
         about = self.omega, self.frequency, self.damping, self.eigenvalues.real
         for k, shape in enumerate(self.shapes.T):
-            numbers = [*(x[k] for x in about), *(x for part in parts for x in part(shape))]
+            numbers = [*(x[k] for x in about), *(x for part in parts for x in part(shape)),
+                       *(row[k] for _, part in whose for row in part.values())]  # fmt: skip
             yield str(k + 1), *(repr(float(x)) for x in numbers)
 
     def save(self, path: str | Path) -> Path:
-        """Frequencies, damping and shapes: .nc (extra io) or .csv, a row for each motion.
+        """Frequencies, damping, shapes and shares of energy: .nc (extra io) or .csv, a row for each
+        motion.
 
         Raises SceneError for another ending, EnvironmentFailure without the extra.
         """

@@ -15,12 +15,13 @@ from ..options import Elements, Json, at_least, output_file, positive
 from ..simulate import compiled, use_files
 
 if TYPE_CHECKING:
+    from mstmm.arrays import Array
     from mstmm.runtime.linear.linear import Linear
     from mstmm.runtime.linear.motions import Modes
     from mstmm.runtime.model.model import Model
 
-#: Rows of tables on the terminal, and coordinates that a mode's row names.
-_ROWS, _NAMED = 20, 3
+#: Rows of tables on the terminal; coordinates and bodies that a mode's row names.
+_ROWS, _NAMED, _OWNERS = 20, 3, 2
 
 SceneFile = Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")]
 AtStart = Annotated[
@@ -112,15 +113,16 @@ def modes(
         terminal.emit_json({"scene": scene, **found.to_dict(), "file": output})
         return
     _tell_of(linear)
-    head = ["mode>", "frequency in Hz>", "omega in rad/s>", "damping>", "moves most"]
+    head = ["mode>", "Hz>", "rad/s>", "damping>", "moves most", "kinetic energy"]
+    carried = found.first(_ROWS).kinetic()
     rows = [
         [str(k + 1), f"{found.frequency[k]:.6g}", f"{found.omega[k]:.6g}",
-         f"{found.damping[k]:.4g}", ", ".join(found.moving(k)[:_NAMED])]
-        for k in range(len(found))
+         f"{found.damping[k]:.4g}", ", ".join(found.moving(k)[:_NAMED]), _most(carried, k)]
+        for k in range(min(_ROWS, len(found)))
     ]  # fmt: skip
-    terminal.console().print(terminal.table("", head, rows[:_ROWS]))
-    if len(rows) > _ROWS:
-        terminal.say(f"and {len(rows) - _ROWS} more: --count N, or --output FILE.csv")
+    terminal.console().print(terminal.table("", head, rows))
+    if len(found) > _ROWS:
+        terminal.say(f"and {len(found) - _ROWS} more: --count N, or --output FILE.csv")
     terminal.say(_counted(found) if len(found) else "nothing moves in this scene")
     _where(output, "")
 
@@ -232,6 +234,12 @@ def _tell_of(linear: Linear) -> None:
 
     for text in linear.warnings if len(linear) <= 2000 else ():
         terminal.note(f"warning: {text}")
+
+
+def _most(shares: dict[str, Array], k: int) -> str:
+    """The owners of the largest shares of motion k."""
+    largest = sorted(shares, key=lambda name: -float(shares[name][k]))[:_OWNERS]
+    return ", ".join(f"{name} {float(shares[name][k]):.0%}" for name in largest)
 
 
 def _counted(found: Modes) -> str:

@@ -70,32 +70,43 @@ static void observe_hinges(const mstmm_state *state, const real *udot,
     }
 }
 
+/* Kinetic energy of a body with the rotors of its inboard hinge, and what it comes from: its inertia
+ * and, of a flexible one, its momentum. */
+static real kinetic_energy(mstmm_state *state, int i, real *inertia, real *momentum)
+{
+    const mstmm_body *body = &state->model->bodies[i];
+    const real *block = state->workspace + body->block;
+    real sum, energy;
+    if (body->modal) {
+        mstmm_at_momentum(state, i, inertia, momentum, &sum);
+    } else {
+        mstmm_body_inertia(body->kernels->inertia, .p = body->body_p, .S = inertia);
+        mstmm_body_energy(body->kernels->energy, .p = body->body_p, .v = block + MSTMM_BLOCK_V,
+                          .w = block + MSTMM_BLOCK_MOTION, .T = &sum);
+    }
+    for (int j = 0; j < body->nu; j++) {
+        mstmm_frames_rotor_energy(.J = body->rotor + j, .u = state->u + body->u + j, .T = &energy);
+        sum += energy;
+    }
+    return sum;
+}
+
 static void observe_sums(mstmm_state *state, const mstmm_balance *balance, real *sums)
 {
     const mstmm_model *model = state->model;
     memset(sums, 0, MSTMM_SUM_NUMBERS * sizeof(real));
     for (int i = 0; i < model->n_bodies; i++) {
-        const mstmm_body *body = &model->bodies[i];
-        const real *block = state->workspace + body->block;
+        const real *block = state->workspace + model->bodies[i].block;
         const real *a = block + MSTMM_BLOCK_A, *x = block + MSTMM_BLOCK_X;
         const real *v = block + MSTMM_BLOCK_V, *w = block + MSTMM_BLOCK_MOTION;
         real inertia[21], momentum[6], energy;
-        if (body->modal) {
-            mstmm_at_momentum(state, i, inertia, momentum, &energy);
+        sums[0] += kinetic_energy(state, i, inertia, momentum);
+        if (model->bodies[i].modal)
             mstmm_frames_carried_momentum(.A = a, .x = x, .h = momentum, .p = sums + 4,
                                           .L = sums + 7);
-        } else {
-            mstmm_body_inertia(body->kernels->inertia, .p = body->body_p, .S = inertia);
-            mstmm_body_energy(body->kernels->energy, .p = body->body_p, .v = v, .w = w, .T = &energy);
+        else
             mstmm_frames_momentum(.S = inertia, .A = a, .x = x, .v = v, .w = w, .L = sums + 4,
                                   .K = sums + 7);
-        }
-        sums[0] += energy;
-        for (int j = 0; j < body->nu; j++) {
-            mstmm_frames_rotor_energy(.J = body->rotor + j, .u = state->u + body->u + j,
-                                      .T = &energy);
-            sums[0] += energy;
-        }
         mstmm_frames_gravity_energy(.S = inertia, .A = a, .x = x, .gravity = model->gravity,
                                     .V = &energy);
         sums[1] += energy;
@@ -141,6 +152,23 @@ int mstmm_observe_many(const mstmm_model *model, real *workspace, int64_t n, con
         if (code) return code;
     }
     return 0;
+}
+
+int mstmm_kinetic_energies(const mstmm_model *model, real *workspace, int64_t n, const real *q,
+                           const real *u, const real *memory, const real *still, real *efforts,
+                           real *energies, mstmm_failure *failure)
+{
+    int code = 0;
+    for (int64_t k = 0; k < n && !code; k++) {
+        mstmm_state state = state_of(model, workspace, 0, memory, failure);
+        real inertia[21], momentum[6];
+        code = mstmm_inverse_dynamics(model, workspace, 0, q, u + k * model->nu, memory, still,
+                                      efforts, failure);
+        if (!code) code = complete(&state, q, u + k * model->nu);
+        for (int i = 0; i < model->n_bodies && !code; i++)
+            energies[k * model->n_bodies + i] = kinetic_energy(&state, i, inertia, momentum);
+    }
+    return code;
 }
 
 int mstmm_accelerations_many(const mstmm_model *model, real *workspace, int64_t n, const real *t,

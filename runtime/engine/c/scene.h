@@ -37,6 +37,11 @@ int mstmm_observe(const mstmm_model *model, real *workspace, real t, const real 
 int mstmm_observe_many(const mstmm_model *model, real *workspace, int64_t n, const real *t,
                        const real *q, const real *u, const real *memory,
                        const mstmm_observation *wanted, mstmm_failure *failure, int64_t *failed_at);
+/* Kinetic energy (n x n_bodies) of every body, with the rotors of its inboard hinge, at one q and n
+ * speeds; `still` are nu zeros, `efforts` nu numbers of room. */
+int mstmm_kinetic_energies(const mstmm_model *model, real *workspace, int64_t n, const real *q,
+                           const real *u, const real *memory, const real *still, real *efforts,
+                           real *energies, mstmm_failure *failure);
 /* Accelerations of n states one after the other. */
 int mstmm_accelerations_many(const mstmm_model *model, real *workspace, int64_t n, const real *t,
                              const real *q, const real *u, const real *memory,

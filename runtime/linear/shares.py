@@ -1,0 +1,92 @@
+"""Whose energy a motion is: bodies carry it, laws and shapes store it.
+
+Of a shape x the kinetic part of body b is x* M_b x over x* M x, where M_b is the mass matrix of the
+scene with the inertia of that body alone; the elastic part of coordinate j is conj(x_j) (K_e x)_j
+over x* K_e x.  Both come from passes over the bodies, without a matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arrays import Array
+
+from .pencil import Pencil
+from .standing import with_held_springs, without_laws
+
+if TYPE_CHECKING:
+    from .equations import Equations
+
+
+def along(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[Any]:
+    """(n, k): a real operator times every shape, complex ones in two parts."""
+    columns = [
+        product(x.real) + (1j * product(x.imag) if np.iscomplexobj(x) else 0.0) for x in shapes.T
+    ]
+    return np.array(columns).reshape(len(columns), len(shapes)).T
+
+
+def kinetic(linear: Equations, shapes: NDArray[Any]) -> dict[str, Array]:
+    """Body -> (k,): its part of each shape's kinetic energy."""
+    engine, parts = linear.model.looped, [shapes.real]
+    if np.iscomplexobj(shapes):
+        parts.append(shapes.imag)
+    energies = np.zeros((shapes.shape[1], engine.packed.topology.count))
+    for part in parts:
+        speeds = np.zeros((shapes.shape[1], engine.nu))
+        speeds[:, list(linear.free)] = part.T
+        energies += engine.kinetic_energies(linear.state.q, speeds)
+    names = [engine.body_name(place).partition("/")[0] for place in range(energies.shape[1])]
+    return _parts(names, energies.T)
+
+
+def strain(linear: Equations, shapes: NDArray[Any]) -> dict[str, Array]:
+    """Owner of coordinates, or "springs" -> (k,): its part of each shape's elastic energy."""
+    whole, lawless, held = (
+        along(_pressed(linear, engine), shapes)
+        for engine in (
+            linear.model.looped,
+            without_laws(linear.model.looped),
+            with_held_springs(linear.model.looped, linear.state),
+        )
+    )
+    own = np.real(np.conj(shapes) * (whole - lawless + _by_shapes(linear, shapes)))
+    names = [name.rpartition(".")[0] for name in linear.coordinates]
+    if not linear.model.scene.spring:
+        return _parts(names, own)
+    sprung = np.real(np.conj(shapes) * (lawless - held)).sum(axis=0)
+    return _parts([*names, "springs"], np.vstack([own, sprung]))
+
+
+def _pressed(linear: Equations, engine: Any) -> Callable[[Array], Array]:
+    """K x of a scene, x' = G x + du."""
+    pencil, turning = Pencil(engine, linear.state, list(linear.free)), linear.turning
+    if turning is None:
+        return pencil.stiffness
+    return lambda x: pencil.stiffness(x) - pencil.damping(turning @ x)
+
+
+def _by_shapes(linear: Equations, x: NDArray[Any]) -> NDArray[Any]:
+    """(n, k): the stiffness of flexible bodies times x."""
+    model = linear.model
+    moved = np.zeros((model.nu, x.shape[1]), dtype=x.dtype)
+    moved[list(linear.free)] = x
+    pressed = np.zeros_like(moved)
+    for name, slots in model.layout.modal.items():
+        pressed[slots.u_slice] = model.flexible[name].K @ moved[slots.u_slice]
+    return pressed[list(linear.free)]
+
+
+def _parts(names: Iterable[str], energies: Array) -> dict[str, Array]:
+    """Sums of rows (k,) by name over the sum of all; nan where there is none."""
+    found: dict[str, Array] = {}
+    for name, row in zip(names, energies, strict=True):
+        found[name] = found[name] + row if name in found else row
+    total = energies.sum(axis=0)
+    with np.errstate(all="ignore"):
+        return {name: np.where(np.abs(total) > 0, row / total, np.nan)
+                for name, row in found.items()}  # fmt: skip
