@@ -15,6 +15,14 @@ from mstmm.errors import EnvironmentFailure, SceneError
 from .lock import held_by_nobody, locked
 
 
+def path_of(given: Any) -> Path:
+    """The path that a name or a path-like object is; SceneError for anything else."""
+    try:
+        return Path(given)
+    except TypeError:
+        raise SceneError(f'file {given!r}: expected a path, such as "out.csv"') from None
+
+
 def refuse_special(path: Path, where: str) -> None:
     """SceneError for a folder, a device or a named pipe, which a reader would wait on for ever.
 

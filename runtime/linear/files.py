@@ -12,7 +12,7 @@ import numpy as np
 from mstmm.errors import SceneError
 from mstmm.extras import missing
 
-from ..host.files import replacing, seal
+from ..host.files import path_of, replacing, seal
 
 if TYPE_CHECKING:
     from .state_space import StateSpace
@@ -70,8 +70,10 @@ def entries(linear: StateSpace) -> Iterator[tuple[str, ...]]:
             yield key, along[row][i], along[column][j], repr(float(values[i, j]))
 
 
-def save(path: Path, dataset: Callable[[], Any], rows: Iterator[tuple[str, ...]]) -> Path:
-    """Write a data set, made by `dataset()`, to .nc or rows to .csv."""
+def save(given: str | Path, dataset: Callable[[], Any], rows: Iterator[tuple[str, ...]]) -> Path:
+    """Write a data set, made by `dataset()`, to .nc or rows to .csv.  SceneError for another
+    ending, EnvironmentFailure without the extra."""
+    path = path_of(given)
     ending = path.suffix.lower()
     if ending not in (".nc", ".csv"):
         raise SceneError(f'file "{path}": expected a name that ends in .nc or .csv')

@@ -92,6 +92,16 @@ class Linear(StateSpace):
 
         return to_control(self, outputs, disturbances)
 
+    def plot(self, path: str | Path | None = None) -> Any:
+        """`matplotlib.figure.Figure`: M, C and K as maps, a row and a column for each coordinate,
+        colours by sign and size; written to `path` where it is given.
+
+        Raises SceneError where nothing moves, EnvironmentFailure without the extra `plot`.
+        """
+        from .pictures.matrices import matrices
+
+        return matrices(self, path)
+
     def to_dict(self) -> dict[str, Any]:
         """Names, state and matrices, for JSON."""
         from .files import dictionary
@@ -106,4 +116,4 @@ class Linear(StateSpace):
         """
         from .files import dataset, entries, save
 
-        return save(Path(path), lambda: dataset(self), entries(self))
+        return save(path, lambda: dataset(self), entries(self))

@@ -57,11 +57,10 @@ class Locus:
 
         Raises EnvironmentFailure without the extra `plot`.
         """
-        from .pictures import locus
+        from .pictures.curves import locus
 
         lines = np.atleast_1d(numbers("orders", orders)).tolist()
-        to = None if path is None else Path(path)
-        return locus(self.parameter, self.values, self.eigenvalues, to, lines)
+        return locus(self.parameter, self.values, self.eigenvalues, path, lines)
 
 
 def traced(at: At, parameter: str, values: Array, count: int | None, damped: bool | None) -> Locus:

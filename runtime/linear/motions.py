@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -18,6 +18,9 @@ from . import files, shares
 
 if TYPE_CHECKING:
     from .equations import Equations
+
+#: Shapes in a picture unless others are asked for.
+_PANELS = 6
 
 Complex = NDArray[np.complex128]
 
@@ -168,7 +171,37 @@ class Modes:
 
         Raises SceneError for another ending, EnvironmentFailure without the extra.
         """
-        return files.save(Path(path), self.to_dataset, self._rows())
+        return files.save(path, self.to_dataset, self._rows())
+
+    def plot(self, path: str | Path | None = None, which: Sequence[int] | None = None) -> Any:
+        """`matplotlib.figure.Figure`: the scene at rest and displaced by the real part of each
+        shape of `which`, counted from 0, the first six unless given, in the coordinate plane that
+        shows most of it; written to `path` where it is given.
+
+        Raises SceneError for a shape that is not there, EnvironmentFailure without the extra
+        `plot`.
+        """
+        from .pictures.shapes import shapes
+
+        if which is None:
+            which = range(min(_PANELS, len(self)))
+        elif isinstance(which, str) or not isinstance(which, Sequence) or not 0 < len(which) <= 12:
+            raise SceneError(
+                f"which = {which!r}: expected a list of 1 to 12 shapes, such as [0, 2]"
+            )
+        for k in which:
+            self._shape(k)
+        return shapes(self.linear, self.eigenvalues, self.shapes, which, path)
+
+    def plot_eigenvalues(self, path: str | Path | None = None) -> Any:
+        """`matplotlib.figure.Figure`: eigenvalues by growth in 1/s and angular frequency in rad/s,
+        with lines of equal damping; written to `path` where it is given.
+
+        Raises EnvironmentFailure without the extra `plot`.
+        """
+        from .pictures.shapes import eigenvalues
+
+        return eigenvalues(self.eigenvalues, path)
 
     @property
     def growing(self) -> NDArray[np.bool_]:

@@ -80,17 +80,17 @@ class FrequencyResponse:
 
         Raises EnvironmentFailure without the extra `plot`.
         """
-        from .pictures import bode
+        from .pictures.curves import bode
 
         units = {f"{y}/{u}" for y in self.output_units for u in self.input_units}
         unit = units.pop() if len(units) == 1 else ""
-        return bode(self.frequency, *self._curves(), unit, None if path is None else Path(path))
+        return bode(self.frequency, *self._curves(), unit, path)
 
     def nyquist(self, path: str | Path | None = None) -> Any:
         """`matplotlib.figure.Figure`, Nyquist's: the same in the complex plane."""
-        from .pictures import nyquist
+        from .pictures.curves import nyquist
 
-        return nyquist(*self._curves(), None if path is None else Path(path))
+        return nyquist(*self._curves(), path)
 
     def _curves(self) -> tuple[Complex, list[str]]:
         """(k, curves) and what each is."""
@@ -133,7 +133,7 @@ class FrequencyResponse:
 
         Raises SceneError for another ending, EnvironmentFailure without the extra.
         """
-        return files.save(Path(path), self.to_dataset, self._rows())
+        return files.save(path, self.to_dataset, self._rows())
 
 
 def frequency_response(

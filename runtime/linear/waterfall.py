@@ -37,10 +37,10 @@ class Waterfall:
 
         Raises EnvironmentFailure without the extra `plot`.
         """
-        from .pictures import waterfall
+        from .pictures.curves import waterfall
 
-        to = None if path is None else Path(path)
-        return waterfall(self.omega / (2 * np.pi), self.points, self.values, self.parameter, to)
+        frequency = self.omega / (2 * np.pi)
+        return waterfall(frequency, self.points, self.values, self.parameter, path)
 
 
 def waterfall(

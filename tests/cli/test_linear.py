@@ -49,6 +49,15 @@ def test_answers_are_told_drawn_and_written(mstmm: Command, folder: Path) -> Non
     assert data["frequency"] == pytest.approx([0.1, 7.0]) and len(data["inputs"]) == 3
 
 
+@pytest.mark.parametrize("command", ["modes", "linearize"])
+def test_pictures_of_both(mstmm: Command, folder: Path, command: str) -> None:
+    pytest.importorskip("matplotlib")
+    done = mstmm(command, "pendulum.toml", "--plot", "of.png")
+    assert done.code == 0, done.err
+    assert "drawn: of.png" in done.out and (folder / "of.png").stat().st_size > 10_000
+    assert json.loads(mstmm(command, "pendulum.toml", "--plot", "of.svg", "--json").out)["plot"]
+
+
 def test_json_of_both(mstmm: Command) -> None:
     modes = json.loads(mstmm("modes", "pendulum.toml", "--json", "--count", "5").out)
     assert modes["omega"] == [pytest.approx(OMEGA)] and modes["complete"] is True
@@ -75,6 +84,11 @@ def test_netcdf_of_both(mstmm: Command) -> None:
         (["linearize", "pendulum.toml", "-i", "pivot.efort"], 'did you mean "pivot.effort"'),
         (["modes", "pendulum.toml", "--set", "pivot.law"], "expected NAME=VALUE"),
         (["modes", "pendulum.toml", "--set", "rod.mas=2"], "rod.mass"),
+        (
+            ["modes", "pendulum.toml", "--set", "rod.mass=2", "--set", "rod.mass = 3"],
+            "rod.mass is set to 2 already",
+        ),
+        (["modes", "pendulum.toml", "--plot", "x.gif"], ".png or .svg or .pdf"),
         (["modes", "pendulum.toml", "--count", "0"], "--count"),
         (["modes", "pendulum.toml", "-o", "modes.txt"], ".nc or .csv"),
         (["modes", "none.toml"], "none.toml"),

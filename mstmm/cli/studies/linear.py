@@ -3,41 +3,22 @@ and answers to harmonic pushes."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mstmm.errors import MstmmError
 
-from ..extras import need_for
-from ..options import Elements, Json, at_least, output_file, positive
-from ..simulate import compiled, use_files
+from ..options import Elements, Json, at_least, positive
+from .asked import Asked, AtStart, Output, Plot, SceneFile, Set
 
 if TYPE_CHECKING:
     from mstmm.arrays import Array
     from mstmm.runtime.linear.linear import Linear
     from mstmm.runtime.linear.motions import Modes
-    from mstmm.runtime.model.model import Model
 
 #: Rows of tables on the terminal; coordinates and bodies that a mode's row names.
 _ROWS, _NAMED, _OWNERS = 20, 3, 2
-
-SceneFile = Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")]
-AtStart = Annotated[
-    bool,
-    typer.Option("--at-start", help="At the scene's start with its speeds, not at rest."),
-]  # fmt: skip
-Set = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Another number of the scene, such as "
-                 "rod1.mass=2; may be repeated."),
-]  # fmt: skip
-Output = Annotated[
-    str | None,
-    typer.Option("--output", "-o", metavar="FILE", help="File for the numbers, .nc or .csv."),
-]  # fmt: skip
-_ENDINGS = (".nc", ".csv")
 
 
 def linearize(
@@ -50,19 +31,16 @@ def linearize(
     at_start: AtStart = False,
     change: Set = None,
     output: Output = None,
+    plot: Plot = None,
     hinge: Elements = None,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Make a scene linear near its rest: M x'' + C x' + K x = V v + W w."""
     from .. import output as terminal
 
-    file = _file(output)
-    use_files(hinge or [])
-    linear = _linear(_model(scene, change or []), inputs or [], at_start)
-    if file is not None:
-        linear.save(file)
-    if json:
-        terminal.emit_json({"scene": scene, **linear.to_dict(), "file": output})
+    asked = Asked(scene, at_start, change, output, plot, hinge, json)
+    linear = asked.linear(inputs)
+    if asked.answered(linear):
         return
     _tell_of(linear)
     terminal.say(
@@ -80,7 +58,7 @@ def linearize(
     terminal.console().print(terminal.table("", head, rows[:_ROWS]))
     if len(rows) > _ROWS:
         terminal.say(f"and {len(rows) - _ROWS} more")
-    _where(output, "all matrices: --output FILE.csv or .nc, or --json")
+    asked.say_where("all matrices: --output FILE.csv or .nc, or --json")
 
 
 def modes(
@@ -96,21 +74,18 @@ def modes(
     at_start: AtStart = False,
     change: Set = None,
     output: Output = None,
+    plot: Plot = None,
     hinge: Elements = None,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Natural motions of a scene near its rest: frequency, damping, and what moves."""
     from .. import output as terminal
 
-    file = _file(output)
-    use_files(hinge or [])
-    linear = _linear(_model(scene, change or []), [], at_start)
+    asked = Asked(scene, at_start, change, output, plot, hinge, json)
+    linear = asked.linear(None)
     most = None if count is None or not len(linear) else min(count, len(linear))
     found = linear.modes(most, False if undamped else None)
-    if file is not None:
-        found.save(file)
-    if json:
-        terminal.emit_json({"scene": scene, **found.to_dict(), "file": output})
+    if asked.answered(found):
         return
     _tell_of(linear)
     head = ["mode>", "Hz>", "rad/s>", "damping>", "moves most", "kinetic energy"]
@@ -124,7 +99,7 @@ def modes(
     if len(found) > _ROWS:
         terminal.say(f"and {len(found) - _ROWS} more: --count N, or --output FILE.csv")
     terminal.say(_counted(found) if len(found) else "nothing moves in this scene")
-    _where(output, "")
+    asked.say_where("")
 
 
 def frf(
@@ -154,10 +129,7 @@ def frf(
     at_start: AtStart = False,
     change: Set = None,
     output: Output = None,
-    plot: Annotated[
-        str | None,
-        typer.Option("--plot", metavar="FILE", help="Bode's picture: .png, .svg or .pdf."),
-    ] = None,
+    plot: Plot = None,
     hinge: Elements = None,
     json: Json = False,
 ) -> None:  # fmt: skip
@@ -168,20 +140,11 @@ def frf(
 
     if not most > least:
         raise MstmmError(f"--from {least:g} --to {most:g}: expected a range that rises")
-    file = _file(output)
-    drawn = None if plot is None else output_file(plot, (".png", ".svg", ".pdf"), "--plot")
-    if drawn is not None:
-        need_for(drawn, "--plot")
-    use_files(hinge or [])
-    linear = _linear(_model(scene, change or []), inputs or [], at_start)
+    asked = Asked(scene, at_start, change, output, plot, hinge, json)
+    linear = asked.linear(inputs)
     omega = 2 * np.pi * np.geomspace(least, most, points)
     found = linear.frequency_response(omega, outputs=outputs)
-    if file is not None:
-        found.save(file)
-    if drawn is not None:
-        found.plot(drawn)
-    if json:
-        terminal.emit_json({"scene": scene, **found.to_dict(), "file": output, "plot": plot})
+    if asked.answered(found):
         return
     _tell_of(linear)
     head = ["output", "input", "largest magnitude>", "at Hz>"]
@@ -195,38 +158,7 @@ def frf(
     terminal.console().print(terminal.table("", head, rows[:_ROWS]))
     if len(rows) > _ROWS:
         terminal.say(f"and {len(rows) - _ROWS} more")
-    _where(output, "" if plot else "all of it: --output FILE.csv or .nc, --plot FILE.png or --json")
-    if plot is not None:
-        terminal.say(f"drawn: {plot}")
-
-
-def _file(output: str | None) -> Path | None:
-    if output is None:
-        return None
-    path = output_file(output, _ENDINGS)
-    need_for(path, "--output")
-    return path
-
-
-def _model(scene: str, changes: list[str]) -> Model:
-    import mstmm
-
-    numbers: dict[str, float] = {}
-    for text in changes:
-        name, equals, value = text.partition("=")
-        try:
-            numbers[name.strip()] = float(value)
-        except ValueError:
-            equals = ""
-        if not equals:
-            raise MstmmError(f'--set {text}: expected NAME=VALUE, such as "rod1.mass=2"')
-    model = compiled(scene, mstmm.load_scene(scene), engine="looped")
-    return model.with_parameters(numbers) if numbers else model
-
-
-def _linear(model: Model, inputs: list[str], at_start: bool) -> Linear:
-    state = model.initial_state() if at_start else (None, None)
-    return model.linearize(*state, inputs=inputs)
+    asked.say_where("all of it: --output FILE.csv or .nc, --plot FILE.png or --json")
 
 
 def _tell_of(linear: Linear) -> None:
@@ -248,12 +180,3 @@ def _counted(found: Modes) -> str:
     if found.complete:
         return "none is missing below the last: counted"
     return "some below the last are missing; ask for more: --count N"
-
-
-def _where(output: str | None, other: str) -> None:
-    from .. import output as terminal
-
-    if output is not None:
-        terminal.say(f"written: {output}")
-    elif other:
-        terminal.say(other)

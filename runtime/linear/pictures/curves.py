@@ -10,49 +10,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.arrays import Array
-from mstmm.errors import SceneError
-from mstmm.extras import missing
 
-from ..host.files import replacing
+from .figure import figure, refuse_none, settled, write
 
 #: Frequencies that reach further than this stand on a logarithmic scale.
 _DECADES = 30.0
 
-_FORMATS = (".png", ".svg", ".pdf")
-
-
-def figure(height: float = 4.5) -> Any:
-    """An empty figure.  EnvironmentFailure without the extra."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise missing("plot", "a picture", error) from None
-    return Figure(figsize=(7.5, height), layout="constrained")
-
-
-def write(made: Any, path: Path | None) -> None:
-    """The figure into a file; its ending says how.  SceneError for another ending."""
-    if path is None:
-        return
-    if path.suffix.lower() not in _FORMATS:
-        raise SceneError(f'picture "{path}": expected a name ending in {", ".join(_FORMATS)}')
-    with replacing(path) as temporary:
-        made.savefig(temporary, dpi=150, format=path.suffix[1:].lower())
-
 
 def locus(
-    parameter: str, x: Array, eigenvalues: NDArray[Any], path: Path | None, orders: Sequence[float]
+    parameter: str,
+    x: Array,
+    eigenvalues: NDArray[Any],
+    path: str | Path | None,
+    orders: Sequence[float],
 ) -> Any:
-    """Frequencies above, growth below; what grows is red."""
-    made = figure(6.0)
-    above, below = made.subplots(2, 1, sharex=True, height_ratios=[2, 1])
+    """Frequencies and, where anything grows or decays, growth below; what grows is red."""
     frequencies = np.abs(eigenvalues.imag) / (2 * np.pi)
-    for frequency, growth in zip(frequencies.T, eigenvalues.real.T, strict=True):
-        (line,) = above.plot(x, frequency, color="0.25", lw=1.2)
-        below.plot(x, growth, color=line.get_color(), lw=1.2)
-        unstable = growth > 0
-        above.plot(x[unstable], frequency[unstable], ".", color="tab:red", ms=4)
-        below.plot(x[unstable], growth[unstable], ".", color="tab:red", ms=4)
+    parts = [("frequency in Hz", frequencies), ("growth in 1/s", eigenvalues.real)]
+    if not np.nan_to_num(eigenvalues.real).any():
+        parts = parts[:1]
+    made = figure(6.0 if len(parts) > 1 else 4.5)
+    axes = made.subplots(len(parts), 1, sharex=True, height_ratios=[2, 1][: len(parts)],
+                         squeeze=False)[:, 0]  # fmt: skip
+    for axis, (label, columns) in zip(axes, parts, strict=True):
+        for column, growth in zip(columns.T, eigenvalues.real.T, strict=True):
+            axis.plot(x, column, color="0.25", lw=1.2)
+            axis.plot(x[growth > 0], column[growth > 0], ".", color="tab:red", ms=4)
+        axis.set_ylabel(label)
+    above = axes[0]
     top = np.nanmax(frequencies, initial=0.0)
     for order in orders:
         above.plot(x, order * x / (2 * np.pi), color="tab:blue", lw=0.8, ls="--")
@@ -63,28 +48,24 @@ def locus(
                 fontsize=8, ha="left", va="center", xytext=(4, 0), textcoords="offset points",
             )  # fmt: skip
     above.set_ylim(0, 1.05 * top if top > 0 else None)
-    above.set_ylabel("frequency in Hz")
-    below.axhline(0, color="0.7", lw=0.8)
-    if not eigenvalues.real.any():
-        below.set_ylim(-1, 1)
-    below.set_ylabel("growth in 1/s")
-    below.set_xlabel(parameter)
-    _settled(above, below)
+    for below in axes[1:]:
+        below.axhline(0, color="0.7", lw=0.8)
+    axes[-1].set_xlabel(parameter)
+    settled(*axes)
     write(made, path)
     return made
 
 
-def _refuse_none(values: NDArray[Any]) -> None:
-    if not values.shape[1]:
-        raise SceneError("nothing moves in this scene, so that there is nothing to draw")
-
-
 def bode(
-    frequency: Array, values: NDArray[Any], labels: Sequence[str], units: str, path: Path | None
+    frequency: Array,
+    values: NDArray[Any],
+    labels: Sequence[str],
+    units: str,
+    path: str | Path | None,
 ) -> Any:
     """Magnitude above, phase below, over the frequency in Hz; a curve for each column of `values`
     (k, curves)."""
-    _refuse_none(values)
+    refuse_none(values)
     made = figure(6.0)
     above, below = made.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     order = np.argsort(frequency, kind="stable")
@@ -98,14 +79,14 @@ def bode(
     below.yaxis.set_major_locator(_every_right_angle())
     if len(labels) > 1 or labels[0]:
         above.legend(fontsize=8, frameon=False)
-    _settled(above, below)
+    settled(above, below)
     write(made, path)
     return made
 
 
-def nyquist(values: NDArray[Any], labels: Sequence[str], path: Path | None) -> Any:
+def nyquist(values: NDArray[Any], labels: Sequence[str], path: str | Path | None) -> Any:
     """Curves (k, curves) in the complex plane."""
-    _refuse_none(values)
+    refuse_none(values)
     made = figure(5.5)
     axis = made.subplots()
     for curve, label in zip(values.T, labels, strict=True):
@@ -116,13 +97,13 @@ def nyquist(values: NDArray[Any], labels: Sequence[str], path: Path | None) -> A
     axis.set_xlabel("real part")
     axis.set_ylabel("imaginary part")
     axis.legend(fontsize=8, frameon=False)
-    _settled(axis)
+    settled(axis)
     write(made, path)
     return made
 
 
 def waterfall(
-    frequency: Array, rows: Array, values: NDArray[Any], about: str, path: Path | None
+    frequency: Array, rows: Array, values: NDArray[Any], about: str, path: str | Path | None
 ) -> Any:
     """Magnitudes (rows, k) as colours over the frequency in Hz and another number."""
     made = figure(5.0)
@@ -143,9 +124,3 @@ def _every_right_angle() -> Any:
     from matplotlib.ticker import MaxNLocator
 
     return MaxNLocator(nbins=6, steps=[1, 1.8, 3, 4.5, 9, 10])
-
-
-def _settled(*axes: Any) -> None:
-    for axis in axes:
-        axis.grid(alpha=0.3, which="both", lw=0.5)
-        axis.spines[["top", "right"]].set_visible(False)

@@ -1,0 +1,137 @@
+"""What `mstmm linearize`, `mstmm modes` and `mstmm frf` have in common: where a scene is made
+linear, and what becomes of the answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
+
+import typer
+
+from mstmm.errors import MstmmError
+
+from ..extras import need_for
+from ..options import output_file
+from ..simulate import compiled, use_files
+
+if TYPE_CHECKING:
+    from mstmm.runtime.linear.linear import Linear
+    from mstmm.runtime.model.model import Model
+
+SceneFile = Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")]
+AtStart = Annotated[
+    bool,
+    typer.Option("--at-start", help="At the scene's start with its speeds, not at rest."),
+]  # fmt: skip
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Another number of the scene, such as "
+                 "rod1.mass=2; may be repeated."),
+]  # fmt: skip
+Output = Annotated[
+    str | None,
+    typer.Option("--output", "-o", metavar="FILE", help="File for the numbers, .nc or .csv."),
+]  # fmt: skip
+Plot = Annotated[
+    str | None,
+    typer.Option("--plot", metavar="FILE", help="A picture of it: .png, .svg or .pdf."),
+]  # fmt: skip
+_ENDINGS, _PICTURES = (".nc", ".csv"), (".png", ".svg", ".pdf")
+
+
+class Answer(Protocol):
+    """What linear models and what follows from them can do."""
+
+    def save(self, path: str | Path) -> Path:
+        """Numbers into a file."""
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """A picture of it."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it for JSON."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The options that all three commands take."""
+
+    scene: str
+    at_start: bool
+    change: list[str] | None
+    output: str | None
+    plot: str | None
+    hinge: list[str] | None
+    json: bool
+
+    def linear(self, inputs: list[str] | None) -> Linear:
+        """The scene made linear; before that every file that it will write is checked."""
+        self._file()
+        self._picture()
+        use_files(self.hinge or [])
+        model = _changed(self.scene, self.change or [])
+        state = model.initial_state() if self.at_start else (None, None)
+        return model.linearize(*state, inputs=inputs or [])
+
+    def _file(self) -> Path | None:
+        return _checked(self.output, _ENDINGS, "--output")
+
+    def _picture(self) -> Path | None:
+        return _checked(self.plot, _PICTURES, "--plot")
+
+    def answered(self, answer: Answer) -> bool:
+        """The files written; with --json the answer told, and nothing is left to say."""
+        from .. import output as terminal
+
+        file, picture = self._file(), self._picture()
+        if file is not None:
+            answer.save(file)
+        if picture is not None:
+            answer.plot(picture)
+        if self.json:
+            files = {"file": self.output, "plot": self.plot}
+            terminal.emit_json({"scene": self.scene, **answer.to_dict(), **files})
+        return self.json
+
+    def say_where(self, other: str) -> None:
+        """Names of the files; without any, `other`."""
+        from .. import output as terminal
+
+        if self.output is not None:
+            terminal.say(f"written: {self.output}")
+        if self.plot is not None:
+            terminal.say(f"drawn: {self.plot}")
+        if other and self.output is None and self.plot is None:
+            terminal.say(other)
+
+
+def _checked(name: str | None, endings: tuple[str, ...], option: str) -> Path | None:
+    if name is None:
+        return None
+    path = output_file(name, endings, option)
+    need_for(path, option)
+    return path
+
+
+def _changed(scene: str, changes: list[str]) -> Model:
+    """The scene compiled, with other numbers."""
+    import mstmm
+
+    numbers: dict[str, float] = {}
+    for text in changes:
+        name, equals, value = text.partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise MstmmError(f'--set {text}: expected NAME=VALUE, such as "rod1.mass=2"')
+        if name.strip() in numbers:
+            raise MstmmError(
+                f"--set {text}: {name.strip()} is set to {numbers[name.strip()]:g} already; "
+                "set each number once"
+            )
+        numbers[name.strip()] = number
+    model = compiled(scene, mstmm.load_scene(scene), engine="looped")
+    return model.with_parameters(numbers) if numbers else model

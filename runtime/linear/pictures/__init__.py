@@ -1,0 +1,1 @@
+"""Pictures of linear models: their matrices, motions and answers (extra: plot)."""

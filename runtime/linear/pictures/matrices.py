@@ -1,0 +1,56 @@
+"""Pictures of the matrices of a linear model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+from .figure import figure, refuse_none, write
+
+if TYPE_CHECKING:
+    from ..equations import Equations
+
+#: Coordinates up to which every row carries its name.
+_NAMED = 40
+#: Entries below this part of the largest are as good as zero in a picture.
+_SMALL = 1e-5
+
+
+def matrices(linear: Equations, path: str | Path | None) -> Any:
+    """M, C and K side by side, each by its own colours."""
+    refuse_none(linear.M)
+    named = len(linear) <= _NAMED
+    side = float(np.clip(0.2 * len(linear), 2.4, 6.0)) if named else 4.0
+    made = figure(side + 1.6, 3 * side + 2.4)
+    panels = made.subplots(1, 3, sharey=True)
+    for panel, name in zip(panels, "MCK", strict=True):
+        matrix = getattr(linear, name)
+        _map(made, panel, matrix)
+        panel.set_title(name if matrix.any() else f"{name} = 0", fontsize=11)
+        if named:
+            panel.set_xticks(range(len(linear)), linear.coordinates, rotation=90, fontsize=7)
+            panel.set_yticks(range(len(linear)), linear.coordinates, fontsize=7)
+        panel.tick_params(length=0)
+    write(made, path)
+    return made
+
+
+def _map(made: Any, panel: Any, matrix: Array) -> None:
+    """Entries as colours, red above zero and blue below, on a scale of decades both ways."""
+    from matplotlib.colors import SymLogNorm
+
+    top = float(np.abs(matrix).max())
+    none, top = top == 0, top or 1.0
+    scale = SymLogNorm(_SMALL * top, linscale=0.5, vmin=-top, vmax=top)
+    drawn = panel.imshow(matrix, cmap="RdBu_r", norm=scale, interpolation="none")
+    panel.spines[:].set_visible(False)
+    bar = made.colorbar(drawn, ax=panel, location="bottom", shrink=0.9, pad=0.02)
+    bar.set_ticks([-top, -(top * _SMALL**0.5), 0, top * _SMALL**0.5, top])
+    bar.set_ticklabels([f"{-top:.3g}", "", "0", "", f"{top:.3g}"])
+    bar.ax.minorticks_off()
+    bar.ax.tick_params(labelsize=8)
+    bar.ax.set_visible(not none)  # its place is kept, so that all three are of one size
