@@ -20,6 +20,7 @@ from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
+from .counting import Counting
 from .pencil import Pencil
 
 #: Motions looked for beyond those asked for, so that the count has a gap behind the last one.
@@ -47,17 +48,17 @@ def undamped(pencil: Pencil, count: int) -> Slowest:
     """The `count` motions of least omega^2 of M and a symmetric K."""
     n, sigma = len(pencil), _shift(pencil)
     rounding = _ROUNDING * abs(sigma)
-    wanted = min(count + _BEYOND, n - 1)
+    wanted, counting = min(count + _BEYOND, n - 1), Counting(pencil)
     for trial in range(_TRIALS):
         values, shapes = _lanczos(pencil, wanted, sigma, trial)
         values = np.where(np.abs(values) <= rounding, 0.0, values)
         kept, edge = _gap(values, count)
-        pencil_count = pencil.count_below(edge)
-        if pencil_count is None or pencil_count == kept:
-            complete = None if pencil_count is None else True
+        counted = counting.below(edge)
+        if counted is None or counted == kept:
+            complete = None if counted is None else True
             return Slowest(values[:count], shapes[:, :count], complete)
-        sigma = min(sigma, edge - abs(edge)) if pencil_count < kept else sigma
-        wanted = min(max(wanted, pencil_count + _BEYOND), n - 1)
+        sigma = min(sigma, edge - abs(edge)) if counted < kept else sigma
+        wanted = min(max(wanted, counted + _BEYOND), n - 1)
     return Slowest(values[:count], shapes[:, :count], False)
 
 

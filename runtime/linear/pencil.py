@@ -68,9 +68,3 @@ class Pencil:
     def solve(self, r: Array) -> Array:
         """x of the last factorisation: (square M + rate C + K) x = r."""
         return self.tangent.solve(self._full(r))[self.free]
-
-    def count_below(self, square: float) -> int | None:
-        """How many omega^2 of an undamped scene are below `square`: negative pivots of K - square M
-        (Sylvester; Wittrick and Williams, Q. J. Mech. Appl. Math. 24 (1971) 263-284)."""
-        self.factor(-square)
-        return self.tangent.count_negative()

@@ -51,6 +51,23 @@ def standing(engine: Engine, state: State) -> Engine:
     return Engine(packed_system(made, engine.packed))
 
 
+def parted(engine: Engine, state: State) -> Engine:
+    """The same with every spring between bodies taken apart into two to the ground, each between
+    one of its ends and the place where the other one stands: what is left does not reach from body
+    to body, and acts as before where nothing moves."""
+    system = engine.packed.system
+    first, second = list(system.forces), []
+    for k, force in enumerate(system.forces):
+        if min(body for body, _, _ in force.ends) < 0:
+            continue
+        seen = _seen(engine, [Probe(*end) for end in force.ends], state)
+        still = [(-1, tuple(pose[15:24].tolist()), tuple(pose[0:3].tolist())) for pose in seen]
+        first[k] = replace(force, ends=(force.ends[0], still[1]))
+        second.append(replace(force, ends=(still[0], force.ends[1])))
+    made = replace(system, forces=(*first, *second))
+    return Engine(packed_system(made, engine.packed))
+
+
 def _values(system: System, state: State) -> Array:
     """What the expressions of a scene give at a state."""
     if system.values is None:

@@ -12,6 +12,7 @@ from scipy.special import jn_zeros
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.runtime.linear.counting import Counting
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -72,6 +73,57 @@ def test_equal_frequencies_are_all_found() -> None:
     j = np.repeat(np.arange(1, 4), 3)[:7]
     np.testing.assert_allclose(modes.omega, 20 * np.sin((2 * j - 1) * np.pi / 602), rtol=1e-8)
     assert modes.complete
+
+
+def tied(count: int, stiffness: float) -> mstmm.Scene:
+    """Rods in space on pins and universal hinges, with springs under tension from one to others."""
+    rod = {"mass": 1.0, "center_of_mass": [0.3, 0, 0], "inertia": [0.1, 0.2, 0.3],
+           "ends": {"tip": [0.6, 0, 0]}}  # fmt: skip
+    kinds = [{"type": "universal", "axis2": [0, 1, 0], "law": {"stiffness": [100.0, 100.0]}},
+             {"type": "pin", "law": {"stiffness": 100.0}}]  # fmt: skip
+    return mstmm.Scene(
+        gravity=(0, -1, 0),
+        body=[{**rod, "name": f"b{k}"} for k in range(count)],
+        hinge=[{"name": f"h{k}", "inboard": f"b{k - 1}.tip" if k else "ground",
+                "outboard": f"b{k}", **kinds[k % 2]} for k in range(count)],
+        spring=[{"name": f"s{k}", "from": f"b{k}", "to": f"b{k + 3}.tip",
+                 "law": {"stiffness": stiffness, "rest": 0.5}} for k in range(0, count - 3, 2)],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("stiffness", [40.0, 2000.0])
+def test_springs_between_bodies_are_counted(stiffness: float) -> None:
+    """Between any two omega^2 of the matrices, and beyond."""
+    linear = of(tied(12, stiffness)).linearize(disturbances=())
+    squares = np.sort(np.linalg.eigvals(np.linalg.solve(linear.M, linear.K)).real)
+    edges = [squares[0] - 1, *(squares[1:] + squares[:-1]) / 2, 1.1 * squares[-1]]
+    counting = Counting(linear.pencil)
+    assert [counting.below(edge) for edge in edges] == list(range(len(squares) + 1))
+
+
+def test_few_of_many_with_springs_between_are_complete() -> None:
+    """Masses in a row, 10 cm apart, with long springs: by the matrices of those springs."""
+    scene = masses(410, 0.5, 200.0).model_dump(by_alias=True)
+    scene["chain"][0]["body"][0]["ends"]["on"]["position"] = [0.1, 0, 0]
+    ties = [(20, 300), (100, 104), (200, 409)]
+    scene["spring"] = [
+        {"name": f"tie{k}", "from": f"row[{a}]", "to": f"row[{b}]",
+         "law": {"stiffness": 50.0, "rest": 0.1 * (b - a)}} for k, (a, b) in enumerate(ties)
+    ]  # fmt: skip
+    modes = of(mstmm.Scene(**scene)).modes(8)
+    pulls = np.array([np.eye(410)[b] - np.eye(410)[a] for a, b in ties])
+    steps = np.eye(410) - np.eye(410, k=-1)
+    squares = np.linalg.eigvalsh(200 * steps.T @ steps + 50 * pulls.T @ pulls) / 0.5
+    np.testing.assert_allclose(modes.omega, np.sqrt(squares[:8]), rtol=1e-8)
+    assert modes.complete
+
+
+def test_loads_that_follow_other_bodies_are_not_counted() -> None:
+    """They have no potential, and no count."""
+    scene = tied(6, 40.0).model_dump(by_alias=True, exclude_defaults=True)
+    load = {"on": "b2", "force": ["3*h3.q", 0, 0]}
+    linear = of(mstmm.Scene(**(scene | {"load": [load]}))).linearize(disturbances=())
+    assert Counting(linear.pencil).below(10.0) is None
 
 
 #: Frequencies of a beam of length and mass per length 1 that hangs on a pin under 9.81 m/s2, by

@@ -176,7 +176,7 @@ def _most(shares: dict[str, Array], k: int) -> str:
 
 def _counted(found: Modes) -> str:
     if found.complete is None:
-        return "whether none is missing below the last was not counted: damped, or springs between"
+        return "not counted whether some below the last are missing: damped, or loads that follow"
     if found.complete:
         return "none is missing below the last: counted"
     return "some below the last are missing; ask for more: --count N"
