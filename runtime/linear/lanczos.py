@@ -15,21 +15,23 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs, eigsh
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
 from .counting import Counting
+from .krylov import Found, slowest
 from .pencil import Pencil
 
 #: Motions looked for beyond those asked for, so that the count has a gap behind the last one.
-_BEYOND = 4
+_BEYOND = 2
 #: Parts of the fastest omega^2 by which a scene that nothing holds is shifted.
 _SHIFT = 1e-12
 #: Parts of that shift that are rounding: omega^2 of motions that nothing holds.
 _ROUNDING = 1e-2
-_TRIALS = 4
+#: Searches at most; each finds one more of motions with equal frequencies.
+_TRIALS = 12
 #: omega^2 that are told apart by a count, in parts of the larger.
 _GAP = 1e-9
 
@@ -47,25 +49,27 @@ class Slowest:
 def undamped(pencil: Pencil, count: int) -> Slowest:
     """The `count` motions of least omega^2 of M and a symmetric K."""
     n, sigma = len(pencil), _shift(pencil)
-    rounding = _ROUNDING * abs(sigma)
     wanted, counting = min(count + _BEYOND, n - 1), Counting(pencil)
+    found, edge = Found.none(n), np.inf
     for trial in range(_TRIALS):
-        values, shapes = _lanczos(pencil, wanted, sigma, trial)
-        values = np.where(np.abs(values) <= rounding, 0.0, values)
+        found = slowest(pencil, wanted, sigma, edge, trial, found)
+        values = np.where(np.abs(found.squares) <= _ROUNDING * abs(sigma), 0.0, found.squares)
         kept, edge = _gap(values, count)
         counted = counting.below(edge)
         if counted is None or counted == kept:
             complete = None if counted is None else True
-            return Slowest(values[:count], shapes[:, :count], complete)
-        sigma = min(sigma, edge - abs(edge)) if counted < kept else sigma
-        wanted = min(max(wanted, counted + _BEYOND), n - 1)
-    return Slowest(values[:count], shapes[:, :count], False)
+            return Slowest(values[:count], found.shapes[:, :count], complete)
+        wanted = counted - kept
+        if counted < kept:  # some were found that are none: nearer to the shift they tell apart
+            found, sigma = Found.none(n), min(sigma, edge - abs(edge))
+            wanted, edge = min(count + _BEYOND, n - 1), np.inf
+    return Slowest(values[:count], found.shapes[:, :count], False)
 
 
 def _gap(values: Array, count: int) -> tuple[int, float]:
     """How many of the values found are below a number between two of them, from the last that was
     asked for on, and that number."""
-    for k in range(min(count, len(values) - 1), len(values)):
+    for k in range(max(1, min(count, len(values) - 1)), len(values)):
         below, above = float(values[k - 1]), float(values[k])
         if above - below > _GAP * max(abs(above), abs(below)):
             return k, (above + below) / 2
@@ -90,35 +94,11 @@ def _shift(pencil: Pencil) -> float:
 def _fastest(pencil: Pencil) -> float:
     """The size of the larger omega^2: a few powers of M^-1 K."""
     x = np.random.default_rng(0).standard_normal(len(pencil))
-    size = 0.0
-    for _ in range(3):
+    pencil.factor(1e30)  # the mass alone
+    for _ in range(2):
         pressed = pencil.stiffness(x / np.linalg.norm(x))
-        pencil.factor(1e30)  # the mass alone
         x = 1e30 * pencil.solve(pressed)
-        size = float(np.linalg.norm(x))
-    return size
-
-
-def _lanczos(pencil: Pencil, k: int, sigma: float, trial: int) -> tuple[Array, Array]:
-    n = len(pencil)
-    pencil.factor(-sigma)
-    start = np.random.default_rng(trial).standard_normal(n)
-    mass = LinearOperator((n, n), matvec=pencil.mass, dtype=np.float64)
-    inverse = LinearOperator((n, n), matvec=pencil.solve, dtype=np.float64)
-    try:
-        values, shapes = eigsh(
-            mass, k=k, M=mass, sigma=sigma, OPinv=inverse, v0=start,
-            ncv=min(n, (2 + trial) * k + 20),
-        )  # fmt: skip
-    except ArpackNoConvergence as error:
-        raise NumericalFailure(
-            f"modes: {len(error.eigenvalues)} of {k} motions found before the iterations were "
-            "exhausted; ask for fewer"
-        ) from None
-    except ArpackError as error:
-        raise NumericalFailure(f"modes: the iteration broke down ({error})") from None
-    order = np.argsort(values)
-    return values[order], shapes[:, order]
+    return float(np.linalg.norm(x))
 
 
 def damped(pencil: Pencil, count: int, with_c: bool) -> Slowest:
@@ -139,7 +119,7 @@ def damped(pencil: Pencil, count: int, with_c: bool) -> Slowest:
         return np.concatenate([x, sigma * x + first])
 
     operator = LinearOperator((2 * n, 2 * n), matvec=inverse, dtype=np.float64)
-    k = min(2 * count + 2 * _BEYOND, 2 * n - 2)
+    k = min(2 * count + 4 * _BEYOND, 2 * n - 2)
     start = np.random.default_rng(0).standard_normal(2 * n)
     try:
         inverses, vectors = eigs(operator, k=k, v0=start, ncv=min(2 * n, 2 * k + 20))

@@ -22,6 +22,7 @@ class Pencil:
 
     def __init__(self, engine: Engine, state: State, free: list[int]) -> None:
         self.tangent, self.free = Tangent(engine), np.array(free, dtype=np.int64)
+        self._places = slice(None) if len(free) == engine.nu else self.free
         self.state, self._nothing = state, np.zeros(engine.nu)
         self.tangent.allow_negative()
         self._no_q = np.zeros(engine.nq)
@@ -38,7 +39,7 @@ class Pencil:
 
     def _full(self, x: Array) -> Array:
         whole = self._nothing.copy()
-        whole[self.free] = np.ravel(x)
+        whole[self._places] = np.ravel(x)
         return whole
 
     def mass(self, x: Array) -> Array:
@@ -48,17 +49,17 @@ class Pencil:
     def _required(self, a: Array) -> Array:
         engine, state = self._inertia, self.state
         memory = self.tangent.memory
-        return engine.inverse_dynamics(state.t, state.q, self._nothing, a, memory)[self.free]
+        return engine.inverse_dynamics(state.t, state.q, self._nothing, a, memory)[self._places]
 
     def damping(self, x: Array) -> Array:
         """C x."""
-        return self.tangent.slope(0.0, self._no_q, self._full(x), self._nothing)[self.free]
+        return self.tangent.slope(0.0, self._no_q, self._full(x), self._nothing)[self._places]
 
     def stiffness(self, x: Array) -> Array:
         """K x."""
         moved = self.tangent.rates(self.state.q, self._full(x))
         self._begin()
-        return self.tangent.slope(0.0, moved, self._nothing, self._nothing)[self.free]
+        return self.tangent.slope(0.0, moved, self._nothing, self._nothing)[self._places]
 
     def factor(self, square: float, rate: float = 0.0) -> None:
         """Factor square M + rate C + K.  NumericalFailure where that is singular."""
@@ -67,4 +68,4 @@ class Pencil:
 
     def solve(self, r: Array) -> Array:
         """x of the last factorisation: (square M + rate C + K) x = r."""
-        return self.tangent.solve(self._full(r))[self.free]
+        return self.tangent.solve(self._full(r))[self._places]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy.special import jn_zeros
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.runtime.linear import krylov
 from mstmm.runtime.linear.counting import Counting
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -52,6 +54,22 @@ def test_few_of_many_are_those_of_the_matrices() -> None:
     np.testing.assert_allclose(few.effective_mass, every.effective_mass[:12], atol=1e-8)
 
 
+def test_few_vectors_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where there is no room for more, the search goes on from what it has."""
+    linear = of(hanging(450)).linearize(disturbances=())
+    expected = linear.modes(10)
+    monkeypatch.setattr(krylov, "_VECTORS", 1)
+    monkeypatch.setattr(krylov, "_ROOM", 14)
+    modes = linear.modes(10)
+    assert modes.complete
+    np.testing.assert_allclose(modes.omega, expected.omega, rtol=1e-9)
+    units = np.einsum("ik,ij,jl->kl", modes.shapes, linear.M, modes.shapes)
+    np.testing.assert_allclose(units, np.eye(10), atol=1e-9)
+    monkeypatch.setattr(krylov, "_RUNS", 1)
+    with pytest.raises(NumericalFailure, match="of 12 motions found"):
+        linear.modes(10)
+
+
 def test_none_is_missed_of_ten_thousand() -> None:
     """The heavy chain of D. Bernoulli: zeros of J0 times sqrt(g/l)/2, from which rods deviate with
     the square of their number in a wave; and the count agrees."""
@@ -79,8 +97,10 @@ def tied(count: int, stiffness: float) -> mstmm.Scene:
     """Rods in space on pins and universal hinges, with springs under tension from one to others."""
     rod = {"mass": 1.0, "center_of_mass": [0.3, 0, 0], "inertia": [0.1, 0.2, 0.3],
            "ends": {"tip": [0.6, 0, 0]}}  # fmt: skip
-    kinds = [{"type": "universal", "axis2": [0, 1, 0], "law": {"stiffness": [100.0, 100.0]}},
-             {"type": "pin", "law": {"stiffness": 100.0}}]  # fmt: skip
+    kinds: list[dict[str, Any]] = [
+        {"type": "universal", "axis2": [0, 1, 0], "law": {"stiffness": [100.0, 100.0]}},
+        {"type": "pin", "law": {"stiffness": 100.0}},
+    ]
     return mstmm.Scene(
         gravity=(0, -1, 0),
         body=[{**rod, "name": f"b{k}"} for k in range(count)],
