@@ -21,13 +21,10 @@ def output_matrices(
     """(names, C (outputs, 2 n), D (outputs, pushes)) of y = C (x, x') + D v, where `pushes` (2 n,
     k) is what v adds to d/dt (x, x')."""
     shown, n = outputs_of(linear, outputs), len(linear)
-    rows, c = rows_of(linear, shown), np.zeros((len(shown), 2 * n))
-    d = np.zeros((len(shown), pushes.shape[1]))
-    for k, one in enumerate(shown):
-        if one.order < 2:
-            c[k, one.order * n : (one.order + 1) * n] = rows[k]
-        else:  # of accelerations
-            c[k], d[k] = rows[k] @ linear.A[n:], rows[k] @ pushes[n:]
+    places, rates, accelerations = rows_of(linear, shown)
+    c, d = np.hstack([places, rates]), np.zeros((len(shown), pushes.shape[1]))
+    if accelerations.any():
+        c, d = c + accelerations @ linear.A[n:], accelerations @ pushes[n:]
     return tuple(one.name for one in shown), c, d
 
 

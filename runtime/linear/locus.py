@@ -7,7 +7,7 @@ its root locus.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -20,6 +20,7 @@ from scipy.optimize import linear_sum_assignment
 from mstmm.arrays import Array, Integers, numbers
 from mstmm.errors import NumericalFailure, SceneError
 
+from . import files
 from .motions import Complex, Modes
 
 if TYPE_CHECKING:
@@ -61,6 +62,34 @@ class Locus:
 
         lines = np.atleast_1d(numbers("orders", orders)).tolist()
         return locus(self.parameter, self.values, self.eigenvalues, path, lines)
+
+    def to_dataset(self) -> Any:
+        """`xarray.Dataset` of frequency and growth.  EnvironmentFailure without the extra."""
+        along = ("value", "motion")
+        arrays: dict[str, Any] = {
+            "frequency": (along, self.frequency, {"units": "Hz"}),
+            "growth": (along, self.growth, {"units": "1/s"}),
+        }
+        coords = {"value": self.values, "motion": np.arange(1, self.eigenvalues.shape[1] + 1)}
+        return files.xarray().Dataset(arrays, coords, {"parameter": self.parameter})
+
+    def _rows(self) -> Iterator[tuple[str, ...]]:
+        """A row for each value."""
+        motions = range(1, self.eigenvalues.shape[1] + 1)
+        yield (
+            self.parameter,
+            *(f"{k} {part}" for k in motions for part in ("frequency [Hz]", "growth [1/s]")),
+        )
+        pairs = np.stack([self.frequency, self.growth], axis=2).reshape(len(self.values), -1)
+        for value, row in zip(self.values.tolist(), pairs.tolist(), strict=True):
+            yield tuple(map(repr, (value, *row)))
+
+    def save(self, path: str | Path) -> Path:
+        """Frequencies and growth: .nc (extra io) or .csv, a row for each value of the parameter.
+
+        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        """
+        return files.save(path, self.to_dataset, self._rows())
 
 
 def traced(at: At, parameter: str, values: Array, count: int | None, damped: bool | None) -> Locus:

@@ -204,7 +204,6 @@ class _Sweep:
         self.columns = np.zeros((len(pushes), engine.nu))
         self.columns[:, free] = _efforts(linear, pushes).T
         self.free, self.rows = free, rows_of(linear, outputs)
-        self.orders = np.array([one.order for one in outputs])
 
     def values(self, omega: Array) -> Complex:
         """(k, outputs, inputs) at angular frequencies (k,)."""
@@ -220,8 +219,11 @@ class _Sweep:
 
     def _at(self, s: Complex) -> tuple[Complex, Array, NDArray[np.int32]]:
         x, growth, grown = self.response.amplitudes(s, self.columns)
-        powers = s[:, None] ** self.orders
-        found = powers[:, :, None] * (self.rows @ x[:, :, self.free].swapaxes(1, 2))
+        moved = x[:, :, self.free].swapaxes(1, 2)
+        found = np.zeros((len(s), self.rows.shape[1], len(self.columns)), dtype=np.complex128)
+        for order, rows in enumerate(self.rows):
+            if rows.any():
+                found += s[:, None, None] ** order * (rows @ moved)
         growth[~np.isfinite(found).all(axis=(1, 2))] = np.inf
         return found, growth, grown
 

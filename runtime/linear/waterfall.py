@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import cmath
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from numpy.typing import ArrayLike
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
+from . import files
 from .motions import Complex
 from .response import frequency_response
 
@@ -41,6 +43,33 @@ class Waterfall:
 
         frequency = self.omega / (2 * np.pi)
         return waterfall(frequency, self.points, self.values, self.parameter, path)
+
+    def to_dataset(self) -> Any:
+        """`xarray.Dataset`, complex numbers in two parts.  EnvironmentFailure without the extra."""
+        along = ("value", "omega")
+        arrays: dict[str, Any] = {
+            "real": (along, self.values.real), "imag": (along, self.values.imag),
+        }  # fmt: skip
+        coords: dict[str, Any] = {
+            "value": self.points, "omega": ("omega", self.omega, {"units": "rad/s"}),
+        }  # fmt: skip
+        about = {"parameter": self.parameter, "input": self.input, "output": self.output}
+        return files.xarray().Dataset(arrays, coords, about)
+
+    def _rows(self) -> Iterator[tuple[str, ...]]:
+        """A row for each value of the parameter and each frequency."""
+        yield self.parameter, "omega [rad/s]", "frequency [Hz]", "magnitude", "phase [rad]"
+        for point, row in zip(self.points.tolist(), self.values, strict=True):
+            for omega, value in zip(self.omega.tolist(), row.tolist(), strict=True):
+                numbers = point, omega, omega / (2 * np.pi), abs(value), cmath.phase(value)
+                yield tuple(map(repr, numbers))
+
+    def save(self, path: str | Path) -> Path:
+        """All of it: .nc (extra io) or .csv, a row for each value and frequency.
+
+        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        """
+        return files.save(path, self.to_dataset, self._rows())
 
 
 def waterfall(

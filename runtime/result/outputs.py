@@ -10,7 +10,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.expression.expression import Expression, Name
-from mstmm.ir import Port
+from mstmm.ir import KernelIR, Port
 from mstmm.ir.graph import Graph
 from mstmm.scene import Output
 
@@ -30,7 +30,8 @@ def quantity_of(output: Output, t: Array, known: Known) -> Quantity:
         columns = [_column(name, t, known) for name in output.of.names]
     except SceneError as error:
         raise SceneError(f'output "{output.name}": of: {error}') from None
-    values = _evaluated(output.of, np.stack(columns, axis=1))
+    names = np.stack(columns, axis=1)
+    values = vectorized.evaluate(kernel_of(output.of), {"names": names})["value"][:, 0]
     return Quantity(output.name, values, output.unit, _long_name(output))
 
 
@@ -69,11 +70,10 @@ def _column(name: Name, t: Array, known: Known) -> Array:
     return found.values
 
 
-def _evaluated(expression: Expression, columns: Array) -> Array:
-    """An expression over the samples, its names given as columns (n, k)."""
+def kernel_of(expression: Expression) -> KernelIR:
+    """The kernel names (k,) -> value (1,) of an expression, its names in their order."""
     graph = Graph()
     places = {name: k for k, name in enumerate(expression.names)}
     node = expression.build(graph, lambda name: graph.element("names", places[name]))
-    ports = Port("names", (columns.shape[1],)), Port("value", (1,))
-    kernel = graph.kernel("output", [ports[0]], [ports[1]], {"value": [node]})
-    return vectorized.evaluate(kernel, {"names": columns})["value"][:, 0]
+    ports = Port("names", (len(places),)), Port("value", (1,))
+    return graph.kernel("output", [ports[0]], [ports[1]], {"value": [node]})

@@ -68,7 +68,8 @@ RATES = {
     "position": "velocity", "velocity": "acceleration", "angular_velocity": "angular_acceleration",
 }  # fmt: skip
 
-_COLUMNS = {
+#: Where they stand in a row of `Observation.points`.
+COLUMNS = {
     "position": slice(0, 3), "velocity": slice(3, 6), "acceleration": slice(6, 9),
     "angular_velocity": slice(9, 12), "angular_acceleration": slice(12, 15),
 }  # fmt: skip
@@ -93,7 +94,7 @@ class Quantities:
         """(n, 3), or (n, 4) for the orientation."""
         points = self.observed.points(reference)
         if kind != "orientation":
-            return points[:, _COLUMNS[kind]]
+            return points[:, COLUMNS[kind]]
         if reference not in self._orientations:
             self._orientations[reference] = quaternions(points[:, 15:24])
         return self._orientations[reference]
@@ -139,6 +140,8 @@ class Quantities:
 
     def get(self, name: str) -> Quantity:
         """The quantity of this name; SceneError with the nearest name if there is none."""
+        if not isinstance(name, str):
+            raise SceneError(f"quantity {name!r}: expected a name, such as energy")
         owners = self._owners_in(name)
         for owner in ["", *owners]:
             entry = self.of(owner).entries.get(name)

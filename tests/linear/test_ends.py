@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from linear.scenes import UNIT
+from linear.scenes import UNIT, pendulum
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
@@ -52,16 +52,50 @@ def test_the_tip_of_a_panel() -> None:
 
 
 def test_an_output_of_the_scene_is_the_quantity_that_it_names() -> None:
-    outputs = [{"name": "sway", "of": "beam.tip.y"}, {"name": "twice", "of": "2*beam.tip.y"}]
+    outputs = [{"name": "sway", "of": "beam.tip.y"}]
     linear = cantilever(output=outputs).linearize(inputs=["beam.tip.fy"])
     ours = linear.frequency_response([1.0], outputs=["sway"]).values
     np.testing.assert_allclose(
         ours, linear.frequency_response([1.0], outputs=["beam.tip.y"]).values
     )
-    with pytest.raises(SceneError, match="is an expression"):
-        linear.frequency_response([1.0], outputs=["twice"])
     with pytest.raises(SceneError, match="expected a list of names"):
         linear.output_matrices("sway")
+
+
+def test_an_output_that_is_an_expression_goes_by_its_slope() -> None:
+    """Of a pendulum on a spring: x = sin q of its tip and y'' = x q'', at rest."""
+    of = "sqrt(bob.tip.x^2 + 2) + 3*pivot.angle_rate + t*sin(pivot.angle) - bob.tip.ay*bob.tip.x"
+    scene = pendulum(0.4, law={"stiffness": 5.0, "rest": 1.0, "damping": 0.3})
+    outputs = [{"name": "mixed", "of": of, "unit": "m"}, {"name": "still", "of": "bob.tip.z"}]
+    data = scene.model_dump(by_alias=True, exclude_defaults=True) | {"output": outputs}
+    model = mstmm.compile(mstmm.Scene(**data), engine="looped")
+    linear = model.linearize(t=2.0, inputs=["pivot.effort"])
+    q = linear.state.q[0]
+    omega, x = np.array([0.5, 4.0, 20.0]), np.sin(q)
+    assert 0.3 < q < 0.4
+    response = linear.frequency_response(omega, outputs=["mixed", "pivot.angle", "still"])
+    assert response.output_units[0] == "m" and not response.values[:, 2].any()
+    slope = x * np.cos(q) / np.sqrt(x**2 + 2) + 3j * omega + 2 * np.cos(q) + x * omega**2 * x
+    np.testing.assert_allclose(
+        response.values[:, 0, 0], slope * response.values[:, 1, 0], rtol=1e-10
+    )
+    system = linear.output_matrices(["mixed"])
+    states = 1j * omega[:, None, None] * np.eye(2) - linear.A
+    found = system[0] @ np.linalg.solve(states, linear.B[None]) + system[1]
+    np.testing.assert_allclose(found[:, 0, 0], response.values[:, 0, 0], rtol=1e-10)
+
+
+def test_outputs_without_a_slope_are_named() -> None:
+    outputs = [{"name": "root", "of": "sqrt(beam.tip.y)"}, {"name": "fed", "of": "2*beam.y1 + a"},
+               {"name": "none", "of": "2*energy"}]  # fmt: skip
+    linear = cantilever(output=outputs, input=[{"name": "a"}]).linearize([0] * 4)
+    for name, found in (
+        ("root", 'output "root": of: "sqrt.beam.tip.y." has no slope'),
+        ("fed", '"a" is an input'),
+        ("none", 'output "none": of: "energy": expected a coordinate'),
+    ):
+        with pytest.raises(SceneError, match=found):
+            linear.frequency_response([1.0], ["beam.tip.fy"], [name])
 
 
 def two_masses() -> mstmm.Scene:

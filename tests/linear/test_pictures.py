@@ -59,6 +59,15 @@ def test_a_waterfall_is_a_row_of_answers(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.values, expected, rtol=1e-9)
     with pytest.raises(SceneError, match=r"output = \['pivot.angle'\]: expected one name"):
         model.waterfall("pivot.law.stiffness[0]", stiffness, OMEGA, names[0], [names[1]])  # type: ignore[arg-type]
+    rows = list(csv.reader(found.save(tmp_path / "waterfall.csv").read_text().splitlines()))
+    assert rows[0][:2] == ["pivot.law.stiffness[0]", "omega [rad/s]"] and len(rows) == 1 + 3 * 60
+    numbers = np.array(rows[1:], float).reshape(3, 60, 5)
+    np.testing.assert_array_equal(numbers[:, 0, 0], stiffness)
+    np.testing.assert_allclose(
+        numbers[:, :, 3] * np.exp(1j * numbers[:, :, 4]), found.values, rtol=1e-12
+    )
+    with pytest.raises(SceneError, match="expected a path"):
+        found.save(None)  # type: ignore[arg-type]
     pytest.importorskip("matplotlib")
     found.plot(tmp_path / "waterfall.png")
     assert (tmp_path / "waterfall.png").stat().st_size > 10_000

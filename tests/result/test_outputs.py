@@ -122,6 +122,9 @@ def test_the_scene_is_written_as_it_is_read() -> None:
 
 def test_quantities_of_the_scene_are_known_by_name() -> None:
     assert {name.partition(".")[0] for name in SUMS} | {"work"} == set(OF_SCENE)
+    for wrong in (3, None, ["energy"]):
+        with pytest.raises(SceneError, match="expected a name, such as energy"):
+            result().quantity(wrong)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -116,8 +116,9 @@ def test_a_file_of_columns_is_read_with_the_scene(
         ("t,v\n0,1\n", "w", ("there is no column 'w'", "t, v")),
         ("0,1\n", "v", ("there is no column", "give its number")),
         ("0,1\n", 3, ("there is no column 3", "it has 2")),
+        ("t,v\n", 2, ("there is no row of numbers in it", "expected times in s")),
+        ("", 2, ("there is no row of numbers in it",)),
         ("0,nan\n", 2, ("expected a number", "'nan'")),
-        ("t,v\n", 2, ("missing",)),
         ("0,1e300\n1e-300,-1e300\n", 2, ("row 1 on its rate",)),
     ],
 )

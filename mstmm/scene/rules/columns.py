@@ -36,6 +36,8 @@ def read_columns(path: str, folder: str, column: str | int) -> Columns:
     ]
     names = rows.pop(0)[1] if rows and _number(rows[0][1][0]) is None else []
     place = _place(path, column, names, len(rows[0][1]) if rows else 0)
+    if not rows:
+        raise refuse(f"{found(path)}: there is no row of numbers in it; expected times in s first")
     first, other = list[float](), list[float]()
     for line, cells in rows:
         if len(cells) <= place:
