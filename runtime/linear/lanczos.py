@@ -50,7 +50,7 @@ def undamped(pencil: Pencil, count: int) -> Slowest:
     """The `count` motions of least omega^2 of M and a symmetric K."""
     n, sigma = len(pencil), _shift(pencil)
     wanted, counting = min(count + _BEYOND, n - 1), Counting(pencil)
-    found, edge = Found.none(n), np.inf
+    found, edge, values = Found.none(n), np.inf, np.zeros(0)
     for trial in range(_TRIALS):
         found = slowest(pencil, wanted, sigma, edge, trial, found)
         values = np.where(np.abs(found.squares) <= _ROUNDING * abs(sigma), 0.0, found.squares)
@@ -122,9 +122,10 @@ def damped(pencil: Pencil, count: int, with_c: bool) -> Slowest:
     k = min(2 * count + 4 * _BEYOND, 2 * n - 2)
     start = np.random.default_rng(0).standard_normal(2 * n)
     try:
-        inverses, vectors = eigs(operator, k=k, v0=start, ncv=min(2 * n, 2 * k + 20))
+        found: Any = eigs(operator, k=k, v0=start, ncv=min(2 * n, 2 * k + 20))
     except ArpackError as error:
         raise NumericalFailure(f"modes: the iteration broke down ({error})") from None
+    inverses, vectors = found
     values = sigma + 1 / inverses
     kept = np.flatnonzero(values.imag >= -1e-9 * np.abs(values))
     kept = kept[np.argsort(np.abs(values[kept]), kind="stable")][:count]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import eig, eigh
@@ -85,13 +85,14 @@ def _general(linear: Equations, c: Array) -> Modes:
     zero, one = np.zeros((n, n)), np.eye(n)
     a = np.block([[zero, one], [-linear.K, -c]])
     b = np.block([[one, zero], [zero, linear.M]])
-    values, vectors = eig(a, b)
+    pairs: Any = eig(a, b)
+    values, vectors = pairs
     if not np.isfinite(values).all():
         raise _no_inertia(linear)
-    fastest = np.abs(values).max(initial=0)
-    values = np.where(np.abs(values.imag) <= _ROUNDING * fastest, values.real, values)
-    values = np.where(np.abs(values.real) <= _ROUNDING * fastest, 1j * values.imag, values)
-    kept = np.flatnonzero(values.imag >= 0)
+    rounding = _ROUNDING * np.abs(values).max(initial=0)
+    values = np.where(np.abs(np.imag(values)) <= rounding, np.real(values), values)
+    values = np.where(np.abs(np.real(values)) <= rounding, 1j * np.imag(values), values)
+    kept = np.flatnonzero(np.imag(values) >= 0)
     kept = kept[np.argsort(np.abs(values[kept]), kind="stable")]
     shapes = vectors[:n, kept]
     places = np.abs(shapes).argmax(axis=0)

@@ -32,9 +32,9 @@ def along(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[An
 
 def kinetic(linear: Equations, shapes: NDArray[Any]) -> dict[str, Array]:
     """Body -> (k,): its part of each shape's kinetic energy."""
-    engine, parts = linear.model.looped, [shapes.real]
+    engine, parts = linear.model.looped, [np.real(shapes)]
     if np.iscomplexobj(shapes):
-        parts.append(shapes.imag)
+        parts.append(np.imag(shapes))
     energies = np.zeros((shapes.shape[1], engine.packed.topology.count))
     for part in parts:
         speeds = np.zeros((shapes.shape[1], engine.nu))

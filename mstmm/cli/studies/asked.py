@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Protocol
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,6 +17,8 @@ from ..simulate import compiled, use_files
 
 if TYPE_CHECKING:
     from mstmm.runtime.linear.linear import Linear
+    from mstmm.runtime.linear.motions import Modes
+    from mstmm.runtime.linear.response import FrequencyResponse
     from mstmm.runtime.model.model import Model
 
 SceneFile = Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")]
@@ -38,19 +40,6 @@ Plot = Annotated[
     typer.Option("--plot", metavar="FILE", help="A picture of it: .png, .svg or .pdf."),
 ]  # fmt: skip
 _ENDINGS, _PICTURES = (".nc", ".csv"), (".png", ".svg", ".pdf")
-
-
-class Answer(Protocol):
-    """What linear models and what follows from them can do."""
-
-    def save(self, path: str | Path) -> Path:
-        """Numbers into a file."""
-
-    def plot(self, path: str | Path | None = None) -> Any:
-        """A picture of it."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """All of it for JSON."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +69,7 @@ class Asked:
     def _picture(self) -> Path | None:
         return _checked(self.plot, _PICTURES, "--plot")
 
-    def answered(self, answer: Answer) -> bool:
+    def answered(self, answer: Linear | Modes | FrequencyResponse) -> bool:
         """The files written; with --json the answer told, and nothing is left to say."""
         from .. import output as terminal
 
@@ -120,18 +109,21 @@ def _changed(scene: str, changes: list[str]) -> Model:
 
     numbers: dict[str, float] = {}
     for text in changes:
-        name, equals, value = text.partition("=")
-        try:
-            number = float(value)
-        except ValueError:
-            equals = ""
-        if not equals:
-            raise MstmmError(f'--set {text}: expected NAME=VALUE, such as "rod1.mass=2"')
-        if name.strip() in numbers:
+        name, number = _assigned(text)
+        if name in numbers:
             raise MstmmError(
-                f"--set {text}: {name.strip()} is set to {numbers[name.strip()]:g} already; "
-                "set each number once"
+                f"--set {text}: {name} is set to {numbers[name]:g} already; set each number once"
             )
-        numbers[name.strip()] = number
+        numbers[name] = number
     model = compiled(scene, mstmm.load_scene(scene), engine="looped")
     return model.with_parameters(numbers) if numbers else model
+
+
+def _assigned(text: str) -> tuple[str, float]:
+    """The name and the number of NAME=VALUE."""
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        message = f'--set {text}: expected NAME=VALUE, such as "rod1.mass=2"'
+        raise MstmmError(message) from None

@@ -25,15 +25,15 @@ def locus(
     orders: Sequence[float],
 ) -> Any:
     """Frequencies and, where anything grows or decays, growth below; what grows is red."""
-    frequencies = np.abs(eigenvalues.imag) / (2 * np.pi)
-    parts = [("frequency in Hz", frequencies), ("growth in 1/s", eigenvalues.real)]
-    if not np.nan_to_num(eigenvalues.real).any():
+    frequencies, growths = np.abs(np.imag(eigenvalues)) / (2 * np.pi), np.real(eigenvalues)
+    parts = [("frequency in Hz", frequencies), ("growth in 1/s", growths)]
+    if not np.nan_to_num(growths).any():
         parts = parts[:1]
     made = figure(6.0 if len(parts) > 1 else 4.5)
     axes = made.subplots(len(parts), 1, sharex=True, height_ratios=[2, 1][: len(parts)],
                          squeeze=False)[:, 0]  # fmt: skip
     for axis, (label, columns) in zip(axes, parts, strict=True):
-        for column, growth in zip(columns.T, eigenvalues.real.T, strict=True):
+        for column, growth in zip(columns.T, growths.T, strict=True):
             axis.plot(x, column, color="0.25", lw=1.2)
             axis.plot(x[growth > 0], column[growth > 0], ".", color="tab:red", ms=4)
         axis.set_ylabel(label)
