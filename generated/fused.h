@@ -38,6 +38,8 @@ typedef struct {
     int (*rates)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *dq);
     int (*coordinates)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, const double *steps, const double *x, const double *rho,
                        double *dq);
+    /* The slopes of the residual about a state; see derive/fuse/linear.py. */
+    int (*linear)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *M, double *C, double *K, double *G, double *r_t);
 } mstmm_fused;
 /* cdef end */
 

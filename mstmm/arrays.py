@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from numbers import Integral, Real
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,9 +15,13 @@ from .errors import SceneError
 Array: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]
 
+_DOUBLE = np.dtype(np.float64)
+
 
 def real(name: str, value: Any, expected: str = "a finite number") -> float:
     """A finite Python float of any library's real number (not of text, truth values, arrays)."""
+    if type(value) is float and math.isfinite(value):
+        return value
     number = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
     if isinstance(number, bool | np.bool_) or not isinstance(number, Real):
         raise SceneError(f"{name} = {_short(value)}: expected {expected}")
@@ -52,21 +56,31 @@ def _short(value: Any) -> str:
 def numbers(name: str, value: ArrayLike) -> Array:
     """A new contiguous array of finite numbers; SceneError for anything else."""
     try:
-        found = np.asarray(value)
-        if found.dtype.kind in "cSU":
-            raise TypeError
-        array = np.array(found, dtype=np.float64, order="C")
+        array = value.copy() if _ready(value) else _converted(value)
     except (TypeError, ValueError, OverflowError):
         raise SceneError(
             f"{name} = {_short(value)}: expected an array of real numbers, every row as long"
         ) from None
-    if not np.isfinite(array).all():
+    # Squares add up quickly, and no two of them cancel; they alone may be too large.
+    if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
         if array.ndim == 0:
             raise SceneError(f"{name} = {array}: expected a finite number")
         place = tuple(int(k[0]) for k in np.nonzero(~np.isfinite(array)))
         where = f"{name}[{', '.join(map(str, place))}]"
         raise SceneError(f"{where} = {array[place]}: expected a finite number")
     return array
+
+
+def _ready(value: ArrayLike) -> TypeGuard[Array]:
+    """Whether it is what most calls give, for which less is to be done."""
+    return type(value) is np.ndarray and value.dtype is _DOUBLE
+
+
+def _converted(value: ArrayLike) -> Array:
+    found = np.asarray(value)
+    if found.dtype.kind in "cSU":
+        raise TypeError
+    return np.array(found, dtype=np.float64, order="C")
 
 
 def one_row(name: str, value: ArrayLike) -> Array:

@@ -31,7 +31,7 @@ class FusedKernels(Protocol):
 
     @property
     def kernels(self) -> dict[str, KernelIR]:
-        """Those of `derive.fuse.scene.fuse`, or of `derive.fuse.implicit.fuse_implicit`."""
+        """Those of `derive.fuse.scene.fuse`, of `fuse_implicit` or of `fuse_slopes`."""
 
     @property
     def failures(self) -> tuple[tuple[int, int, int], ...]:
@@ -63,7 +63,7 @@ def fused_sources(fused: FusedKernels, key: str, part: str = "scalar") -> dict[s
 
     Part "scalar" holds the kernels for one state (accelerations, accelerations_power), part
     "lanes" those for several states at once (accelerations_lanes, accelerations_many), part
-    "implicit" what implicit methods ask for.
+    "implicit" what implicit methods ask for, part "linear" the slopes about a state.
     """
     kernels = fused.kernels
     sizes = {port.name: port.length() for port in next(iter(kernels.values())).inputs}
@@ -227,9 +227,10 @@ def _self_test(kernels: dict[str, KernelIR], part: str) -> str:
     names = ["accelerations_lanes"] if part == "lanes" else list(kernels)
     called = {name: kernels[name.removesuffix("_lanes")] for name in names}
     ports = [port for kernel in called.values() for port in (*kernel.inputs, *kernel.outputs)]
+    most = max(len(kernel.outputs) for kernel in called.values())
     lines = [
         f"enum {{ length = {max(1, *(port.length() for port in ports))} * MSTMM_LANES }};",
-        "static double ones[length], results[4][length];",
+        f"static double ones[length], results[{most}][length];",
         "static int codes[MSTMM_LANES];",
         "for (int i = 0; i < length; i++) ones[i] = 1.0;",
     ]

@@ -77,6 +77,7 @@ class Fusion:
         self.library: FusedLibrary | None = None
         self.lanes: FusedLibrary | None = None
         self.implicit: FusedLibrary | None = None
+        self.linear: FusedLibrary | None = None
         self.note = ""
         self._insisted = False  # engine="fused": batches too
         self.inputs: Places = ()
@@ -114,7 +115,7 @@ class Fusion:
             return
         if self.structure == other.structure:
             self.library, self.lanes, self.note = other.library, other.lanes, other.note
-            self.implicit = other.implicit
+            self.implicit, self.linear = other.implicit, other.linear
         elif other.library is not None:
             try:
                 self.build()
@@ -140,11 +141,17 @@ class Fusion:
         evaluations there will be (inf) only after `build`.  None where the looped engine serves:
         for other scenes, and where it cannot be made.
         """
-        if self.obstacle or self.structure.nu > _MOST_UNKNOWNS:
+        return self._of_small("implicit", self._break_even() < evaluations < math.inf)
+
+    def ready_linear(self, pays: bool) -> FusedLibrary | None:
+        """The same for the slopes about a state."""
+        return self._of_small("linear", pays)
+
+    def _of_small(self, part: str, pays: bool) -> FusedLibrary | None:
+        if self.obstacle or not 0 < self.structure.nu <= _MOST_UNKNOWNS:
             return None
-        pays = self._break_even() < evaluations < math.inf
         try:
-            return self._get("implicit", build=self._insisted or pays)
+            return self._get(part, build=self._insisted or pays)
         except EnvironmentFailure:
             return None
 
@@ -190,7 +197,7 @@ class Fusion:
     def _sources(self, part: str, key: str) -> dict[str, str]:
         from ..derive.print.scene import fused_sources
 
-        make = self.fused_implicit if part == "implicit" else self.fused
+        make = {"implicit": self.fused_implicit, "linear": self.fused_linear}.get(part, self.fused)
         return fused_sources(make(self.structure), key, part)
 
     def columns(
@@ -244,6 +251,12 @@ class Fusion:
         from ..derive.fuse.implicit import fuse_implicit
 
         return fuse_implicit(structure, kernels_of(self._definitions))
+
+    def fused_linear(self, structure: Structure) -> Fused:
+        """The same of slopes about a state."""
+        from ..derive.fuse.linear import fuse_slopes
+
+        return fuse_slopes(structure, kernels_of(self._definitions))
 
     def symbolic(self, linear: Equations, keep: Sequence[str]) -> Symbolic:
         """See `Equations.symbolic`; no compiler."""

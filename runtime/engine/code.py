@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 class Fusing(Protocol):
     """Fused libraries of a scene: `library` for one state, `lanes` for several side by side,
-    `implicit` for what implicit methods ask.
+    `implicit` for what implicit methods ask, `linear` for slopes about a state.
 
     `numbers` is the vector p they read, `inputs` where inputs stand in it; `note` says where the
     library came from, `obstacle` why there can be none.  `ready(n)` gives a library if it is there
@@ -31,6 +31,7 @@ class Fusing(Protocol):
     library: FusedLibrary | None
     lanes: FusedLibrary | None
     implicit: FusedLibrary | None
+    linear: FusedLibrary | None
     numbers: Array
     inputs: Places
     note: str
@@ -42,6 +43,7 @@ class Fusing(Protocol):
     def ready(self, evaluations: float) -> FusedLibrary | None: ...
     def ready_lanes(self, evaluations: float) -> FusedLibrary | None: ...
     def ready_implicit(self, evaluations: float) -> FusedLibrary | None: ...
+    def ready_linear(self, pays: bool) -> FusedLibrary | None: ...
     def fused(self, structure: Any) -> Any: ...
     def columns(
         self, structure: Any, kernels: Callable[[], Any], what: str, build: bool
@@ -58,6 +60,7 @@ class NotFused:
     library: FusedLibrary | None = None
     lanes: FusedLibrary | None = None
     implicit: FusedLibrary | None = None
+    linear: FusedLibrary | None = None
     note: str = ""
     numbers: Array = field(default_factory=lambda: np.zeros(0))
     inputs: Places = ()
@@ -80,6 +83,9 @@ class NotFused:
         return None
 
     def ready_implicit(self, evaluations: float) -> None:
+        return None
+
+    def ready_linear(self, pays: bool) -> None:
         return None
 
     def fused(self, structure: Any) -> Any:

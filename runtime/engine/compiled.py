@@ -18,6 +18,7 @@ from ..pack.packed import Packed
 from .code import Fusing, NotFused
 from .engine import Engine
 from .given import GivenInput, with_inputs
+from .slopes import Slopes
 
 
 class Compiled:
@@ -105,6 +106,11 @@ class Compiled:
                 unit = slots.u_units[k].removesuffix("/s")
                 found.append((f"{slots.name}.{slots.u_names[k]}_increment", unit))
         return tuple(found)
+
+    @cached_property
+    def slopes(self) -> Slopes:
+        """The scene about its states, by code of its own."""
+        return Slopes(self.looped, self.fusion, self.free_speeds)
 
     @property
     def nq(self) -> int:

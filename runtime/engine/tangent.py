@@ -7,6 +7,7 @@ R and its tangent, eliminated from the tips to the root (derive/equations/tangen
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,11 +59,17 @@ class Tangent:
         self._call("residual_slope", float(d_t), d_q, d_u, d_a, found)
         return found
 
-    def slopes(self, d_q: Array, d_u: Array, d_a: Array) -> Array:
-        """Derivatives (n, nu) of R along n directions, rows of coordinates (n, nq), speeds and
-        accelerations (n, nu)."""
-        found = np.empty((len(d_q), self.nu))
-        self._call("residual_slopes", len(d_q), d_q, d_u, d_a, found)
+    def matrices(
+        self, t: float, q: Array, u: Array, a: Array, free: Sequence[int]
+    ) -> Array:
+        """M, C and K (3, n, n) about a state: derivatives of R by the accelerations of some speeds,
+        by these speeds, and by how coordinates follow them; the state is referred to from now on.
+        """
+        n = len(free)
+        found, work = np.empty((3, n, n)), np.empty(2 * self.nq + 3 * self.nu)
+        places = self.engine.ffi.new("int[]", free)
+        self.state = np.array(q, float), np.array(u, float)
+        self._call("linear_swept", float(t), q, u, a, n, places, found, work)
         return found
 
     def factor(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:

@@ -20,6 +20,7 @@ from .standing import standing, with_held_springs, without_laws
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
+    from ..engine.slopes import About
     from .symbolic import Symbolic
 
 
@@ -38,6 +39,7 @@ class Equations:
         controls, others: where v and w push.
         turning: (n, n) G of x' = G x + du, how increments of coordinates that are no integrals of
             speeds go along with the motion; None where they do not.
+        about: the state by code compiled for the scene, where there is such code.
     """
 
     model: Compiled
@@ -45,6 +47,7 @@ class Equations:
     controls: tuple[Channel, ...] = ()
     others: tuple[Channel, ...] = ()
     turning: Array | None = field(default=None, repr=False)
+    about: About | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         return (
@@ -74,6 +77,9 @@ class Equations:
 
     @cached_property
     def _whole(self) -> Matrices:
+        about = self.about
+        if about is not None:
+            return self._second_order(Matrices(about.M, about.C, about.K))
         refuse_dense(len(self), "the matrix of a linear model")
         return self._second_order(matrices(self.model.looped, self.state, list(self.free)))
 

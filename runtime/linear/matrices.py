@@ -11,6 +11,7 @@ Every column is one directional derivative of the recursion, exact, O(bodies)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,6 @@ from mstmm.errors import NumericalFailure
 
 from ..engine.culprit import steep
 from ..engine.engine import Engine
-from ..engine.tangent import Tangent
 
 
 @dataclass(frozen=True)
@@ -42,21 +42,12 @@ class Matrices:
     K: Array
 
 
-def matrices(engine: Engine, state: State, free: list[int]) -> Matrices:
+def matrices(engine: Engine, state: State, free: Sequence[int]) -> Matrices:
     """The matrices of a packed scene.  NumericalFailure where the state cannot be evaluated."""
-    tangent, n, nu = Tangent(engine), len(free), engine.nu
-    units = np.zeros((n, nu))
-    units[np.arange(n), free] = 1.0
-    moves = [tangent.rates(state.q, unit) for unit in units]
-    tangent.residual(state.t, state.q, state.u, state.a)
-    d_q, d_u, d_a = np.zeros((3 * n, engine.nq)), np.zeros((3 * n, nu)), np.zeros((3 * n, nu))
-    d_a[:n], d_u[n : 2 * n] = units, units
-    d_q[2 * n :] = np.array(moves).reshape(n, engine.nq)
-    found = tangent.slopes(d_q, d_u, d_a)[:, free]
+    found = engine.tangent.matrices(state.t, state.q, state.u, state.a, free)
     if not np.isfinite(found).all():
         raise _no_slope(engine, state)
-    m, c, k = np.split(found, 3)
-    return Matrices(m.T, c.T, k.T)
+    return Matrices(*found)
 
 
 def _no_slope(engine: Engine, state: State) -> NumericalFailure:

@@ -22,6 +22,10 @@ class StateSpace(Equations):
     @cached_property
     def A(self) -> Array:
         """(2 n, 2 n): d/dt (x, x') = A (x, x') + B v."""
+        if self.about is not None:
+            found = self.model.slopes.state_matrix(self.about, self.turning is not None)
+            if found is not None:
+                return found
         n = len(self)
         below = -np.linalg.solve(self.M, np.hstack([self.K, self.C]))
         return np.vstack([np.hstack([np.zeros((n, n)), np.eye(n)]), below])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,7 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
 from ..engine.sizes import speed_sizes
-from ..linear.channels import GROUND, channel, names_of
+from ..linear.channels import GROUND, Channel, channel, names_of
 from ..linear.linear import Linear
 from ..linear.matrices import State, matrices
 from ..run.start import initial_state
@@ -28,32 +29,69 @@ _AT_REST = 1e-9
 _TOLERANCE = 1e-10
 
 
-def linearize(
-    model: Compiled,
-    q: Array | None,
-    u: Array | None,
-    t: float,
-    inputs: Sequence[str],
-    disturbances: Sequence[str] | None,
-) -> Linear:
-    """See `Model.linearize`."""
-    pushes = tuple(channel(model, name) for name in names_of("inputs", inputs))
-    named = GROUND if disturbances is None else names_of("disturbances", disturbances)
-    others = tuple(channel(model, name) for name in named)
-    state = _state(model, q, u, t)
-    return Linear(model, state, pushes, others, _turning(model, state))
+class Linearising:
+    """Makes one model linear, at many states."""
 
+    def __init__(self, model: Compiled) -> None:
+        self._model = model
+        system, layout = model.packed.system, model.layout
+        twists = any(law.twist >= 0 for law in system.laws)
+        self._settled = not (len(layout.quaternions) or system.driven or twists)
+        self._straight = all(h.straight for h in layout.hinges.values() if h.nu)
 
-def _state(model: Compiled, q: Array | None, u: Array | None, t: float) -> State:
-    """The state that is given with its drives, or rest; `accelerations` refuses what has none."""
-    speeds = np.zeros(model.nu) if u is None else u
-    if q is None:
-        q = _rest(model, t) if u is None else initial_state(model)[0]
-    whole = SceneSystem(model.looped).start(t, q, speeds)
-    q, speeds = whole[: model.nq], whole[model.nq : model.nq + model.nu]
-    engine, memory = model.looped, model.looped.start_memory()
-    _, a = engine.accelerations(t, q[None].copy(), speeds[None].copy(), memory[None])
-    return State(t, q, speeds, a[0])
+    def __call__(
+        self,
+        q: Array | None,
+        u: Array | None,
+        t: float,
+        inputs: Sequence[str],
+        disturbances: Sequence[str] | None,
+    ) -> Linear:
+        """See `Model.linearize`."""
+        pushes = self._channels("inputs", inputs) if inputs != () else ()
+        others = self._ground
+        if disturbances is not None:
+            others = self._channels("disturbances", disturbances)
+        q, u = self._state(q, u, t)
+        model, about = self._model, self._model.slopes.at(t, q, u)
+        if about is None:
+            state = State(t, q, u, self._accelerations(t, q, u))
+            return Linear(model, state, pushes, others, self._turning(state))
+        turning = None if self._straight or not u.any() else about.G
+        return Linear(model, State(t, q, u, about.a), pushes, others, turning, about)
+
+    def _channels(self, what: str, names: Sequence[str]) -> tuple[Channel, ...]:
+        return tuple(channel(self._model, name) for name in names_of(what, names))
+
+    @cached_property
+    def _ground(self) -> tuple[Channel, ...]:
+        return self._channels("disturbances", GROUND)
+
+    def _state(self, q: Array | None, u: Array | None, t: float) -> tuple[Array, Array]:
+        """The state that is given with its drives, or rest."""
+        model = self._model
+        speeds = np.zeros(model.nu) if u is None else u
+        if q is None:
+            q = _rest(model, t) if u is None else initial_state(model)[0]
+        if self._settled:
+            return q, speeds
+        whole = SceneSystem(model.looped).start(t, q, speeds)
+        return whole[: model.nq], whole[model.nq : model.nq + model.nu]
+
+    def _accelerations(self, t: float, q: Array, u: Array) -> Array:
+        """Refuses a state that has none."""
+        engine = self._model.looped
+        memory = engine.start_memory()
+        return engine.accelerations(t, q[None].copy(), u[None].copy(), memory[None])[1][0]
+
+    def _turning(self, state: State) -> Array | None:
+        """See `Linear.turning`; exact."""
+        model = self._model
+        if self._straight or not state.u.any():
+            return None
+        of = np.array([[state.t]]), state.q[None], state.u[None], np.zeros((1, model.nu))
+        found = Differentiation(model, ()).at(*of)["rate_q"][0]
+        return np.asarray(found[np.ix_(model.free_speeds, model.free_speeds)])
 
 
 def _rest(model: Compiled, t: float) -> Array:
@@ -77,12 +115,3 @@ def _at_rest(model: Compiled, q: Array, t: float) -> bool:
     stiffness = matrices(engine, State(t, q, still, still), free).K * np.outer(sizes, sizes)
     scale = float(np.abs(stiffness).max(initial=0))
     return float(np.abs(missing).max(initial=0)) <= _AT_REST * scale
-
-
-def _turning(model: Compiled, state: State) -> Array | None:
-    """See `Linear.turning`; exact."""
-    if not state.u.any() or all(h.straight for h in model.layout.hinges.values() if h.nu):
-        return None
-    of = np.array([[state.t]]), state.q[None], state.u[None], np.zeros((1, model.nu))
-    found = Differentiation(model, ()).at(*of)["rate_q"][0]
-    return np.asarray(found[np.ix_(model.free_speeds, model.free_speeds)])

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from ..run.batch import BatchResult
     from .derivatives import Derivatives, Differentiation
     from .equilibrium import Equilibrium
+    from .linearize import Linearising
 
 
 class Model(Compiled):
@@ -199,15 +200,18 @@ class Model(Compiled):
         Raises SceneError for a name or shape that does not fit, NumericalFailure where there is no
         equilibrium near the scene's start or the state has no accelerations.
         """
-        from .linearize import linearize
-
         instead = "call linearize for each of several"
-        return linearize(
-            self,
+        return self._linearising(
             None if q is None else one("q", q, self.nq, instead),
             None if u is None else one("u", u, self.nu, instead),
             real("t", t, "a time in s"), inputs, disturbances,
         )  # fmt: skip
+
+    @cached_property
+    def _linearising(self) -> Linearising:
+        from .linearize import Linearising
+
+        return Linearising(self)
 
     def modes(
         self,

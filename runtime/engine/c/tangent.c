@@ -490,16 +490,6 @@ static void without_imposed_coordinates(const mstmm_model *model, const real *me
     }
 }
 
-int mstmm_residual_slopes(mstmm_tangent *at, int n, const real *d_q, const real *d_u,
-                          const real *d_a, real *d_r)
-{
-    const int64_t nq = at->model->nq, nu = at->model->nu;
-    int code = 0;
-    for (int k = 0; k < n && !code; k++)
-        code = mstmm_residual_slope(at, 0, d_q + k * nq, d_u + k * nu, d_a + k * nu, d_r + k * nu);
-    return code;
-}
-
 void mstmm_rates_slope(const mstmm_tangent *at, real *d_rates)
 {
     memcpy(d_rates, parts_of(at).d_qdot, (size_t)at->model->nq * sizeof(real));

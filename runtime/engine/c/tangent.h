@@ -48,9 +48,6 @@ int mstmm_residual_is_at(const mstmm_tangent *at, real t, const real *q, const r
 /* Derivative of R (nu) along d_t, d_q, d_u, d_a. */
 int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const real *d_u,
                          const real *d_a, real *d_r);
-/* The same along n directions, rows of d_q (nq), d_u, d_a and d_r (nu), at a standing time. */
-int mstmm_residual_slopes(mstmm_tangent *at, int n, const real *d_q, const real *d_u,
-                          const real *d_a, real *d_r);
 /* Change of the coordinates' rates (nq) along the direction of the last mstmm_residual_slope. */
 void mstmm_rates_slope(const mstmm_tangent *at, real *d_rates);
 /* Factors dR along unknowns x: du = rate x, da = s x, dq = (sq - kappa g_q)^-1 N x, where g_q are the

@@ -1,0 +1,129 @@
+/* The linear equations of a scene about a state; see linear.h. */
+#include "linear.h"
+
+#include <string.h>
+
+int64_t mstmm_linear_numbers(const mstmm_linear_code *code)
+{
+    const int64_t n = code->n;
+    return code->fused->nu + 4 * n * n + n + code->fused->nq;
+}
+
+/* Sums of several are quicker than one after the other, and what is not finite makes its sum so; a
+ * sum that alone is not finite is looked at again. */
+static int finite(int64_t count, const real *numbers)
+{
+    real sums[8] = {0};
+    int64_t k = 0;
+    for (; k + 8 <= count; k += 8)
+        for (int j = 0; j < 8; j++) sums[j] += numbers[k + j];
+    for (; k < count; k++) sums[0] += numbers[k];
+    for (int j = 1; j < 8; j++) sums[0] += sums[j];
+    if (isfinite(sums[0])) return 1;
+    for (k = 0; k < count; k++)
+        if (!isfinite(numbers[k])) return 0;
+    return 1;
+}
+
+int mstmm_linear_at(const mstmm_linear_code *code, real t, const real *q, const real *u,
+                    const real *efforts, real *found)
+{
+    const mstmm_fused *fused = code->fused;
+    const int64_t n = code->n, square = n * n, count = mstmm_linear_numbers(code);
+    real *a = found, *m = a + fused->nu, *r_t = m + 4 * square, *qdot = r_t + n;
+    mstmm_renew_inputs(&code->live, t, code->p);
+    int failed = fused->accelerations(code->p, &t, q, u, code->memory, efforts, qdot, a);
+    if (!failed)
+        failed = fused->linear(code->p, &t, q, u, code->memory, a, m, m + square, m + 2 * square,
+                               m + 3 * square, r_t);
+    return failed || !finite(count, found);
+}
+
+int mstmm_linear_swept(mstmm_tangent *at, real t, const real *q, const real *u, const real *a,
+                       int n, const int *free, real *found, real *work)
+{
+    const int64_t nq = at->model->nq, nu = at->model->nu;
+    real *column = work, *unit = column + nu, *still = unit + nu, *moved = still + nq + nu;
+    memset(work, 0, (size_t)(nq + 3 * nu) * sizeof(real));
+    int code = mstmm_residual(at, t, q, u, a, column, NULL);
+    for (int k = 0; k < n; k++)
+        for (int kind = 0; !code && kind < 3; kind++) {
+            unit[free[k]] = 1;
+            /* The change of the rates along a speed is how coordinates follow it. */
+            if (kind == 2) mstmm_rates_slope(at, moved);
+            code = mstmm_residual_slope(at, 0, kind == 2 ? moved : still, kind == 1 ? unit : still,
+                                        kind == 0 ? unit : still, column);
+            unit[free[k]] = 0;
+            for (int i = 0; !code && i < n; i++) found[(kind * n + i) * n + k] = column[free[i]];
+        }
+    return code;
+}
+
+/* rows (n x m) become M^-1 rows, by M = L D L^T; `factors` (n x n) keeps L, and 1 / D. */
+static int divide_by_mass(int n, int m, const real *restrict mass, real *restrict rows,
+                          real *restrict factors)
+{
+    for (int i = 0; i < n; i++) {
+        real *own = factors + n * i, pivot = mass[n * i + i];
+        for (int j = 0; j < i; j++) {
+            real rest = mass[n * i + j];
+            for (int k = 0; k < j; k++) rest -= own[k] * factors[n * j + k];
+            own[j] = rest; /* times D as yet */
+        }
+        for (int j = 0; j < i; j++) {
+            const real scaled = own[j] * factors[n * j + j];
+            pivot -= own[j] * scaled;
+            own[j] = scaled;
+        }
+        if (!(pivot > 0)) return 1;
+        own[i] = 1 / pivot;
+        for (int j = 0; j < i; j++)
+            for (int c = 0; c < m; c++) rows[m * i + c] -= own[j] * rows[m * j + c];
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        for (int c = 0; c < m; c++) rows[m * i + c] *= factors[n * i + i];
+        for (int k = i + 1; k < n; k++)
+            for (int c = 0; c < m; c++) rows[m * i + c] -= factors[n * k + i] * rows[m * k + c];
+    }
+    return 0;
+}
+
+int mstmm_state_matrix(const mstmm_linear_code *code, const real *found, int turning, real *matrix)
+{
+    const int n = code->n;
+    const real *M = found + code->fused->nu, *C = M + n * n, *K = C + n * n, *G = K + n * n;
+    real *below = matrix + 2 * n * n;
+    memset(matrix, 0, 2 * (size_t)(n * n) * sizeof(real));
+    for (int i = 0; i < n; i++) {
+        matrix[2 * n * i + n + i] = 1;
+        for (int j = 0; j < n; j++) {
+            below[2 * n * i + j] = -K[n * i + j];
+            below[2 * n * i + n + j] = -C[n * i + j];
+        }
+    }
+    const int singular = divide_by_mass(n, 2 * n, M, below, code->work);
+    /* x'' = G x' + u', where u' goes with u = x' - G x. */
+    for (int i = 0; turning && i < n; i++) {
+        real *by_x = below + 2 * n * i, *by_rate = by_x + n;
+        for (int k = 0; k < n; k++)
+            for (int j = 0; j < n; j++) by_x[j] -= by_rate[k] * G[n * k + j];
+        for (int j = 0; j < n; j++) by_rate[j] += G[n * i + j];
+    }
+    return singular;
+}
+
+int mstmm_acceleration_slopes(const mstmm_linear_code *code, const real *found, real *rows)
+{
+    const int n = code->n, width = 3 * n + 1;
+    const real *M = found + code->fused->nu, *C = M + n * n, *K = C + n * n, *r_t = K + 2 * n * n;
+    for (int i = 0; i < n; i++) {
+        real *right = rows + i * width;
+        for (int j = 0; j < n; j++) {
+            right[j] = -K[n * i + j];
+            right[n + j] = -C[n * i + j];
+            right[2 * n + j] = i == j;
+        }
+        right[3 * n] = -r_t[i];
+    }
+    return divide_by_mass(n, width, M, rows, code->work);
+}

@@ -1,0 +1,40 @@
+/* The linear equations of a scene about a state: M da + C du + K dphi = -r_t dt where accelerations
+ * change by da, speeds by du, coordinates by N dphi.  By code compiled for the scene, or by
+ * directions of the residual. */
+#ifndef MSTMM_LINEAR_HEADER
+#define MSTMM_LINEAR_HEADER
+
+#include "fused.h"
+#include "inputs.h"
+#include "tangent.h"
+
+/* cdef begin */
+/* Code of a scene, of which n speeds are imposed by nobody; everything is the caller's. */
+typedef struct {
+    const mstmm_fused *fused;
+    mstmm_live_inputs live;
+    real *p; /* written anew by live inputs */
+    const real *memory;
+    real *work; /* n n */
+    int n;
+} mstmm_linear_code;
+
+/* Numbers that it finds: udot (nu), M, C, K, G (n x n each), r_t (n), qdot (nq). */
+int64_t mstmm_linear_numbers(const mstmm_linear_code *code);
+/* Fills them at a state under efforts (nu).  Returns 0; else a guard failed or a number is not
+ * finite, nothing is meant, and the looped engine tells what is wrong. */
+int mstmm_linear_at(const mstmm_linear_code *code, real t, const real *q, const real *u,
+                    const real *efforts, real *found);
+/* M, C, K (n x n each) of the speeds `free` by the looped engine, behind one another.  `work` has
+ * 2 nq + 3 nu numbers. */
+int mstmm_linear_swept(mstmm_tangent *at, real t, const real *q, const real *u, const real *a,
+                       int n, const int *free, real *found, real *work);
+/* Slopes of accelerations, row by row (n x (3n + 1)): -M^-1 K, -M^-1 C, M^-1 and -M^-1 r_t of what
+ * mstmm_linear_at found.  Returns 1 where M is not positive definite. */
+int mstmm_acceleration_slopes(const mstmm_linear_code *code, const real *found, real *rows);
+/* d/dt (x, x') = matrix (2n x 2n) (x, x') of what mstmm_linear_at found, x' = G x + du where
+ * `turning`, else du.  Returns 1 where M is not positive definite. */
+int mstmm_state_matrix(const mstmm_linear_code *code, const real *found, int turning, real *matrix);
+/* cdef end */
+
+#endif

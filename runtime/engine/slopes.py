@@ -1,0 +1,156 @@
+"""A scene about its states, by code compiled for it: accelerations and linear equations at once."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arrays import Array
+
+from ..kernels.fused import FusedLibrary
+from .code import Fusing
+from .engine import Engine
+from .live import LiveInputs
+
+#: Seconds that a compiler takes, by the square of the speeds, and that its code saves a state, by
+#: the same; measured.  Only their ratio matters; fixed, so that the choice is always the same.
+_SECONDS_PER_PAIR = 0.1
+_SAVED, _SAVED_PER_PAIR = 2e-5, 4e-7
+
+
+class About:
+    """What is known of one state: n of nu speeds are imposed by nobody.
+
+    `a` (nu,) accelerations; M, C, K (n, n) as of `linear.matrices`; G (n, n) of x' = G x + du; r_t
+    (n,) what the efforts change by with time; views of `numbers`.
+    """
+
+    __slots__ = ("_n", "_nu", "numbers")
+
+    def __init__(self, numbers: Array, nu: int, n: int) -> None:
+        self.numbers, self._nu, self._n = numbers, nu, n
+
+    @property
+    def a(self) -> Array:
+        return self.numbers[: self._nu]
+
+    @property
+    def M(self) -> Array:
+        return self._matrix(0)
+
+    @property
+    def C(self) -> Array:
+        return self._matrix(1)
+
+    @property
+    def K(self) -> Array:
+        return self._matrix(2)
+
+    @property
+    def G(self) -> Array:
+        return self._matrix(3)
+
+    def _matrix(self, k: int) -> Array:
+        n = self._n
+        first = self._nu + k * n * n
+        return self.numbers[first : first + n * n].reshape(n, n)
+
+
+class Slopes:
+    """What `About` tells of any state of one scene, by code that is looked for at first, and
+    compiled once so many states pay.  Safe to call from several threads."""
+
+    def __init__(self, engine: Engine, fusion: Fusing, free: Sequence[int]) -> None:
+        self._engine, self._fusion, self._n = engine, fusion, len(free)
+        self._local, self._lock = threading.local(), threading.Lock()
+        self._library: FusedLibrary | None = None
+        self._looked, self._saved = False, 0.0
+
+    def at(self, t: float, q: Array, u: Array) -> About | None:
+        """One state, q (nq,) and u (nu,), contiguous; None where there is no code or a guard fails:
+        the looped engine serves, and names what is wrong."""
+        call = self.call()
+        return None if call is None else call.at(t, q, u)
+
+    def state_matrix(self, about: About, turning: bool) -> Array | None:
+        """A (2 n, 2 n) of d/dt (x, x') = A (x, x'), x' = du or, `turning`, G x + du; None where M
+        is not positive definite."""
+        call = self.call(0.0)
+        return None if call is None else call.state_matrix(about, turning)
+
+    def call(self, saved: float = 1.0) -> _Call | None:
+        """This thread's call, where there is code; `saved` counts what it saves, in states."""
+        if self._library is None and not self._expect(saved):
+            return None
+        try:
+            found: _Call = self._local.call
+        except AttributeError:
+            found = self._local.call = self._made()
+        return found
+
+    def _expect(self, saved: float) -> bool:
+        """Whether there is code by now."""
+        with self._lock:
+            pairs = self._engine.nu**2
+            self._saved += saved * (_SAVED + _SAVED_PER_PAIR * pairs)
+            pays = self._saved > _SECONDS_PER_PAIR * pairs
+            if self._library is None and (pays or not self._looked):
+                self._looked = True
+                self._library = self._fusion.ready_linear(pays)
+                if pays:  # it cannot be: another try would be no better
+                    self._saved = -np.inf
+            return self._library is not None
+
+    def _made(self) -> _Call:
+        assert self._library is not None
+        live = LiveInputs(self._engine.packed.system.inputs, self._fusion.inputs)
+        return _Call(self._engine, self._library, self._fusion.numbers, live, self._n)
+
+
+class _Call:
+    """One thread's record of the code, with what it reads."""
+
+    def __init__(
+        self, engine: Engine, library: FusedLibrary, numbers: Array, live: LiveInputs, n: int
+    ) -> None:
+        self._ffi, self._lib, self._n, self._nu = engine.ffi, engine.lib, n, engine.nu
+        p, memory, none = np.array(numbers), engine.start_memory(), np.zeros(engine.nu)
+        self._kept = library, live, *map(engine.pointer, (p, memory, none, np.empty(n * n)))
+        self._real = engine.ffi.typeof("double[]")
+        self._record = record = engine.ffi.new("mstmm_linear_code *")
+        record.fused, record.n = library.descriptor, n
+        record.p, record.memory, self._no_efforts, record.work = self._kept[2:]
+        if live.varies:
+            self._places: NDArray[np.int32] = live.places
+            record.live.n, record.live.inputs = len(live.places), engine.packed.model.inputs
+            record.live.places = engine.ffi.from_buffer("int[]", self._places)
+        self._numbers = int(engine.lib.mstmm_linear_numbers(record))
+
+    def at(self, t: float, q: Array, u: Array, efforts: Array | None = None) -> About | None:
+        """See `Slopes.at`."""
+        buffer, real = self._ffi.from_buffer, self._real
+        found = np.empty(self._numbers)
+        given = self._no_efforts if efforts is None else buffer(real, efforts)
+        failed = self._lib.mstmm_linear_at(
+            self._record, t, buffer(real, q), buffer(real, u), given, buffer(real, found)
+        )
+        return None if failed else About(found, self._nu, self._n)
+
+    def acceleration_slopes(self, about: About) -> Array | None:
+        """-M^-1 K, -M^-1 C, M^-1 and -M^-1 r_t (n, 3 n + 1) beside one another."""
+        n, buffer, real = self._n, self._ffi.from_buffer, self._real
+        rows = np.empty((n, 3 * n + 1))
+        numbers = buffer(real, about.numbers)
+        failed = self._lib.mstmm_acceleration_slopes(self._record, numbers, buffer(real, rows))
+        return None if failed else rows
+
+    def state_matrix(self, about: About, turning: bool) -> Array | None:
+        """See `Slopes.state_matrix`."""
+        n, buffer, real = self._n, self._ffi.from_buffer, self._real
+        found = np.empty((2 * n, 2 * n))
+        numbers = buffer(real, about.numbers)
+        failed = self._lib.mstmm_state_matrix(self._record, numbers, turning, buffer(real, found))
+        return None if failed else found
