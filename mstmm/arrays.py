@@ -61,14 +61,19 @@ def numbers(name: str, value: ArrayLike) -> Array:
         raise SceneError(
             f"{name} = {_short(value)}: expected an array of real numbers, every row as long"
         ) from None
-    # Squares add up quickly, and no two of them cancel; they alone may be too large.
-    if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
+    if not _surely_finite(array) and not np.isfinite(array).all():
         if array.ndim == 0:
             raise SceneError(f"{name} = {array}: expected a finite number")
         place = tuple(int(k[0]) for k in np.nonzero(~np.isfinite(array)))
         where = f"{name}[{', '.join(map(str, place))}]"
         raise SceneError(f"{where} = {array[place]}: expected a finite number")
     return array
+
+
+def _surely_finite(array: Array) -> bool:
+    """By the sum of squares, which is quick and in which nothing cancels."""
+    row = array if array.ndim == 1 else array.ravel()
+    return math.isfinite(row.dot(row))
 
 
 def _ready(value: ArrayLike) -> TypeGuard[Array]:
@@ -137,6 +142,14 @@ def columns(name: str, value: ArrayLike, width: int) -> tuple[bool, Array]:
     return False, array
 
 
+def one_state(*given: tuple[str, ArrayLike, int]) -> list[Array] | None:
+    """Copies of (name, value, width) where each is an array (width,): one state, as most calls give
+    it; None for anything else, and SceneError for what is no finite number."""
+    if not all(_ready(value) and value.shape == (width,) for _, value, width in given):
+        return None
+    return [numbers(name, value) for name, value, _ in given]
+
+
 #: How many numbers there are per state: one, a row of so many, or an array of such a shape.
 Width = int | tuple[int, int] | None
 
@@ -154,6 +167,8 @@ def batch(*given: tuple[str, ArrayLike, Width]) -> tuple[tuple[int, ...], list[A
             expected = ", ".join(map(str, tail))
             raise SceneError(f"{name} has shape {array.shape}, expected (..., {expected})")
     leads = [a.shape[: a.ndim - len(tail)] for a, tail in zip(arrays, tails, strict=True)]
+    if not any(leads):
+        return (), [a.reshape(1, *tail) for a, tail in zip(arrays, tails, strict=True)]
     try:
         lead = leads[0] if len(set(leads)) == 1 else np.broadcast_shapes(*leads)
     except ValueError:

@@ -81,12 +81,12 @@ class Slopes:
         call = self.call(0.0)
         return None if call is None else call.state_matrix(about, turning)
 
-    def call(self, saved: float = 1.0) -> _Call | None:
+    def call(self, saved: float = 1.0) -> Call | None:
         """This thread's call, where there is code; `saved` counts what it saves, in states."""
         if self._library is None and not self._expect(saved):
             return None
         try:
-            found: _Call = self._local.call
+            found: Call = self._local.call
         except AttributeError:
             found = self._local.call = self._made()
         return found
@@ -104,13 +104,13 @@ class Slopes:
                     self._saved = -np.inf
             return self._library is not None
 
-    def _made(self) -> _Call:
+    def _made(self) -> Call:
         assert self._library is not None
         live = LiveInputs(self._engine.packed.system.inputs, self._fusion.inputs)
-        return _Call(self._engine, self._library, self._fusion.numbers, live, self._n)
+        return Call(self._engine, self._library, self._fusion.numbers, live, self._n)
 
 
-class _Call:
+class Call:
     """One thread's record of the code, with what it reads."""
 
     def __init__(

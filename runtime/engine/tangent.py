@@ -59,9 +59,7 @@ class Tangent:
         self._call("residual_slope", float(d_t), d_q, d_u, d_a, found)
         return found
 
-    def matrices(
-        self, t: float, q: Array, u: Array, a: Array, free: Sequence[int]
-    ) -> Array:
+    def matrices(self, t: float, q: Array, u: Array, a: Array, free: Sequence[int]) -> Array:
         """M, C and K (3, n, n) about a state: derivatives of R by the accelerations of some speeds,
         by these speeds, and by how coordinates follow them; the state is referred to from now on.
         """

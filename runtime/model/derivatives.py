@@ -1,21 +1,24 @@
-"""Exact derivatives of the accelerations: the fused kernel differentiated, not its values.
+"""Exact derivatives of the accelerations, without differences.
 
-Forward mode (`mstmm.ir.tangent`): one run of a tangent kernel gives the derivative along one
-direction.  Coordinates are varied by tangent increments dphi, one for each speed: dq = N(q) dphi,
-where qdot = N(q) u.  For coordinates whose rate is their speed that is the coordinate itself; for
-the quaternion of a ball or free hinge it is the rotation vector in outboard axes.
+Where there is code for the linear equations of a scene about a state, they are all found at once:
+M da + C du + K dphi + r_t dt = d efforts.  Else by forward mode (`mstmm.ir.tangent`) on the fused
+kernel: one run of a tangent kernel gives the derivative along one direction.
+
+Coordinates are varied by tangent increments dphi, one for each speed: dq = N(q) dphi, where
+qdot = N(q) u.  For coordinates whose rate is their speed that is the coordinate itself; for the
+quaternion of a ball or free hinge it is the rotation vector in outboard axes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arrays import Array, batch
+from mstmm.arrays import Array, batch, one_state
 from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.live import LiveInputs
@@ -27,6 +30,9 @@ if TYPE_CHECKING:
     from ..engine.compiled import Compiled
 
 
+#: What code of linear equations saves a state beside directions one by one, in what it saves where
+#: a model is made linear; measured.
+_SAVED = 10.0
 #: More bodies than this are not differentiated: work and results grow with their square.
 MOST_BODIES = 1000
 
@@ -74,11 +80,81 @@ class Differentiation:
         self._live = LiveInputs(model.packed.system.inputs, structure.inputs)
         self.tangents = Tangents(model.fusion, structure, bool(names))
         self._memory = np.zeros(structure.n_memory)
+        #: Without drives all speeds are free, and time acts at coordinates that stay.
+        self._undriven = not names and not model.packed.system.driven
+        self._units = np.eye(model.nu)
         self._straight = all(hinge.straight for hinge in model.layout.hinges.values())
+
+    def __call__(
+        self,
+        q: ArrayLike,
+        u: ArrayLike,
+        t: ArrayLike,
+        efforts: ArrayLike | None,
+        accelerations: Callable[[], Array],
+    ) -> Derivatives:
+        """`Model.derivatives`; `accelerations` gives those of all its states, or refuses them."""
+        nq, nu, names = self._model.nq, self._model.nu, self.names
+        if self._undriven and isinstance(t, float) and efforts is None:
+            state = one_state(("q", q, nq), ("u", u, nu))
+            one = None if state is None else self._one(t, *state)
+            if one is not None:
+                return one
+        lead, (coordinates, speeds, times, extra) = batch(
+            ("q", q, nq), ("u", u, nu), ("t", t, None),
+            ("efforts", np.zeros(nu) if efforts is None else efforts, nu),
+        )  # fmt: skip
+        udot = accelerations()
+        found = self.at(times[:, None], coordinates, speeds, extra)
+
+        def shaped(name: str, *shape: int) -> Array:
+            return found[name].reshape(*lead, *shape)
+
+        columns = shaped("parameters", nu, len(names)) if names else np.zeros((*lead, nu, 0))
+        return Derivatives(
+            udot=udot,
+            t=shaped("t", nu),
+            parameters={name: columns[..., k] for k, name in enumerate(names)},
+            **{name: shaped(name, nu, nu) for name in ("q", "u", "efforts", "rate_q", "rate_u")},
+        )
+
+    def _one(self, t: float, q: Array, u: Array) -> Derivatives | None:
+        """Those of one state by the code of its linear equations; None where there is no such code,
+        or where it finds none: then the other way says why."""
+        call = self._model.slopes.call(_SAVED)
+        about = None if call is None else call.at(t, q, u)
+        slopes = None if call is None or about is None else call.acceleration_slopes(about)
+        if about is None or slopes is None:
+            return None
+        n, rate_u = len(slopes), self._units.copy()
+        by_q, by_u, by_efforts = slopes[:, :n], slopes[:, n : 2 * n], slopes[:, 2 * n : -1]
+        return Derivatives(about.a, by_q, by_u, by_efforts, slopes[:, -1], about.G, rate_u)
+
+    def _all_at_once(self, t: Array, q: Array, u: Array, efforts: Array) -> dict[str, Array] | None:
+        """`at` by that code."""
+        call = self._model.slopes.call(_SAVED * len(q)) if self._undriven else None
+        if call is None:
+            return None
+        n = self._model.nu
+        slopes, turning = np.empty((len(q), n, 3 * n + 1)), np.empty((len(q), n, n))
+        for k, state in enumerate(zip(t[:, 0].tolist(), q, u, efforts, strict=True)):
+            about = call.at(*state)
+            found = None if about is None else call.acceleration_slopes(about)
+            if about is None or found is None:
+                return None
+            slopes[k], turning[k] = found, about.G
+        return {
+            "q": slopes[..., :n], "u": slopes[..., n : 2 * n], "efforts": slopes[..., 2 * n : -1],
+            "t": slopes[..., -1:], "rate_q": turning,
+            "rate_u": np.repeat(self._units[None], len(q), axis=0),
+        }  # fmt: skip
 
     def at(self, t: Array, q: Array, u: Array, efforts: Array) -> dict[str, Array]:
         """Derivatives of n states, t (n, 1), q (n, nq), u and efforts (n, nu), by the names of
         `Derivatives`; (n, row, column), parameters as columns."""
+        at_once = self._all_at_once(t, q, u, efforts)
+        if at_once is not None:
+            return at_once
         nu = self._model.nu
         states = {
             "p": np.atleast_2d(self._live.at(self.p, t[:, 0])), "t": t, "q": q, "u": u,
@@ -148,33 +224,3 @@ def _refuse(model: Compiled) -> None:
             f"derivatives: {packed.system.count} bodies; expected {MOST_BODIES} or fewer, as "
             "work and results grow with their square"
         )
-
-
-def derivatives(
-    model: Compiled,
-    differentiation: Differentiation,
-    q: ArrayLike,
-    u: ArrayLike,
-    t: ArrayLike,
-    efforts: ArrayLike | None,
-    udot: Array,
-) -> Derivatives:
-    """`Model.derivatives` of all states of a batch, whose accelerations are known."""
-    nu = model.nu
-    lead, (coordinates, speeds, times, extra) = batch(
-        ("q", q, model.nq), ("u", u, nu), ("t", t, None),
-        ("efforts", np.zeros(nu) if efforts is None else efforts, nu),
-    )  # fmt: skip
-    found = differentiation.at(times[:, None], coordinates, speeds, extra)
-
-    def shaped(name: str, *shape: int) -> Array:
-        return found[name].reshape(*lead, *shape)
-
-    names = differentiation.names
-    columns = shaped("parameters", nu, len(names)) if names else np.zeros((*lead, nu, 0))
-    return Derivatives(
-        udot=udot,
-        t=shaped("t", nu),
-        parameters={name: columns[..., k] for k, name in enumerate(names)},
-        **{name: shaped(name, nu, nu) for name in ("q", "u", "efforts", "rate_q", "rate_u")},
-    )

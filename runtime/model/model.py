@@ -300,13 +300,17 @@ class Model(Compiled):
         Raises SceneError for a name that the scene does not have and for scenes with releases,
         NumericalFailure where `accelerations` does and where a derivative does not exist.
         """
-        from .derivatives import Differentiation, derivatives
-
         names = tuple(parameters)
         if names not in self._differentiations:
-            self._differentiations[names] = Differentiation(self, names)
-        udot = self.accelerations(q, u, t, efforts)  # refuses states that have none
-        return derivatives(self, self._differentiations[names], q, u, t, efforts, udot)
+            self._differentiations[names] = self._differentiated_by(names)
+        return self._differentiations[names](
+            q, u, t, efforts, lambda: self.accelerations(q, u, t, efforts)
+        )
+
+    def _differentiated_by(self, names: tuple[str, ...]) -> Differentiation:
+        from .derivatives import Differentiation
+
+        return Differentiation(self, names)
 
     def simulate(
         self,

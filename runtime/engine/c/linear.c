@@ -109,7 +109,7 @@ int mstmm_state_matrix(const mstmm_linear_code *code, const real *found, int tur
             for (int j = 0; j < n; j++) by_x[j] -= by_rate[k] * G[n * k + j];
         for (int j = 0; j < n; j++) by_rate[j] += G[n * i + j];
     }
-    return singular;
+    return singular || !finite(2 * n * n, below);
 }
 
 int mstmm_acceleration_slopes(const mstmm_linear_code *code, const real *found, real *rows)
@@ -125,5 +125,5 @@ int mstmm_acceleration_slopes(const mstmm_linear_code *code, const real *found, 
         }
         right[3 * n] = -r_t[i];
     }
-    return divide_by_mass(n, width, M, rows, code->work);
+    return divide_by_mass(n, width, M, rows, code->work) || !finite(n * width, rows);
 }

@@ -30,10 +30,10 @@ int mstmm_linear_at(const mstmm_linear_code *code, real t, const real *q, const 
 int mstmm_linear_swept(mstmm_tangent *at, real t, const real *q, const real *u, const real *a,
                        int n, const int *free, real *found, real *work);
 /* Slopes of accelerations, row by row (n x (3n + 1)): -M^-1 K, -M^-1 C, M^-1 and -M^-1 r_t of what
- * mstmm_linear_at found.  Returns 1 where M is not positive definite. */
+ * mstmm_linear_at found.  Returns 1 where M is not positive definite, or a number not finite. */
 int mstmm_acceleration_slopes(const mstmm_linear_code *code, const real *found, real *rows);
 /* d/dt (x, x') = matrix (2n x 2n) (x, x') of what mstmm_linear_at found, x' = G x + du where
- * `turning`, else du.  Returns 1 where M is not positive definite. */
+ * `turning`, else du.  Returns 1 as before. */
 int mstmm_state_matrix(const mstmm_linear_code *code, const real *found, int turning, real *matrix);
 /* cdef end */
 
