@@ -145,9 +145,12 @@ def columns(name: str, value: ArrayLike, width: int) -> tuple[bool, Array]:
 def one_state(*given: tuple[str, ArrayLike, int]) -> list[Array] | None:
     """Copies of (name, value, width) where each is an array (width,): one state, as most calls give
     it; None for anything else, and SceneError for what is no finite number."""
-    if not all(_ready(value) and value.shape == (width,) for _, value, width in given):
-        return None
-    return [numbers(name, value) for name, value, _ in given]
+    found = list[Array]()
+    for name, value, width in given:
+        if not _ready(value) or value.shape != (width,):
+            return None
+        found.append(numbers(name, value))
+    return found
 
 
 #: How many numbers there are per state: one, a row of so many, or an array of such a shape.

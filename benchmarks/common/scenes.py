@@ -64,6 +64,19 @@ def puma(n: int = 6) -> Scene:
     return example("puma560")
 
 
+def arm(n: int) -> Scene:
+    """An arm as robots have it: links with offsets and full inertias, axes along and across."""
+    scene = chain(n, [0.0, 0.0, -9.81], lambda i: {"type": "pin", "axis": AXES[2 - i % 2]})
+    for i, body in enumerate(scene["body"]):
+        body |= {
+            "mass": 4.0 - 0.4 * i,
+            "center_of_mass": [0.01, 0.02, 0.12],
+            "inertia": [0.03, 0.025, 0.01, 0.001, -0.002, 0.0015],
+            "ends": {"tip": [0.0, 0.03 * (i % 2), 0.25]},
+        }
+    return scene
+
+
 def long_chain(kind: str, n: int) -> Scene:
     """`pins`, `balls` or `planar` with any n, written as one chain."""
     body = {key: value for key, value in rod("").items() if key != "name"}

@@ -55,21 +55,22 @@ class Calls:
         self.packed = packed
         self.ffi, self.lib = packed.ffi, packed.lib
         self.nq, self.nu = packed.layout.nq, packed.layout.nu
-        self._local = threading.local()
+        #: What each thread keeps for itself.
+        self.local = threading.local()
 
     def workspace(self) -> Any:
         """This thread's workspace as `real *`."""
         size = self.packed.workspace
-        if getattr(self._local, "size", None) != size:
-            self._local.array = np.zeros(size)
-            self._local.pointer = self.pointer(self._local.array)
-            self._local.size = size
-        return self._local.pointer
+        if getattr(self.local, "size", None) != size:
+            self.local.array = np.zeros(size)
+            self.local.pointer = self.pointer(self.local.array)
+            self.local.size = size
+        return self.local.pointer
 
     def workspace_array(self) -> Array:
         """The numbers this thread's last call left in its workspace, a view."""
         self.workspace()
-        return np.asarray(self._local.array)
+        return np.asarray(self.local.array)
 
     def pointer(self, array: Array) -> Any:
         """`real *` to a contiguous array of doubles."""

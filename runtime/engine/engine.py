@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +13,6 @@ from mstmm.errors import NumericalFailure, UndeterminedMotion
 
 from .calls import Calls
 from .culprit import culprit
-from .tangent import Tangent
 
 
 class Engine(Calls):
@@ -124,14 +123,6 @@ class Engine(Calls):
             name = self.packed.layout.u_name(int(np.nonzero(~np.isfinite(answers))[1][0]))
             raise engine.not_finite(f"the answer of {name}", 0.0, q, np.zeros(self.nu))
         return answers
-
-    @property
-    def tangent(self) -> Tangent:
-        """This thread's, with nothing released and no turns counted."""
-        if getattr(self._local, "tangent_of", None) != self.packed.workspace:
-            self._local.tangent = Tangent(self)
-            self._local.tangent_of = self.packed.workspace
-        return cast(Tangent, self._local.tangent)
 
     def rates(self, t: float, q: Array, u: Array, memory: Array) -> Array:
         """qdot (nq,) of one state: kinematics alone, so that no inertia has to be positive."""

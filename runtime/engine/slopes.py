@@ -129,23 +129,29 @@ class Call:
             record.live.places = engine.ffi.from_buffer("int[]", self._places)
         self._numbers = int(engine.lib.mstmm_linear_numbers(record))
 
-    def at(self, t: float, q: Array, u: Array, efforts: Array | None = None) -> About | None:
+    def at(self, t: float, q: Array, u: Array) -> About | None:
         """See `Slopes.at`."""
         buffer, real = self._ffi.from_buffer, self._real
         found = np.empty(self._numbers)
-        given = self._no_efforts if efforts is None else buffer(real, efforts)
         failed = self._lib.mstmm_linear_at(
-            self._record, t, buffer(real, q), buffer(real, u), given, buffer(real, found)
-        )
+            self._record, t, buffer(real, q), buffer(real, u), self._no_efforts,
+            buffer(real, found),
+        )  # fmt: skip
         return None if failed else About(found, self._nu, self._n)
 
-    def acceleration_slopes(self, about: About) -> Array | None:
-        """-M^-1 K, -M^-1 C, M^-1 and -M^-1 r_t (n, 3 n + 1) beside one another."""
-        n, buffer, real = self._n, self._ffi.from_buffer, self._real
-        rows = np.empty((n, 3 * n + 1))
-        numbers = buffer(real, about.numbers)
-        failed = self._lib.mstmm_acceleration_slopes(self._record, numbers, buffer(real, rows))
-        return None if failed else rows
+    def with_slopes(
+        self, t: float, q: Array, u: Array, efforts: Array | None = None
+    ) -> tuple[About, Array] | None:
+        """The same, and of the accelerations -M^-1 K, -M^-1 C, M^-1 and -M^-1 r_t beside one
+        another (n, 3 n + 1)."""
+        buffer, real, n = self._ffi.from_buffer, self._real, self._n
+        found, slopes = np.empty(self._numbers), np.empty((n, 3 * n + 1))
+        given = self._no_efforts if efforts is None else buffer(real, efforts)
+        failed = self._lib.mstmm_accelerations_about(
+            self._record, t, buffer(real, q), buffer(real, u), given, buffer(real, found),
+            buffer(real, slopes),
+        )  # fmt: skip
+        return None if failed else (About(found, self._nu, n), slopes)
 
     def state_matrix(self, about: About, turning: bool) -> Array | None:
         """See `Slopes.state_matrix`."""

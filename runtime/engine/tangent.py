@@ -8,7 +8,7 @@ R and its tangent, eliminated from the tips to the root (derive/equations/tangen
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -141,6 +141,15 @@ class Tangent:
         if getattr(self.engine.lib, f"mstmm_{name}")(self.record, *given):
             t = float(self.record.t)
             raise self.engine.failed(self.record.failure, t, *self.state)
+
+
+def tangent_of(engine: Engine) -> Tangent:
+    """This thread's, with nothing released and no turns counted."""
+    kept, size = engine.local, engine.packed.workspace
+    if getattr(kept, "tangent_of", None) != size:
+        kept.tangent = Tangent(engine)
+        kept.tangent_of = engine.packed.workspace
+    return cast(Tangent, kept.tangent)
 
 
 def _couplings(engine: Engine) -> tuple[list[Any], int]:

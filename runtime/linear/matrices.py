@@ -21,6 +21,7 @@ from mstmm.errors import NumericalFailure
 
 from ..engine.culprit import steep
 from ..engine.engine import Engine
+from ..engine.tangent import tangent_of
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Matrices:
 
 def matrices(engine: Engine, state: State, free: Sequence[int]) -> Matrices:
     """The matrices of a packed scene.  NumericalFailure where the state cannot be evaluated."""
-    found = engine.tangent.matrices(state.t, state.q, state.u, state.a, free)
+    found = tangent_of(engine).matrices(state.t, state.q, state.u, state.a, free)
     if not np.isfinite(found).all():
         raise _no_slope(engine, state)
     return Matrices(*found)

@@ -122,10 +122,10 @@ class Differentiation:
         """Those of one state by the code of its linear equations; None where there is no such code,
         or where it finds none: then the other way says why."""
         call = self._model.slopes.call(_SAVED)
-        about = None if call is None else call.at(t, q, u)
-        slopes = None if call is None or about is None else call.acceleration_slopes(about)
-        if about is None or slopes is None:
+        found = None if call is None else call.with_slopes(t, q, u)
+        if found is None:
             return None
+        about, slopes = found
         n, rate_u = len(slopes), self._units.copy()
         by_q, by_u, by_efforts = slopes[:, :n], slopes[:, n : 2 * n], slopes[:, 2 * n : -1]
         return Derivatives(about.a, by_q, by_u, by_efforts, slopes[:, -1], about.G, rate_u)
@@ -138,11 +138,10 @@ class Differentiation:
         n = self._model.nu
         slopes, turning = np.empty((len(q), n, 3 * n + 1)), np.empty((len(q), n, n))
         for k, state in enumerate(zip(t[:, 0].tolist(), q, u, efforts, strict=True)):
-            about = call.at(*state)
-            found = None if about is None else call.acceleration_slopes(about)
-            if about is None or found is None:
+            found = call.with_slopes(*state)
+            if found is None:
                 return None
-            slopes[k], turning[k] = found, about.G
+            slopes[k], turning[k] = found[1], found[0].G
         return {
             "q": slopes[..., :n], "u": slopes[..., n : 2 * n], "efforts": slopes[..., 2 * n : -1],
             "t": slopes[..., -1:], "rate_q": turning,

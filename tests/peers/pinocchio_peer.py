@@ -155,3 +155,13 @@ class PinocchioPeer:
             self.model.nv, self.tree.nu
         )
         return np.array([self.back(row) for row in columns.T]).reshape(self.tree.nu, self.tree.nu)
+
+    def derivatives(self, q: Any, u: Any) -> tuple[Any, Any, Any]:
+        """Of accelerations under gravity alone by tangent increments of q, by u and by efforts."""
+        state = self.coordinates(q), self.speeds(u), np.zeros(self.model.nv)
+        pin.computeABADerivatives(self.model, self.data, *state)
+        places = self.back(np.arange(self.model.nv)).astype(int)
+        inverse = np.triu(self.data.Minv)
+        inverse = inverse + np.triu(inverse, 1).T
+        found = self.data.ddq_dq, self.data.ddq_dv, inverse
+        return tuple(matrix[np.ix_(places, places)] for matrix in found)

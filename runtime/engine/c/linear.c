@@ -112,12 +112,14 @@ int mstmm_state_matrix(const mstmm_linear_code *code, const real *found, int tur
     return singular || !finite(2 * n * n, below);
 }
 
-int mstmm_acceleration_slopes(const mstmm_linear_code *code, const real *found, real *rows)
+int mstmm_accelerations_about(const mstmm_linear_code *code, real t, const real *q, const real *u,
+                              const real *efforts, real *found, real *slopes)
 {
     const int n = code->n, width = 3 * n + 1;
     const real *M = found + code->fused->nu, *C = M + n * n, *K = C + n * n, *r_t = K + 2 * n * n;
+    if (mstmm_linear_at(code, t, q, u, efforts, found)) return 1;
     for (int i = 0; i < n; i++) {
-        real *right = rows + i * width;
+        real *right = slopes + i * width;
         for (int j = 0; j < n; j++) {
             right[j] = -K[n * i + j];
             right[n + j] = -C[n * i + j];
@@ -125,5 +127,5 @@ int mstmm_acceleration_slopes(const mstmm_linear_code *code, const real *found, 
         }
         right[3 * n] = -r_t[i];
     }
-    return divide_by_mass(n, width, M, rows, code->work) || !finite(n * width, rows);
+    return divide_by_mass(n, width, M, slopes, code->work) || !finite(n * width, slopes);
 }

@@ -29,11 +29,12 @@ int mstmm_linear_at(const mstmm_linear_code *code, real t, const real *q, const 
  * 2 nq + 3 nu numbers. */
 int mstmm_linear_swept(mstmm_tangent *at, real t, const real *q, const real *u, const real *a,
                        int n, const int *free, real *found, real *work);
-/* Slopes of accelerations, row by row (n x (3n + 1)): -M^-1 K, -M^-1 C, M^-1 and -M^-1 r_t of what
- * mstmm_linear_at found.  Returns 1 where M is not positive definite, or a number not finite. */
-int mstmm_acceleration_slopes(const mstmm_linear_code *code, const real *found, real *rows);
+/* The same, and slopes of accelerations row by row (n x (3n + 1)): -M^-1 K, -M^-1 C, M^-1 and
+ * -M^-1 r_t.  Neither is meant either where M is not positive definite. */
+int mstmm_accelerations_about(const mstmm_linear_code *code, real t, const real *q, const real *u,
+                              const real *efforts, real *found, real *slopes);
 /* d/dt (x, x') = matrix (2n x 2n) (x, x') of what mstmm_linear_at found, x' = G x + du where
- * `turning`, else du.  Returns 1 as before. */
+ * `turning`, else du.  Returns 1 where M is not positive definite, or a number not finite. */
 int mstmm_state_matrix(const mstmm_linear_code *code, const real *found, int turning, real *matrix);
 /* cdef end */
 

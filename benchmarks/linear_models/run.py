@@ -1,0 +1,128 @@
+"""Linear models of arms at a state, called from Python, beside Pinocchio's derivatives.
+
+    python benchmarks/linear_models/run.py [--quick]
+
+CPU time of a call, contenders in alternating rounds: mstmm on code compiled for the scene and on
+the looped engine, and pin.computeABADerivatives (if pin is there), which finds the same numbers.
+Building models and compiling are not counted.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+
+from common import links, measure, scenes  # noqa: E402
+
+import mstmm  # noqa: E402
+
+PEER = "pin.computeABADerivatives"
+SCENES = {"puma560": scenes.puma, "arm of seven": lambda: scenes.arm(7)}
+TARGETS = {"linearize(q, u)": 2.0, "linearize(q, u).A": 2.0, "derivatives(q, u)": 1.5}
+
+Work = dict[str, Callable[[], object]]
+
+
+def own(scene: scenes.Scene, q: np.ndarray, u: np.ndarray) -> tuple[Work, np.ndarray]:
+    """Our calls, and the slopes of accelerations (nu, 2 nu) by q and u that they find."""
+    fused, looped = (
+        mstmm.compile(mstmm.Scene(**scene), engine=engine) for engine in ("fused", "looped")
+    )
+    for model in (fused, looped):  # the first call compiles, or looks for code
+        model.linearize(q, u)
+        model.derivatives(q, u)
+    work: Work = {
+        "linearize(q, u)": lambda: fused.linearize(q, u),
+        "linearize(q, u).A": lambda: fused.linearize(q, u).A,
+        "derivatives(q, u)": lambda: fused.derivatives(q, u),
+        "looped linearize(q, u).A": lambda: looped.linearize(q, u).A,
+    }
+    return work, fused.linearize(q, u).A[len(u) :]
+
+
+def peer(scene: scenes.Scene, q: np.ndarray, u: np.ndarray) -> tuple[Work, np.ndarray | None]:
+    """Pinocchio's call and what it finds; nothing where pin is missing."""
+    try:
+        import pinocchio as pin
+    except ImportError:
+        return {}, None
+    tree, model = links.links_of(scene), pin.Model()
+    model.gravity.linear = tree.gravity
+    for link in tree.links:
+        joint = model.addJoint(
+            link.parent + 1, pin.JointModelRevoluteUnaligned(link.axis),
+            pin.SE3(link.turn, link.place), link.name,
+        )  # fmt: skip
+        inertia = pin.Inertia(link.mass, link.center, link.inertia)
+        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    model.armature = np.array([link.armature for link in tree.links])
+    data, efforts = model.createData(), np.zeros(len(u))
+
+    def call() -> object:
+        pin.computeABADerivatives(model, data, q, u, efforts)
+        return data.ddq_dq, data.ddq_dv, data.Minv
+
+    call()
+    return {PEER: call}, np.hstack([data.ddq_dq, data.ddq_dv])
+
+
+def measured(quick: bool) -> list[dict[str, Any]]:
+    """Microseconds a call, and how far the slopes lie apart."""
+    results = []
+    for name, make in SCENES.items():
+        scene = bare(make())
+        (q,), (u,) = links.states(links.links_of(scene), 1)
+        work, found = own(scene, q, u)
+        other, wanted = peer(scene, q, u)
+        apart = None if wanted is None else measure.disagreement(found, wanted)
+        timed = {one: lambda call=call: measure.once(call) for one, call in (other | work).items()}
+        for one, samples in measure.rounds(timed, 3 if quick else 40).items():
+            us = [1e6 * s for s in samples]
+            results.append({"scene": name, "call": one, "us": us, "apart": apart})
+            print(name, one, f"{min(us):.4g} us", flush=True)
+    return results
+
+
+def bare(scene: scenes.Scene) -> scenes.Scene:
+    """Without what the peer does not differentiate, but inertia of drives."""
+    hinges = [
+        hinge | {"law": {"inertia": hinge.get("law", {}).get("inertia", 0.0)}}
+        for hinge in scene["hinge"]
+    ]
+    return {key: scene[key] for key in ("gravity", "body")} | {"hinge": hinges}
+
+
+def table(results: list[dict[str, Any]]) -> str:
+    """Markdown: best of the rounds."""
+    lines = ["| scene | call | us | beside pin | asked | apart |", "|---|---|---|---|---|---|"]
+    best = {(r["scene"], r["call"]): min(r["us"]) for r in results}
+    for r in results:
+        us, beside = min(r["us"]), best.get((r["scene"], PEER))
+        ratio = "" if beside is None else f"{us / beside:.3g}"
+        apart = "" if r["apart"] is None or r["call"] == PEER else f"{r['apart']:.1e}"
+        asked = TARGETS.get(r["call"], "")
+        lines.append(f"| {r['scene']} | {r['call']} | {us:.4g} | {ratio} | {asked} | {apart} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Measure, print the table."""
+    options = measure.options(str(__doc__).splitlines()[0], HERE).parse_args()
+    if not options.plot:
+        measure.save(options.json, measured(options.quick))
+    record = json.loads(options.json.read_text())
+    text = table(record["results"])
+    print(text)
+    options.json.with_suffix(".md").write_text(text + "\n")
+
+
+if __name__ == "__main__":
+    main()
