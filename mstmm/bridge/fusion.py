@@ -48,6 +48,9 @@ _SAVED_PER_BODY = 6e-8
 #: More unknowns than this are eliminated body by body, by the looped engine: the tangent as a whole
 #: costs the square of them.
 _MOST_UNKNOWNS = 20
+#: More than this make the matrices of a linear model too much text: 4 s of a compiler for 7, 15 s
+#: for 12.
+_MOST_SLOPES = 10
 #: A frame or section of a flexible body with n shapes compiles like 1 + n^2 / this many bodies.
 _MODES_PER_BODY = 24
 
@@ -141,14 +144,15 @@ class Fusion:
         evaluations there will be (inf) only after `build`.  None where the looped engine serves:
         for other scenes, and where it cannot be made.
         """
-        return self._of_small("implicit", self._break_even() < evaluations < math.inf)
+        pays = self._break_even() < evaluations < math.inf
+        return self._of_small("implicit", _MOST_UNKNOWNS, pays)
 
     def ready_linear(self, pays: bool) -> FusedLibrary | None:
-        """The same for the slopes about a state."""
-        return self._of_small("linear", pays)
+        """The same for the slopes about a state, where the caller knows whether they pay."""
+        return self._of_small("linear", _MOST_SLOPES, pays)
 
-    def _of_small(self, part: str, pays: bool) -> FusedLibrary | None:
-        if self.obstacle or not 0 < self.structure.nu <= _MOST_UNKNOWNS:
+    def _of_small(self, part: str, most: int, pays: bool) -> FusedLibrary | None:
+        if self.obstacle or not 0 < self.structure.nu <= most:
             return None
         try:
             return self._get(part, build=self._insisted or pays)

@@ -83,9 +83,16 @@ class Calls:
     @cached_property
     def inertia_alone(self) -> Self:
         """The same tree without gravity, laws, drives and loads."""
+        return self._pulled((0.0, 0.0, 0.0))
+
+    @cached_property
+    def pulled(self) -> tuple[Self, ...]:
+        """The same under a gravity of 1 m/s^2 along each inertial axis."""
+        return tuple(self._pulled(tuple(row)) for row in np.eye(3).tolist())
+
+    def _pulled(self, gravity: tuple[float, ...]) -> Self:
         model = self.ffi.new("mstmm_model *", self.packed.model[0])
-        for k in range(3):
-            model.gravity[k] = 0.0
+        model.gravity = list(gravity)
         model.n_laws = model.n_drives = model.n_values = 0
         model.n_loads = model.n_forces = model.needs_pose = 0
         model.product = self.ffi.NULL

@@ -24,7 +24,8 @@ class Engine(Calls):
     ) -> tuple[Array, Array]:
         """(qdot, udot) of n states: q (n, nq), u (n, nu), memory (n, m), efforts (n, nu)."""
         n = len(q)
-        times = np.ascontiguousarray(np.broadcast_to(np.asarray(t, dtype=np.float64), (n,)))
+        times = np.empty(n)
+        times[:] = t
         qdot, udot = np.empty((n, self.nq)), np.empty((n, self.nu))
         failure, at = self.ffi.new("mstmm_failure *"), self.ffi.new("int64_t *")
         code = self.lib.mstmm_accelerations_many(

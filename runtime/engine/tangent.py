@@ -63,11 +63,14 @@ class Tangent:
         """M, C and K (3, n, n) about a state: derivatives of R by the accelerations of some speeds,
         by these speeds, and by how coordinates follow them; the state is referred to from now on.
         """
-        n = len(free)
+        n, engine = len(free), self.engine
         found, work = np.empty((3, n, n)), np.empty(2 * self.nq + 3 * self.nu)
-        places = self.engine.ffi.new("int[]", free)
         self.state = np.array(q, float), np.array(u, float)
-        self._call("linear_swept", float(t), q, u, a, n, places, found, work)
+        given = map(engine.pointer, (*self.state, np.ascontiguousarray(a, float)))
+        made = map(engine.pointer, (found, work))
+        places = engine.ffi.new("int[]", free)
+        if engine.lib.mstmm_linear_swept(self.record, t, *given, n, places, *made):
+            raise engine.failed(self.record.failure, t, *self.state)
         return found
 
     def factor(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:

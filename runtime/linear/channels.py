@@ -142,17 +142,18 @@ def columns(engine: Engine, state: State, channels: Sequence[Channel], free: lis
     """(free, channels): efforts in the free speeds of a unit of each push."""
     if not channels:
         return np.zeros((len(free), 0))
-    bare = _under(engine, (0.0, 0.0, 0.0))
-    still = np.zeros(engine.nu)
+    still, memory = np.zeros(engine.nu), engine.start_memory()
 
-    def residual(of: Engine) -> Array:
-        return of.inverse_dynamics(state.t, state.q, still, still, of.start_memory())
+    def beyond(of: Engine) -> Array:
+        """Efforts that it needs at rest beyond those of the same tree under nothing."""
+        bare, loaded = (
+            each.inverse_dynamics(state.t, state.q, still, still, memory)
+            for each in (engine.inertia_alone, of)
+        )
+        return np.asarray(loaded - bare)
 
-    nothing = residual(bare)
     found = []
     for one in channels:
-        unit = [0.0, 0.0, 0.0]
-        unit[one.axis] = 1.0
         if one.input >= 0:
             found.append(
                 _rate(engine, state, one.input, 0.0) - _rate(engine, state, one.input, 1.0)
@@ -160,9 +161,9 @@ def columns(engine: Engine, state: State, channels: Sequence[Channel], free: lis
         elif one.speed >= 0:
             found.append(np.eye(engine.nu)[one.speed])
         elif one.end:
-            found.append(nothing - residual(_under(engine, (0.0, 0.0, 0.0), one, unit)))
+            found.append(-beyond(_under(engine, one)))
         else:
-            found.append(residual(_under(engine, unit)) - nothing)
+            found.append(beyond(engine.pulled[one.axis]))
     return np.array(found).T[free]
 
 
@@ -180,27 +181,19 @@ def _rate(engine: Engine, state: State, place: int, rate: float) -> Array:
     return tangent.slope(1.0, np.zeros(engine.nq), nothing, nothing)
 
 
-def _under(
-    engine: Engine,
-    gravity: Sequence[float],
-    push: Channel | None = None,
-    unit: Sequence[float] = (),
-) -> Engine:
-    """The tree under gravity and one push alone."""
-    packed, system = engine.packed, engine.packed.system
-    loads: tuple[LoadNumbers, ...] = ()
-    if push is not None:
-        body, _, offset = packed.end(push.end)
-        system = system.awake(body)  # nothing else may hang or act on this end
-        nothing, own = (-1, -1, -1), (0, 1, 2)
-        force = push.kind == "force"
-        load = LoadNumbers(
-            body, -1, INERTIAL, offset, own if force else nothing, nothing if force else own
-        )
-        loads = (load,)
-    values = constant_kernel("values", system, list(unit)) if loads else None
+def _under(engine: Engine, push: Channel) -> Engine:
+    """The tree under a unit of one push at an end alone."""
+    packed = engine.packed
+    body, _, offset = packed.end(push.end)
+    system = packed.system.awake(body)  # nothing else may hang or act on this end
+    unit = np.eye(3)[push.axis].tolist()
+    nothing, own = (-1, -1, -1), (0, 1, 2)
+    force = push.kind == "force"
+    load = LoadNumbers(
+        body, -1, INERTIAL, offset, own if force else nothing, nothing if force else own
+    )
     system = replace(
-        system, gravity=tuple(gravity), laws=(), forces=(), loads=loads, values=values,
-        drives=None, driven=(), moving={},
+        system, gravity=(0.0, 0.0, 0.0), laws=(), forces=(), loads=(load,),
+        values=constant_kernel("values", system, unit), drives=None, driven=(), moving={},
     )  # fmt: skip
     return Engine(packed_system(system, packed))
