@@ -15,12 +15,14 @@ from typing import Protocol
 
 import mstmm.templates
 from mstmm.border.fused import ABI, DECLARATIONS, FLAGS, SYMBOL
-from mstmm.ir import Assign, Element, KernelIR, Operand, Store
+from mstmm.ir import Element, KernelIR, Operand
 
 from ..fuse.passes.interleave import merged
 from ..fuse.passes.registers import thrifty
 from ..fuse.passes.sincos import Angle, gather
+from .guards import Guards
 from .kernel import string
+from .parts import WHOLE, Parts, printed
 from .straight_line import LANES, NUMBERS, Dialect, StraightText, port_name, signature
 
 __all__ = ["ABI", "FLAGS", "function_text", "fused_sources", "support"]
@@ -91,71 +93,40 @@ def support(name: str) -> str:
     return path.read_text(encoding="utf-8")
 
 
-#: C names: whether every guard held so far, and how many did before the first that did not.
-_HOLDS, _COUNT = "holds", "held"
-
-
 def function_text(kernel: KernelIR, name: str, dialect: Dialect) -> str:
-    """C function `name` of a straight-line kernel; returns 0 or the code of the first failed guard.
+    """C function `name` of a straight-line kernel, the long ones in parts; returns 0 or the code of
+    the first failed guard.
 
-    Nothing depends on a guard, and a branch would only stand in the way of what comes behind it;
-    so it is counted on the way how many hold before the first that does not.  In lanes guards are
-    judged in the end, there is one more argument, `int *codes`, and the result is non-zero if any
-    lane failed.
+    In lanes there is one more argument, `int *codes`, and the result is non-zero if any lane
+    failed.
     """
     text = StraightText(kernel, dialect)
     ordered = gather(kernel.statements)
+    short = not dialect.vector and kernel.flops() <= _SHORT
+    rest = merged(ordered.rest) if short else thrifty(ordered.rest)
+    guards = Guards(text)
+    parts = Parts(text, name, ordered.made(), rest, guards) if len(rest) > WHOLE else None
     lines = [f"(void){port_name(port.name)};" for port in (*kernel.inputs, *kernel.outputs)]
-    guards: list[tuple[str, int]] = []
-    angles = _lanes_angles if dialect.vector else _four_angles
     for level in ordered.levels:
         for early in level.statements:
             lines += text.assign(early)
-        lines += angles(text, level.angles)
-    short = not dialect.vector and kernel.flops() <= _SHORT
-    for statement in merged(ordered.rest) if short else thrifty(ordered.rest):
-        if isinstance(statement, Assign):
-            lines += text.assign(statement)
-        elif isinstance(statement, Store):
-            lines.append(text.store(statement))
-        else:
-            guards.append((text.truth(statement.condition), statement.code))
-            lines += [] if dialect.vector else _judged(guards)
-    if guards and not dialect.vector:
-        lines.insert(0, f"int {_HOLDS} = 1, {_COUNT} = 0;")
-    lines += _lanes_verdict(guards) if dialect.vector else _verdict(guards)
+        lines += (_lanes_angles if dialect.vector else _four_angles)(text, level.angles)
+    lines += guards.begun()
+    if parts is None:
+        lines += [line for statement in rest for line in printed(text, statement, guards)]
+    else:
+        lines += parts.calls()
+    lines += guards.verdict()
     parameters = signature(kernel, dialect) + (["int *restrict codes"] if dialect.vector else [])
     body = "\n".join(f"    {line}" for line in lines)
-    return f"static int {name}(\n    {_wrapped(parameters)})\n{{\n{body}\n}}\n"
+    return (
+        f"{parts.functions if parts else ''}static int {name}(\n"
+        f"    {_wrapped(parameters)})\n{{\n{body}\n}}\n"
+    )
 
 
 def _wrapped(words: Sequence[str]) -> str:
     return ",\n    ".join(words)
-
-
-def _judged(guards: Sequence[tuple[str, int]]) -> list[str]:
-    """The last guard; counting waits for the first of another code."""
-    truth, code = guards[-1]
-    counted = len(guards) > 1 and guards[-2][1] != code
-    return [f"{_COUNT} += {_HOLDS};"] * counted + [f"{_HOLDS} &= {truth};"]
-
-
-def _verdict(guards: Sequence[tuple[str, int]]) -> list[str]:
-    if not guards:
-        return ["return 0;"]
-    codes = [code for i, (_, code) in enumerate(guards) if not i or guards[i - 1][1] != code]
-    words = ", ".join(map(str, [*codes, 0]))
-    return [f"static const int codes[] = {{{words}}};", f"return codes[{_COUNT} + {_HOLDS}];"]
-
-
-def _lanes_verdict(guards: Sequence[tuple[str, int]]) -> list[str]:
-    lines = ["for (int i = 0; i < MSTMM_LANES; i++) codes[i] = 0;"]
-    if not guards:
-        return [*lines, "return 0;"]
-    every = " & ".join(truth for truth, _ in guards)
-    lines.append(f"if (MSTMM_LIKELY(lanes_every({every}))) return 0;")
-    lines += [f"lanes_fail(codes, {truth}, {code});" for truth, code in guards]
-    return [*lines, "return 1;"]
 
 
 def _lanes_angles(text: StraightText, angles: Sequence[Angle]) -> list[str]:

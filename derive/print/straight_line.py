@@ -64,22 +64,25 @@ class StraightText:
             raise ValueError(f"{kernel.name}: a kernel of run-time size is no straight line")
         self.kernel, self.dialect = kernel, dialect
         self.ports: dict[str, Port] = {p.name: p for p in (*kernel.inputs, *kernel.outputs)}
-        self._truths = {
+        #: Temporaries that are truth values.
+        self.truths = {
             s.number for s in kernel.statements if isinstance(s, Assign) and OPERATIONS[s.op].truth
         }
-        self._numbers = _used_as_numbers(kernel.statements) & self._truths
+        self._numbers = _used_as_numbers(kernel.statements) & self.truths
 
     def assign(self, statement: Assign) -> list[str]:
         """`const real t12 = ...;`; a truth value is `m12`, and `t12` where somebody counts it."""
         number, op, args = statement.number, statement.op, statement.args
         if not OPERATIONS[op].truth:
             return [f"const {self.dialect.real} t{number} = {self._value(op, args)};"]
-        lines = [f"const {self.dialect.truth} m{number} = {self._comparison(op, args)};"]
-        if number in self._numbers:
-            lines.append(
-                f"const {self.dialect.real} t{number} = {self.dialect.prefix}number(m{number});"
-            )
-        return lines
+        truth = f"const {self.dialect.truth} m{number} = {self._comparison(op, args)};"
+        return [truth, *self.counted(number)]
+
+    def counted(self, number: int) -> list[str]:
+        """A truth value as a number, where somebody counts it."""
+        if number not in self._numbers:
+            return []
+        return [f"const {self.dialect.real} t{number} = {self.dialect.prefix}number(m{number});"]
 
     def store(self, statement: Store) -> str:
         """`qdot_[3] = t12;`, or += where the port accumulates."""
@@ -90,7 +93,7 @@ class StraightText:
 
     def truth(self, operand: Operand) -> str:
         """Whether an operand is true, that is neither zero nor NaN."""
-        if isinstance(operand, Temporary) and operand.number in self._truths:
+        if isinstance(operand, Temporary) and operand.number in self.truths:
             return f"m{operand.number}"
         return f"{self.dialect.prefix}true({self.whole(operand)})"
 
@@ -128,7 +131,7 @@ class StraightText:
         if row.sign:
             return f"{self.whole(args[0])} {row.sign} {self.whole(args[1])}"
         (a,) = args
-        if isinstance(a, Temporary) and a.number in self._truths:
+        if isinstance(a, Temporary) and a.number in self.truths:
             return f"{self.dialect.prefix}not(m{a.number})"
         return f"{self.whole(a)} == {self.whole(Constant('0'))}"
 

@@ -39,6 +39,14 @@ class Ordered:
     levels: tuple[Level, ...]
     rest: tuple[Assign | Store | Guard, ...]
 
+    def made(self) -> list[int]:
+        """Temporaries of the levels."""
+        found = []
+        for level in self.levels:
+            found += [statement.number for statement in level.statements]
+            found += [n for angle in level.angles for n in (*angle.sines, *angle.cosines)]
+        return found
+
 
 def gather(statements: Sequence[Statement]) -> Ordered:
     """Take the sines and cosines out of a straight line, each as early as its argument allows.

@@ -1,0 +1,61 @@
+"""Guards of a straight line in C: judged as they come, and what they come to.
+
+Nothing depends on a guard, and a branch would only stand in the way of what comes behind it; so it
+is counted on the way how many hold before the first that does not.  In lanes guards are judged in
+the end.
+"""
+
+from __future__ import annotations
+
+from mstmm.ir import Guard
+
+from .straight_line import StraightText
+
+#: C name of two numbers: whether every guard held so far, and how many did before one did not.
+GUARDS = "guards"
+
+
+class Guards:
+    """The guards of one function's text, in their order."""
+
+    def __init__(self, text: StraightText) -> None:
+        self._text, self._found = text, list[tuple[str, int]]()
+        self.in_lanes = text.dialect.vector
+        some = any(isinstance(s, Guard) for s in text.kernel.statements)
+        #: Whether they are counted on the way, in GUARDS.
+        self.counted = some and not self.in_lanes
+
+    def begun(self) -> list[str]:
+        """Before the first."""
+        return [f"int {GUARDS}[2] = {{1, 0}};"] if self.counted else []
+
+    def judged(self, guard: Guard) -> list[str]:
+        """One of them; counting waits for the first of another code."""
+        truth, earlier = self._text.truth(guard.condition), self._found[-1:]
+        self._found.append((truth, guard.code))
+        if self.in_lanes:
+            return []
+        counted = any(code != guard.code for _, code in earlier)
+        return [f"{GUARDS}[1] += {GUARDS}[0];"] * counted + [f"{GUARDS}[0] &= {truth};"]
+
+    def verdict(self) -> list[str]:
+        """Behind the last: the function's result."""
+        if self.in_lanes:
+            return self._of_lanes()
+        if not self._found:
+            return ["return 0;"]
+        found = [code for _, code in self._found]
+        codes = [code for i, code in enumerate(found) if not i or found[i - 1] != code]
+        words = ", ".join(map(str, [*codes, 0]))
+        return [
+            f"static const int codes[] = {{{words}}};", f"return codes[{GUARDS}[1] + {GUARDS}[0]];"
+        ]  # fmt: skip
+
+    def _of_lanes(self) -> list[str]:
+        lines = ["for (int i = 0; i < MSTMM_LANES; i++) codes[i] = 0;"]
+        if not self._found:
+            return [*lines, "return 0;"]
+        every = " & ".join(truth for truth, _ in self._found)
+        lines.append(f"if (MSTMM_LIKELY(lanes_every({every}))) return 0;")
+        lines += [f"lanes_fail(codes, {truth}, {code});" for truth, code in self._found]
+        return [*lines, "return 1;"]
