@@ -69,7 +69,7 @@ def arm(n: int) -> Scene:
     scene = chain(n, [0.0, 0.0, -9.81], lambda i: {"type": "pin", "axis": AXES[2 - i % 2]})
     for i, body in enumerate(scene["body"]):
         body |= {
-            "mass": 4.0 - 0.4 * i,
+            "mass": 4.0 / (1 + i / 4),
             "center_of_mass": [0.01, 0.02, 0.12],
             "inertia": [0.03, 0.025, 0.01, 0.001, -0.002, 0.0015],
             "ends": {"tip": [0.0, 0.03 * (i % 2), 0.25]},

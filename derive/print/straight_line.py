@@ -79,10 +79,11 @@ class StraightText:
         return [truth, *self.counted(number)]
 
     def counted(self, number: int) -> list[str]:
-        """A truth value as a number, where somebody counts it."""
+        """A truth value as a number, where somebody counts it, if only in another part."""
         if number not in self._numbers:
             return []
-        return [f"const {self.dialect.real} t{number} = {self.dialect.prefix}number(m{number});"]
+        value = f"{self.dialect.prefix}number(m{number})"
+        return [f"const {self.dialect.real} t{number} = {value}; (void)t{number};"]
 
     def store(self, statement: Store) -> str:
         """`qdot_[3] = t12;`, or += where the port accumulates."""

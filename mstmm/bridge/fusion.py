@@ -36,21 +36,18 @@ if TYPE_CHECKING:
     from ..runtime.pack.packed import Packed
 
 #: More bodies (ends and sections of flexible bodies count) than this are not fused unless the user
-#: asks for it: the compiler's time grows with their square while the advantage shrinks.
+#: asks for it: compilers take seconds, while the advantage shrinks.
 MOST_BODIES = 64
 #: More than this are not fused at all: the compiler would take many minutes.
 MOST_ASKED = 400
-#: Seconds that a compiler takes for the scalar code, by bodies and their square, and seconds that
-#: one evaluation saves per body; measured, see benchmarks/startup.  Only their ratio matters, and
+#: Seconds that a compiler takes for the scalar code, by bodies, and seconds that one evaluation
+#: saves per body; measured, see benchmarks/startup.  Only their ratio matters, and
 #: only for the choice of engine "auto"; fixed numbers, so that the choice is the same on every run.
-_SECONDS, _SECONDS_PER_BODY, _SECONDS_PER_PAIR = 0.1, 0.03, 0.0015
+_SECONDS, _SECONDS_PER_BODY = 0.1, 0.04
 _SAVED_PER_BODY = 6e-8
 #: More unknowns than this are eliminated body by body, by the looped engine: the tangent as a whole
-#: costs the square of them.
+#: and the matrices of a linear model cost the square of them.
 _MOST_UNKNOWNS = 20
-#: More than this make the matrices of a linear model too much text: 4 s of a compiler for 7, 15 s
-#: for 12.
-_MOST_SLOPES = 10
 #: A frame or section of a flexible body with n shapes compiles like 1 + n^2 / this many bodies.
 _MODES_PER_BODY = 24
 
@@ -145,14 +142,14 @@ class Fusion:
         for other scenes, and where it cannot be made.
         """
         pays = self._break_even() < evaluations < math.inf
-        return self._of_small("implicit", _MOST_UNKNOWNS, pays)
+        return self._of_small("implicit", pays)
 
     def ready_linear(self, pays: bool) -> FusedLibrary | None:
         """The same for the slopes about a state, where the caller knows whether they pay."""
-        return self._of_small("linear", _MOST_SLOPES, pays)
+        return self._of_small("linear", pays)
 
-    def _of_small(self, part: str, most: int, pays: bool) -> FusedLibrary | None:
-        if self.obstacle or not 0 < self.structure.nu <= most:
+    def _of_small(self, part: str, pays: bool) -> FusedLibrary | None:
+        if self.obstacle or not 0 < self.structure.nu <= _MOST_UNKNOWNS:
             return None
         try:
             return self._get(part, build=self._insisted or pays)
@@ -171,7 +168,7 @@ class Fusion:
     def _break_even(self) -> float:
         modes = modes_at(self.structure)
         n = sum(1 + count**2 / _MODES_PER_BODY for count in modes)
-        seconds = _SECONDS + n * (_SECONDS_PER_BODY + n * _SECONDS_PER_PAIR)
+        seconds = _SECONDS + n * _SECONDS_PER_BODY
         return seconds / (_SAVED_PER_BODY * max(1, sum(1 + 2 * count for count in modes)))
 
     def _get(self, part: str, build: bool) -> FusedLibrary | None:

@@ -17,7 +17,7 @@ from .live import LiveInputs
 
 #: Seconds that a compiler takes, by the square of the speeds, and that its code saves a state, by
 #: the same; measured.  Only their ratio matters; fixed, so that the choice is always the same.
-_SECONDS_PER_PAIR = 0.1
+_SECONDS_PER_PAIR = 0.035
 _SAVED, _SAVED_PER_PAIR = 2e-5, 4e-7
 
 

@@ -11,6 +11,7 @@ from support.fused_lab import COMPILERS, FusedLab
 from support.random_kernels import random_inputs, random_kernel
 
 from mstmm.derive.audit.rounding import rounding_bounds
+from mstmm.derive.print import parts, scene
 from mstmm.ir import OPERATIONS, Port
 from mstmm.ir.graph import Graph
 
@@ -32,10 +33,19 @@ def guarded() -> Any:
     return graph.kernel("guarded", [Port("x", (2,))], [Port("y")], {"y": x[0] * x[1]})
 
 
-@pytest.fixture(scope="module", params=COMPILERS)
+#: Compilers, and lines printed whole or in parts of so many statements.
+PRINTED = [(compiler, size) for compiler in COMPILERS for size in (0, 7)]
+
+
+@pytest.fixture(scope="module", params=PRINTED, ids=lambda one: f"{one[0]} {one[1] or 'whole'}")
 def lab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> FusedLab:
+    compiler, size = request.param
     folder = tmp_path_factory.mktemp("lab")
-    return FusedLab(folder, [*SMOOTH, *MIXED, guarded()], request.param)
+    with pytest.MonkeyPatch.context() as patch:
+        if size:
+            patch.setattr(scene, "WHOLE", 0)
+            patch.setattr(parts, "SIZE", size)
+        return FusedLab(folder, [*SMOOTH, *MIXED, guarded()], compiler)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
