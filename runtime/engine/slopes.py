@@ -93,6 +93,8 @@ class Slopes:
 
     def _expect(self, saved: float) -> bool:
         """Whether there is code by now."""
+        if not self._n:
+            return False
         with self._lock:
             pairs = self._engine.nu**2
             self._saved += saved * (_SAVED + _SAVED_PER_PAIR * pairs)

@@ -36,6 +36,7 @@ class Linearising:
         self._model = model
         system, layout = model.packed.system, model.layout
         twists = any(law.twist >= 0 for law in system.laws)
+        #: Whether states are in order as they are given.
         self._settled = not (len(layout.quaternions) or system.driven or twists)
         self._straight = all(h.straight for h in layout.hinges.values() if h.nu)
 
@@ -48,8 +49,7 @@ class Linearising:
         disturbances: Sequence[str] | None,
     ) -> Linear:
         """See `Model.linearize`."""
-        pushes = self._channels("inputs", inputs) if inputs != () else ()
-        others = self._ground
+        pushes, others = self._channels("inputs", inputs), self._ground
         if disturbances is not None:
             others = self._channels("disturbances", disturbances)
         q, u = self._state(q, u, t)
@@ -61,6 +61,8 @@ class Linearising:
         return Linear(model, State(t, q, u, about.a), pushes, others, turning, about)
 
     def _channels(self, what: str, names: Sequence[str]) -> tuple[Channel, ...]:
+        if type(names) is tuple and not names:  # as most calls have it: nothing to be checked
+            return ()
         return tuple(channel(self._model, name) for name in names_of(what, names))
 
     @cached_property
