@@ -10,6 +10,7 @@ import sympy as sp
 from mstmm.errors import ElementError
 from mstmm.ir import KernelIR
 
+from ..classical import harmonic_stiffness
 from ..classical.catalogue import CLASSICAL, classical_derivation, classical_guards
 from ..elements.body_rigid import RigidBody
 from ..equations import body as body_kernels
@@ -217,8 +218,9 @@ def tangent_kernels() -> tuple[Kernel, ...]:
 
 
 def beam_kernels() -> tuple[Kernel, ...]:
-    """Beams: integrands per length, integrated along the beam when a scene is packed."""
-    derivations = beam_fields.KERNELS | beam_second_order.KERNELS
+    """Beams: integrands per length, integrated along the beam when a scene is packed; dynamic
+    stiffness of vibrating ones."""
+    derivations = beam_fields.KERNELS | beam_second_order.KERNELS | harmonic_stiffness.KERNELS
     return tuple(Kernel(name, make()) for name, make in derivations.items())
 
 
