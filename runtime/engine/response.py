@@ -2,16 +2,19 @@
 
 Z(s) x = r with Z(s) = s^2 M + s C + K, the tangent of the residual in complex numbers
 (derive/print/complex.py): what bodies bring is put together once, every s is one elimination.
+Losses of elastic parts are i (K' - K) besides, K' that of a scene with so much more stiffness.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.arrays import Array
+from mstmm.arrays import Array, Integers
 
 from .tangent import Tangent
 
@@ -21,27 +24,45 @@ if TYPE_CHECKING:
 Complex = NDArray[np.complex128]
 
 
+class Exact(NamedTuple):
+    """Flexible bodies by their dynamic stiffness, at these places of the tree.
+
+    `stiffness` gives at s (k,) for each of them in turn the loads (k, 6 + n, 6 + n) on the frame,
+    told by three rotations and three displacements, and on the n shapes.
+    """
+
+    places: tuple[int, ...]
+    stiffness: Callable[[Complex], list[Complex]]
+
+
 class Response:
     """Z(s) of one scene about one state; each thread needs its own.
 
-    `lanes` is how many s go at a time, 2 or 4; 0 for as many as the processor takes.
+    `lanes` is how many s go at a time, 2 or 4; 0 for as many as the processor takes.  `stiffer` is
+    the scene with more elastic stiffness by what it loses; `exact` are bodies by their
+    dynamic stiffness.
     """
 
     def __init__(
-        self, engine: Engine, t: float, q: Array, u: Array, a: Array, lanes: int = 0
-    ) -> None:
+        self, engine: Engine, t: float, q: Array, u: Array, a: Array, lanes: int = 0,
+        stiffer: Engine | None = None, exact: Exact | None = None,
+    ) -> None:  # fmt: skip
         self.engine, self.tangent = engine, Tangent(engine)
         self.tangent.residual(t, q, u, a)
         nu, m, count = engine.nu, self.tangent.coupled, len(self.tangent.numbers)
         several = 2 * int(engine.lib.MSTMM_MOST_LANES)
         self._record = record = engine.ffi.new("mstmm_response *")
         record.at, record.lanes, record.n_numbers = self.tangent.record, lanes, count
+        if stiffer is not None:
+            self._stiffer = Tangent(stiffer)
+            self._stiffer.residual(t, q, u, a)
+            record.stiffer = self._stiffer.record
         self._kept = {
-            "brought": _aligned(2 * count),
+            "brought": _aligned(3 * count),
             "numbers": _aligned(several * count),
             "workspace": _aligned(several * engine.packed.workspace),
             "vectors": _aligned(several * 2 * nu),
-            "scratch": _aligned(3 * nu + m),
+            "scratch": _aligned(3 * nu + 2 * m),
             "answers": _aligned(several * m * nu),
             "closure": _aligned(several * m * (4 * m + 2)),
         }
@@ -49,6 +70,12 @@ class Response:
             setattr(record, name, engine.pointer(array))
         if engine.lib.mstmm_response_begin(record):
             raise engine.failed(self.tangent.record.failure, t, *self.tangent.state)
+        self._exact = exact
+        if exact is not None:
+            self._order = np.argsort(exact.places)[::-1]
+            self._kept_bodies = np.array(exact.places, dtype=np.int32)[self._order]
+            record.exact_bodies = engine.ffi.from_buffer("int[]", self._kept_bodies)
+            record.n_exact = len(self._order)
 
     def amplitudes(self, s: Complex, columns: Array) -> tuple[Complex, Array, NDArray[np.int32]]:
         """x (k, n, nu) at every s (k,) in 1/s of n right-hand sides (n, nu), by how much the
@@ -61,12 +88,61 @@ class Response:
         x = np.zeros((len(points), len(rows), self.engine.nu), dtype=np.complex128)
         growth, grown = np.zeros(len(points)), np.zeros(len(points), dtype=np.int32)
         pointer = self.engine.pointer
+        kept = self._stiffness(points)  # while it is read
         self.engine.lib.mstmm_response_many(
             self._record, len(points), pointer(points.view(np.float64)), len(rows), pointer(rows),
             pointer(x.view(np.float64)), pointer(growth),
             self.engine.ffi.from_buffer("int[]", grown),
         )  # fmt: skip
+        del kept
         return x, growth, grown
+
+    def _stiffness(self, points: Complex) -> Complex | None:
+        if self._exact is None:
+            return None
+        parts = self._exact.stiffness(points)
+        flat = [parts[k].reshape(len(points), -1) for k in self._order]
+        found = np.ascontiguousarray(np.concatenate(flat, axis=1))
+        self._record.exact_numbers = found.shape[1]
+        self._record.exact = self.engine.pointer(found.view(np.float64))
+        return found
+
+    def undamped(self) -> None:
+        """From now on nothing goes by the first power of s."""
+        self._kept["brought"][: len(self.tangent.numbers)] = 0.0
+
+    def count_negative(self, squares: Array) -> Integers:
+        """How many pivots are negative at every s^2 (k,) < 0 of a symmetric Z: as many as
+        eigenvalues (see `Tangent.count_negative`); -1 where a pivot is zero."""
+        sizes = self._sizes
+        pivots = np.zeros((len(squares), sum(n * n for n in sizes)))
+        record, points = self._record, np.sqrt(squares.astype(np.complex128))
+        record.pivots, record.n_pivots = self.engine.pointer(pivots), pivots.shape[1]
+        _, growth, _ = self.amplitudes(points, np.zeros((0, self.engine.nu)))
+        record.pivots = self.engine.ffi.NULL
+        found = np.zeros(len(squares), dtype=np.int64)
+        for blocks in _by_size(pivots, sizes):
+            regular = np.where(np.isfinite(growth)[:, None, None, None], blocks, 0.0)
+            found += (np.linalg.eigvalsh(regular) < 0).sum(axis=(1, 2))
+        return np.where(np.isfinite(growth), found, -1)
+
+    @cached_property
+    def _sizes(self) -> list[int]:
+        """Sizes of the pivots one after the other."""
+        engine = self.engine
+        block = np.zeros(max([6, *(body.n for body in engine.packed.flexible.values())]) ** 2)
+        pivot, pointer = engine.lib.mstmm_tangent_pivot, engine.pointer(block)
+        bodies = range(engine.packed.system.count)
+        return [pivot(self.tangent.record, k, part, pointer) for k in bodies for part in (1, 0)]
+
+
+def _by_size(pivots: Array, sizes: list[int]) -> Iterator[Array]:
+    """(k, blocks, n, n) for each n among the sizes."""
+    squares = np.square(sizes)
+    firsts = np.cumsum(squares) - squares
+    for n in sorted(set(sizes) - {0}):
+        places = firsts[np.array(sizes) == n][:, None] + np.arange(n * n)
+        yield pivots[:, places].reshape(len(pivots), -1, n, n)
 
 
 def _aligned(count: int) -> Array:

@@ -14,6 +14,10 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
 from ..pack.layout import refuse_dense
+from .harmonic.counted import ExactModes, exact_modes
+from .harmonic.exact import Chosen
+from .harmonic.losses import Losses
+from .harmonic.prescribed import Ratios
 from .judged import warnings_of
 from .modes import modes
 from .motions import Modes
@@ -53,6 +57,10 @@ class Linear(StateSpace):
         omega: ArrayLike,
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
+        *,
+        structural: Losses = 0.0,
+        modal: Ratios = 0.0,
+        exact: Chosen = False,
     ) -> FrequencyResponse:
         """Amplitudes of outputs under harmonic inputs at angular frequencies omega (k,) in rad/s,
         O(bodies) a frequency.
@@ -63,10 +71,30 @@ class Linear(StateSpace):
         ("boom.tip.position.y", "boom.tip.vy", "boom.tip.angular_velocity.z"), beside the state and,
         under accelerations of the ground, relative to it.
 
+        Two kinds of damping join what the scene has.  `structural` are loss factors eta: stiffness
+        k of laws, springs and shapes becomes k (1 + i eta), of all of them or by the names of
+        hinges, chains, flexible bodies and springs; what expressions give loses nothing.  `modal`
+        are parts of the critical damping: of all natural motions of the undamped scene (from their
+        matrices), or of as many of the slowest as there are numbers (O(bodies) each), the others
+        staying as they are.
+
+        `exact`, True for all or a list of names, gives uniform beams their exact dynamic stiffness
+        in the directions in which they have shapes, in place of these: bending after Euler and
+        Bernoulli, twist, tension, at any frequency.
+
         Raises SceneError for a name or frequency that does not fit, NumericalFailure at a resonance
         without damping.
         """
-        return frequency_response(self, omega, inputs, outputs)
+        return frequency_response(self, omega, inputs, outputs, structural, modal, exact)
+
+    def exact_modes(self, count: int, exact: Chosen = True) -> ExactModes:
+        """The `count` slowest undamped natural motions with exact beams (`exact` as in
+        `frequency_response`), found by counting: none is missed, however many there are.
+
+        Raises SceneError for beams that the exact solution does not hold for, springs between
+        bodies, loads without potential and a state from which a motion grows.
+        """
+        return exact_modes(self, count, exact)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:

@@ -36,12 +36,9 @@ def _few(linear: Equations, count: int, damped: bool | None) -> Modes:
     from . import lanczos
 
     pencil = linear.pencil
-    x, y = np.random.default_rng(0).standard_normal((2, len(linear)))
-    pressed = pencil.stiffness(x), pencil.stiffness(y)
-    skew = abs(float(y @ pressed[0] - x @ pressed[1]))
-    size = float(np.linalg.norm(pressed[0]) * np.linalg.norm(y))
+    x = np.random.default_rng(0).standard_normal(len(linear))
     with_c = bool(pencil.damping(x).any()) if damped is None else damped
-    if with_c or skew > _SYMMETRIC * size:
+    if with_c or pencil.skew() > _SYMMETRIC:
         slowest = lanczos.damped(pencil, count, with_c)
         return Modes(linear, slowest.values, slowest.shapes, None)
     slowest = lanczos.undamped(pencil, count)

@@ -61,6 +61,13 @@ class Pencil:
         self._begin()
         return self.tangent.slope(0.0, moved, self._nothing, self._nothing)[self._places]
 
+    def skew(self) -> float:
+        """How far K is from symmetric, in parts, along two directions."""
+        x, y = np.random.default_rng(0).standard_normal((2, len(self)))
+        first, second = self.stiffness(x), self.stiffness(y)
+        size = float(np.linalg.norm(first) * np.linalg.norm(y))
+        return abs(float(y @ first - x @ second)) / size if size else 0.0
+
     def factor(self, square: float, rate: float = 0.0) -> None:
         """Factor square M + rate C + K.  NumericalFailure where that is singular."""
         self._begin()

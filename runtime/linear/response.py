@@ -23,6 +23,10 @@ from mstmm.errors import NumericalFailure, SceneError
 from ..engine.response import Response
 from . import files
 from .channels import Channel, channel, columns, some_names
+from .harmonic.exact import Chosen, ExactBeams, exact_beams, refuse_inner
+from .harmonic.losses import Losses, stiffer
+from .harmonic.prescribed import Ratios, modal_damping
+from .harmonic.refused import given, refuse_in_motion, refuse_ratios
 from .outputs import Output, outputs_of, rows_of
 
 if TYPE_CHECKING:
@@ -141,6 +145,9 @@ def frequency_response(
     omega: ArrayLike,
     inputs: Sequence[str] | None,
     outputs: Sequence[str] | None,
+    structural: Losses = 0.0,
+    modal: Ratios = 0.0,
+    exact: Chosen = False,
 ) -> FrequencyResponse:
     """See `Linear.frequency_response`."""
     frequencies = _frequencies(omega)
@@ -149,9 +156,17 @@ def frequency_response(
             "frequency response: the state turns a ball, a free or another hinge whose rates go by "
             "its coordinates; ask about a state at rest"
         )
+    beams = None
+    if exact is not False:
+        refuse_ratios(modal)
+        beams = exact_beams(linear, exact, structural)
+        refuse_inner(beams, [*(inputs or ()), *(outputs or ())])
+        linear = beams.linear
+        if outputs is None:
+            outputs = [name for name in linear.coordinates if not beams.named(name)]
     pushes = _pushes(linear, inputs)
     shown = outputs_of(linear, None if outputs is None else some_names("outputs", outputs))
-    values = _Sweep(linear, pushes, shown).values(frequencies)
+    values = _Sweep(linear, pushes, shown, structural, modal, beams).values(frequencies)
     return FrequencyResponse(
         frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
         tuple(one.unit for one in pushes), tuple(one.unit for one in shown), values,
@@ -196,13 +211,23 @@ class _Sweep:
     """The response of some outputs to some pushes, s by s."""
 
     def __init__(
-        self, linear: Equations, pushes: Sequence[Channel], outputs: Sequence[Output]
-    ) -> None:
+        self, linear: Equations, pushes: Sequence[Channel], outputs: Sequence[Output],
+        structural: Losses, modal: Ratios, beams: ExactBeams | None,
+    ) -> None:  # fmt: skip
         engine, state, free = linear.model.looped, linear.state, list(linear.free)
+        refuse_in_motion(linear, structural, modal)
+        lossy = stiffer(linear.model, state, structural) if given(structural) else None
+        self.modal = modal_damping(linear, modal) if given(modal) else None
         self.engine = engine
-        self.response = Response(engine, state.t, state.q, state.u, state.a)
-        self.columns = np.zeros((len(pushes), engine.nu))
-        self.columns[:, free] = _efforts(linear, pushes).T
+        self.response = Response(
+            engine, state.t, state.q, state.u, state.a, stiffer=lossy,
+            exact=None if beams is None else beams.bodies,
+        )  # fmt: skip
+        efforts = _efforts(linear, pushes)
+        if self.modal is not None:
+            efforts = np.concatenate([efforts, self.modal.columns], axis=1)
+        self.pushes, self.columns = len(pushes), np.zeros((efforts.shape[1], engine.nu))
+        self.columns[:, free] = efforts.T
         self.free, self.rows = free, rows_of(linear, outputs)
 
     def values(self, omega: Array) -> Complex:
@@ -219,11 +244,13 @@ class _Sweep:
 
     def _at(self, s: Complex) -> tuple[Complex, Array, NDArray[np.int32]]:
         x, growth, grown = self.response.amplitudes(s, self.columns)
-        moved = x[:, :, self.free].swapaxes(1, 2)
-        found = np.zeros((len(s), self.rows.shape[1], len(self.columns)), dtype=np.complex128)
+        moved = x[:, : self.pushes, self.free]
+        if self.modal is not None:
+            moved = self.modal.damp(s, moved, x[:, self.pushes :, self.free])
+        found = np.zeros((len(s), self.rows.shape[1], self.pushes), dtype=np.complex128)
         for order, rows in enumerate(self.rows):
             if rows.any():
-                found += s[:, None, None] ** order * (rows @ moved)
+                found += s[:, None, None] ** order * (rows @ moved.swapaxes(1, 2))
         growth[~np.isfinite(found).all(axis=(1, 2))] = np.inf
         return found, growth, grown
 

@@ -98,10 +98,7 @@ def _dead(engine: Engine, load: LoadNumbers, values: list[float], state: State) 
 
 def _held(engine: Engine, spring: ForceNumbers, state: State) -> ForceNumbers:
     """A spring whose tension is that of the state."""
-    seen = _seen(engine, [Probe(*end) for end in spring.ends], state)
-    apart, moving = seen[1, 0:3] - seen[0, 0:3], seen[1, 3:6] - seen[0, 3:6]
-    length = float(np.linalg.norm(apart))
-    rate = float(apart @ moving) / length
+    length, rate = spring_length(engine, spring, state)
     stiffness, rest, damping = spring.p
     effort = -stiffness * (length - rest) - damping * rate
     if spring.effort is not None:
@@ -110,6 +107,14 @@ def _held(engine: Engine, spring: ForceNumbers, state: State) -> ForceNumbers:
         effort += float(kernel.run({**given, "length": np.array([length, rate])})[1]["values"][0])
     constant = constant_kernel("effort", engine.packed.system, [effort])
     return replace(spring, p=(0.0, 0.0, 0.0), effort=constant)
+
+
+def spring_length(engine: Engine, spring: ForceNumbers, state: State) -> tuple[float, float]:
+    """Length (m) of a spring at a state, and its rate."""
+    seen = _seen(engine, [Probe(*end) for end in spring.ends], state)
+    apart, moving = seen[1, 0:3] - seen[0, 0:3], seen[1, 3:6] - seen[0, 3:6]
+    length = float(np.linalg.norm(apart))
+    return length, float(apart @ moving) / length
 
 
 def _seen(engine: Engine, probes: list[Probe], state: State) -> Array:

@@ -26,6 +26,10 @@ from ..pack.packed import Packed
 
 if TYPE_CHECKING:
     from ..engine.solver import Solver
+    from ..linear.harmonic.counted import ExactModes
+    from ..linear.harmonic.exact import Chosen
+    from ..linear.harmonic.losses import Losses
+    from ..linear.harmonic.prescribed import Ratios
     from ..linear.linear import Linear
     from ..linear.locus import Critical, Locus
     from ..linear.motions import Modes
@@ -229,6 +233,17 @@ class Model(Compiled):
         """
         return self.linearize(q, u, t).modes(count, damped)
 
+    def exact_modes(
+        self,
+        count: int,
+        exact: Chosen = True,
+        q: ArrayLike | None = None,
+        t: float = 0.0,
+    ) -> ExactModes:
+        """The `count` slowest undamped natural motions at rest with exact beams, all of them or
+        those named.  See `Linear.exact_modes`."""
+        return self.linearize(q, None, t).exact_modes(count, exact)
+
     def frequency_response(
         self,
         omega: ArrayLike,
@@ -236,10 +251,16 @@ class Model(Compiled):
         outputs: Sequence[str] | None = None,
         q: ArrayLike | None = None,
         t: float = 0.0,
+        *,
+        structural: Losses = 0.0,
+        modal: Ratios = 0.0,
+        exact: Chosen = False,
     ) -> FrequencyResponse:
         """Amplitudes of outputs under harmonic inputs at omega (k,) in rad/s, near rest at `q`, or
         at the equilibrium.  See `Linear.frequency_response`; without `inputs` the ground moves."""
-        return self.linearize(q, None, t).frequency_response(omega, inputs, outputs)
+        return self.linearize(q, None, t).frequency_response(
+            omega, inputs, outputs, structural=structural, modal=modal, exact=exact
+        )
 
     def locus(
         self,

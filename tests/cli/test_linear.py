@@ -58,6 +58,18 @@ def test_pictures_of_both(mstmm: Command, folder: Path, command: str) -> None:
     assert json.loads(mstmm(command, "pendulum.toml", "--plot", "of.svg", "--json").out)["plot"]
 
 
+def test_damping_is_asked_for(mstmm: Command) -> None:
+    def imaginary(*damping: str) -> float:
+        done = mstmm("frf", "pendulum.toml", "--json", "--points", "2", "-i", "pivot.effort",
+                     "--set", "pivot.law.stiffness[0]=3", *damping)  # fmt: skip
+        return float(json.loads(done.out)["imag"][0][0][0])
+
+    assert imaginary() == 0
+    one, two = imaginary("--structural", "0.01"), imaginary("--structural", "pivot=0.02")
+    assert two < one < 0 and two == pytest.approx(2 * one, rel=1e-3)
+    assert imaginary("--modal", "0.02") < 0
+
+
 def test_json_of_both(mstmm: Command) -> None:
     modes = json.loads(mstmm("modes", "pendulum.toml", "--json", "--count", "5").out)
     assert modes["omega"] == [pytest.approx(OMEGA)] and modes["complete"] is True
@@ -94,6 +106,10 @@ def test_netcdf_of_both(mstmm: Command) -> None:
         (["modes", "none.toml"], "none.toml"),
         (["frf", "pendulum.toml", "--from", "5", "--to", "1"], "expected a range that rises"),
         (["frf", "pendulum.toml", "-q", "pivot.angel"], 'did you mean "pivot.angle"'),
+        (["frf", "pendulum.toml", "--structural", "pivot"], "expected NAME=VALUE"),
+        (["frf", "pendulum.toml", "--exact", "rod"], '"rod": expected a flexible beam'),
+        (["frf", "pendulum.toml", "--exact", "all"], "no flexible beam"),
+        (["frf", "pendulum.toml", "--modal", "-1"], "parts of the critical damping"),
         (["frf", "pendulum.toml", "--plot", "x.gif"], ".png or .svg or .pdf"),
     ],
 )

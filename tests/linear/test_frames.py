@@ -75,6 +75,10 @@ def test_a_frame_with_a_corner() -> None:
              "orientation": [np.sqrt(0.5), 0, 0, np.sqrt(0.5)]},
         ],
     )  # fmt: skip
-    modes = mstmm.compile(scene, engine="looped").modes(4)
+    model = mstmm.compile(scene, engine="looped")
+    modes, counted = model.modes(4), model.exact_modes(len(exact))
     assert len(exact) >= 4
     np.testing.assert_allclose(modes.omega, exact[:4], rtol=2e-6)
+    np.testing.assert_allclose(counted.omega, exact, rtol=1e-10)
+    assert counted.coordinates == ("post.y1", "post.y2", "arm.y1", "arm.y2")
+    np.testing.assert_allclose(np.abs(counted.shapes).max(axis=0), 1.0)

@@ -109,7 +109,7 @@ def _changed(scene: str, changes: list[str]) -> Model:
 
     numbers: dict[str, float] = {}
     for text in changes:
-        name, number = _assigned(text)
+        name, number = assigned("--set", text, "rod1.mass=2")
         if name in numbers:
             raise MstmmError(
                 f"--set {text}: {name} is set to {numbers[name]:g} already; set each number once"
@@ -119,11 +119,11 @@ def _changed(scene: str, changes: list[str]) -> Model:
     return model.with_parameters(numbers) if numbers else model
 
 
-def _assigned(text: str) -> tuple[str, float]:
+def assigned(option: str, text: str, example: str) -> tuple[str, float]:
     """The name and the number of NAME=VALUE."""
     name, _, value = text.partition("=")
     try:
         return name.strip(), float(value)
     except ValueError:
-        message = f'--set {text}: expected NAME=VALUE, such as "rod1.mass=2"'
+        message = f'{option} {text}: expected NAME=VALUE, such as "{example}"'
         raise MstmmError(message) from None

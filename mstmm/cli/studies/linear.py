@@ -10,10 +10,11 @@ import typer
 from mstmm.errors import MstmmError
 
 from ..options import Elements, Json, at_least, positive
-from .asked import Asked, AtStart, Output, Plot, SceneFile, Set
+from .asked import Asked, AtStart, Output, Plot, SceneFile, Set, assigned
 
 if TYPE_CHECKING:
     from mstmm.arrays import Array
+    from mstmm.runtime.linear.harmonic.losses import Losses
     from mstmm.runtime.linear.linear import Linear
     from mstmm.runtime.linear.motions import Modes
 
@@ -126,6 +127,21 @@ def frf(
         int, typer.Option("--points", metavar="N", parser=at_least(2), help="How many, evenly on "
                           "a logarithmic scale.")
     ] = 201,
+    structural: Annotated[
+        list[str] | None,
+        typer.Option("--structural", metavar="ETA", help="Loss factor of all that is elastic, or "
+                     "of a hinge, chain, flexible body or spring: boom=0.02; may be repeated."),
+    ] = None,
+    modal: Annotated[
+        list[float] | None,
+        typer.Option("--modal", metavar="RATIO", help="Part of the critical damping of all natural "
+                     "motions; repeated, of as many of the slowest."),
+    ] = None,
+    exact: Annotated[
+        list[str] | None,
+        typer.Option("--exact", metavar="BEAM", help="A beam by its exact dynamic stiffness in "
+                     "place of shapes, all for every one; may be repeated."),
+    ] = None,
     at_start: AtStart = False,
     change: Set = None,
     output: Output = None,
@@ -143,7 +159,12 @@ def frf(
     asked = Asked(scene, at_start, change, output, plot, hinge, json)
     linear = asked.linear(inputs)
     omega = 2 * np.pi * np.geomspace(least, most, points)
-    found = linear.frequency_response(omega, outputs=outputs)
+    ratios: list[float] = modal or [0.0]
+    found = linear.frequency_response(
+        omega, outputs=outputs, structural=_losses(structural or []),
+        modal=ratios[0] if len(ratios) == 1 else ratios,
+        exact=True if exact == ["all"] else exact or False,
+    )  # fmt: skip
     if asked.answered(found):
         return
     _tell_of(linear)
@@ -159,6 +180,16 @@ def frf(
     if len(rows) > _ROWS:
         terminal.say(f"and {len(rows) - _ROWS} more")
     asked.say_where("all of it: --output FILE.csv or .nc, --plot FILE.png or --json")
+
+
+def _losses(texts: list[str]) -> Losses:
+    """One number for all, or numbers by names."""
+    if len(texts) == 1 and "=" not in texts[0]:
+        try:
+            return float(texts[0])
+        except ValueError:
+            pass
+    return dict(assigned("--structural", text, "boom=0.02") for text in texts) or 0.0
 
 
 def _tell_of(linear: Linear) -> None:

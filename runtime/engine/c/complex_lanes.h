@@ -61,11 +61,14 @@ MSTMM_COMPLEX double mstmm_complex_sizes(mstmm_complex a)
 }
 
 /* x = a^-1 b by LU with row exchange, the same in all lanes; arguments and result of mstmm_solve_lu
- * (templates/solve_lu.c.jinja), singular if one of the lanes is. */
+ * (templates/solve_lu.c.jinja), singular if one of the lanes is.  A pivot is refused where it is
+ * zero alone: frequencies are asked for, and counted, next to where they vanish, and the digits that
+ * are lost are told by how inertia grows (complex_swept.h). */
 MSTMM_COMPLEX int mstmm_complex_solve_lu(int n, int m, const mstmm_complex *restrict a,
                                         const mstmm_complex *restrict b, mstmm_complex *restrict x,
                                         mstmm_complex *restrict work, double relative_pivot)
 {
+    (void)relative_pivot;
     for (int i = 0; i < n * n; i++) work[i] = a[i];
     for (int i = 0; i < n * m; i++) x[i] = b[i];
     for (int i = 0; i < n; i++) {
@@ -83,11 +86,9 @@ MSTMM_COMPLEX int mstmm_complex_solve_lu(int n, int m, const mstmm_complex *rest
             x[i * m + j] = x[best * m + j];
             x[best * m + j] = entry;
         }
-        mstmm_lanes size = {0};
-        for (int k = 0; k < n; k++) size += mstmm_complex_size(a[k * n + i]);
-        const mstmm_bits large = mstmm_complex_size(work[i * n + i]) > relative_pivot * size;
+        const mstmm_bits there = mstmm_complex_size(work[i * n + i]) > 0;
         for (int lane = 0; lane < MSTMM_LANES; lane++)
-            if (!large[lane]) return 1;
+            if (!there[lane]) return 1;
         const mstmm_complex scale = work[i * n + i] = mstmm_complex_inverse(work[i * n + i]);
         for (int k = i + 1; k < n; k++) {
             const mstmm_complex factor = mstmm_complex_times(work[k * n + i], scale);

@@ -8,6 +8,7 @@ typedef struct {
     mstmm_complex s, square;
     mstmm_lanes growth;
     mstmm_bits grown;
+    int place[MSTMM_LANES]; /* of which s each is */
 } mstmm_lanes_at;
 
 /* Inertia in S: angular accelerations to moments, accelerations to forces. */
@@ -25,11 +26,71 @@ static inline void inertia(const mstmm_complex *S, mstmm_lanes *sizes)
 static void bring(const mstmm_response *of, mstmm_lanes_at *with, int64_t first, int64_t end)
 {
     const real *by_rate = of->brought, *by_square = by_rate + of->n_numbers;
+    const real *lost = by_square + of->n_numbers;
     mstmm_complex *numbers = with->tangents.numbers;
     const mstmm_complex s = with->s, square = with->square;
     for (int64_t k = first; k < end; k++) {
         numbers[k].re = with->tangents.held[k] + s.re * by_rate[k] + square.re * by_square[k];
         numbers[k].im = s.im * by_rate[k] + square.im * by_square[k];
+    }
+    for (int64_t k = first; of->stiffer && k < end; k++) numbers[k].im += lost[k];
+}
+
+/* --- bodies by their dynamic stiffness --- */
+
+/* Where the effect of cause `j` on `k` is, both of three rotations and three displacements of the
+ * frame, and the shapes. */
+static mstmm_complex *of_both(mstmm_complex *S, mstmm_complex *bend, int n, int j, int k)
+{
+    const int load = k < 3 ? 3 + k : k - 3;
+    if (j < 6)
+        return k < 6 ? S + 6 * (3 + j) + load : bend + MSTMM_BEND_Z_Z(n) + n * (3 + j) + k - 6;
+    return k < 6 ? bend + MSTMM_BEND_K(n) + 6 * (j - 6) + load
+                 : bend + MSTMM_BEND_Z_X(n) + n * (j - 6) + k - 6;
+}
+
+/* Frames are told by their accelerations: s^2 times as much as they are displaced. */
+static void lay_exact(const mstmm_response *of, mstmm_lanes_at *with, int body, int64_t first)
+{
+    const mstmm_body *one = &of->at->model->bodies[body];
+    const int n = mstmm_modes_of(one->modal), size = 6 + n;
+    mstmm_complex *numbers = with->tangents.numbers;
+    mstmm_complex *S = numbers + one->tangent, *bend = numbers + one->modal->tangent;
+    const mstmm_complex per_square = mstmm_complex_inverse(with->square);
+    for (int j = 0; j < size; j++)
+        for (int k = 0; k < size; k++) {
+            mstmm_complex value, *to = of_both(S, bend, n, j, k);
+            for (int lane = 0; lane < MSTMM_LANES; lane++) {
+                const real *from = of->exact
+                    + 2 * (with->place[lane] * of->exact_numbers + first + j * size + k);
+                value.re[lane] = from[0];
+                value.im[lane] = from[1];
+            }
+            if (j < 6) value = mstmm_complex_times(per_square, value);
+            *to = value;
+        }
+}
+
+/* Real parts of what bodies were divided by. */
+static void keep_pivots(const mstmm_response *of, const mstmm_lanes_at *with, int count)
+{
+    const mstmm_model *model = of->at->model;
+    const mstmm_complex *numbers = with->tangents.numbers;
+    int64_t place = 0;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const mstmm_body *body = &model->bodies[i];
+        int columns[6];
+        if (body->idle) continue;
+        const int shapes = body->modal ? mstmm_modes_of(body->modal) : 0;
+        const int speeds = body->section ? 0 : mstmm_free_speeds(of->at->memory, body, columns);
+        const mstmm_complex *from[] = {
+            shapes ? numbers + body->modal->tangent + MSTMM_BEND_D(shapes) : NULL,
+            numbers + body->tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq)};
+        const int sizes[] = {shapes * shapes, speeds * speeds};
+        for (int part = 0; part < 2; part++)
+            for (int k = 0; k < sizes[part]; k++, place++)
+                for (int lane = 0; lane < count; lane++)
+                    of->pivots[lane * of->n_pivots + place] = from[part][k].re[lane];
     }
 }
 
@@ -37,7 +98,8 @@ static void bring(const mstmm_response *of, mstmm_lanes_at *with, int64_t first,
 static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
 {
     const mstmm_model *model = of->at->model;
-    int64_t begun = of->n_numbers;
+    int64_t begun = of->n_numbers, exact = 0;
+    int next = 0;
     with->growth = 1 + (mstmm_lanes){0};
     with->grown = -1 + (mstmm_bits){0};
     for (int i = model->n_bodies - 1; i >= 0; i--) {
@@ -47,6 +109,13 @@ static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
         if (first < begun) {
             bring(of, with, first, begun);
             begun = first;
+            for (; next < of->n_exact; next++) {
+                const mstmm_body *one = &model->bodies[of->exact_bodies[next]];
+                if (one->tangent < first) break;
+                const int size = 6 + mstmm_modes_of(one->modal);
+                lay_exact(of, with, of->exact_bodies[next], exact);
+                exact += size * size;
+            }
         }
         mstmm_lanes before[2], after[2];
         inertia(S, before);
@@ -87,6 +156,7 @@ static int coupled_along(mstmm_response *of, const mstmm_lanes_at *with, const m
 {
     const int nu = of->at->model->nu, m = of->at->n_coupled;
     real *moved = of->scratch, *d_u = moved + nu, *d_a = d_u + nu, *found = d_a + nu;
+    real *lossy = found + m;
     for (int part = 0; part < 2 * MSTMM_LANES; part++) {
         const int lane = part / 2, imaginary = part % 2;
         for (int j = 0; j < nu; j++) {
@@ -96,11 +166,18 @@ static int coupled_along(mstmm_response *of, const mstmm_lanes_at *with, const m
             d_u[j] = imaginary ? du.im[lane] : du.re[lane];
             d_a[j] = imaginary ? da.im[lane] : da.re[lane];
         }
-        const int code = mstmm_coupled_along(of->at, moved, d_u, d_a, found);
+        int code = mstmm_coupled_along(of->at, moved, d_u, d_a, found);
+        if (!code && of->stiffer) code = mstmm_coupled_along(of->stiffer, moved, d_u, d_a, lossy);
         if (code) return code;
         for (int k = 0; k < m; k++) {
-            if (imaginary) changes[k].im[lane] = found[k];
-            else changes[k].re[lane] = found[k];
+            const real lost = of->stiffer ? lossy[k] - found[k] : 0;
+            if (imaginary) {
+                changes[k].im[lane] += found[k];
+                changes[k].re[lane] -= lost;
+            } else {
+                changes[k].re[lane] = found[k];
+                changes[k].im[lane] = lost;
+            }
         }
     }
     return 0;
@@ -163,6 +240,7 @@ static void take(mstmm_response *of, int count, const real *s, mstmm_lanes_at *w
         const int k = lane < count ? lane : count - 1;
         with->s.re[lane] = s[2 * k];
         with->s.im[lane] = s[2 * k + 1];
+        with->place[lane] = k;
     }
     with->square = mstmm_complex_times(with->s, with->s);
     with->slope.workspace = (mstmm_complex *)of->workspace;
@@ -183,6 +261,7 @@ void MSTMM_BY_LANES(MSTMM_LANES)(mstmm_response *of, int count, const real *s, i
     mstmm_lanes_at with;
     take(of, count, s, &with);
     int code = eliminate(of, &with);
+    if (!code && of->pivots) keep_pivots(of, &with, count);
     if (!code && m) code = close_couplings(of, &with);
     for (int64_t k = 0; !code && k < n; k++) {
         for (int j = 0; j < nu; j++) column[j] = mstmm_complex_plain(columns[k * nu + j]);

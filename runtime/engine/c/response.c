@@ -6,6 +6,17 @@
 /* Steps so long that coordinates follow nothing: their share is lost beside any other. */
 #define MSTMM_STILL 1e300
 
+/* Stiffness that is larger by the losses, less the stiffness. */
+static int bring_losses(mstmm_response *of)
+{
+    real *lost = of->brought + 2 * of->n_numbers;
+    const int code = mstmm_tangent_brought(of->stiffer, 0, 0, 1);
+    if (code) of->at->failure = of->stiffer->failure;
+    for (int64_t k = 0; k < of->n_numbers; k++)
+        lost[k] = of->stiffer->numbers[k] - of->at->numbers[k];
+    return code;
+}
+
 int mstmm_response_begin(mstmm_response *of)
 {
     mstmm_tangent *at = of->at;
@@ -18,7 +29,8 @@ int mstmm_response_begin(mstmm_response *of)
     for (size_t k = 0; k < n; k++) by_rate[k] = at->numbers[k] - by_square[k];
     if (!code) code = mstmm_tangent_brought(at, 0, 1, MSTMM_STILL);
     for (size_t k = 0; k < n; k++) by_square[k] = at->numbers[k] - by_square[k];
-    return code ? code : mstmm_tangent_brought(at, 0, 0, 1);
+    if (!code) code = mstmm_tangent_brought(at, 0, 0, 1);
+    return code || !of->stiffer ? code : bring_losses(of);
 }
 
 /* How many frequencies go at a time on this processor, and by what. */
@@ -35,6 +47,15 @@ static int lanes(const mstmm_response *of, mstmm_response_few **by)
     return 2;
 }
 
+/* The same with the numbers of s from number k on. */
+static mstmm_response from(const mstmm_response *of, int64_t k)
+{
+    mstmm_response at = *of;
+    if (at.n_exact) at.exact += 2 * k * of->exact_numbers;
+    if (at.pivots) at.pivots += k * of->n_pivots;
+    return at;
+}
+
 void mstmm_response_many(mstmm_response *of, int64_t count, const real *s, int64_t n,
                          const real *columns, real *x, real *growth, int *grown)
 {
@@ -43,11 +64,15 @@ void mstmm_response_many(mstmm_response *of, int64_t count, const real *s, int64
     const int most = lanes(of, &by);
     for (int64_t k = 0; k < count; k += most) {
         const int some = count - k < most ? (int)(count - k) : most;
-        by(of, some, s + 2 * k, n, columns, x + k * size, growth + k, grown + k);
+        mstmm_response at = from(of, k);
+        by(&at, some, s + 2 * k, n, columns, x + k * size, growth + k, grown + k);
         /* One that is singular spoils those beside it. */
-        for (int j = 0; some > 1 && !isfinite(growth[k]) && j < some; j++)
-            by(of, 1, s + 2 * (k + j), n, columns, x + (k + j) * size, growth + k + j,
+        const int spoiled = some > 1 && !isfinite(growth[k]);
+        for (int j = 0; spoiled && j < some; j++) {
+            at = from(of, k + j);
+            by(&at, 1, s + 2 * (k + j), n, columns, x + (k + j) * size, growth + k + j,
                grown + k + j);
+        }
         for (int j = 0; j < some; j++)
             if (!isfinite(growth[k + j])) memset(x + (k + j) * size, 0, (size_t)size * sizeof *x);
     }

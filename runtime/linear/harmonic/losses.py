@@ -1,0 +1,139 @@
+"""Hysteretic damping: what is elastic loses, at every frequency, the same part of its energy.
+
+A loss factor eta makes the stiffness k of an element k (1 + i eta) under harmonic motion (Crandall,
+J. Sound Vib. 11 (1970) 3-18).  What the losses add is i (K' - K) of two scenes, whose elements lose
+nothing: the scene itself, and one that is stiffer by eta k and carries the same static loads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from mstmm.arrays import real
+from mstmm.errors import SceneError
+from mstmm.scene.rules.messages import near
+
+from ...engine.engine import Engine
+from ...pack.pack import packed_system
+from ...pack.system import (
+    Arrays,
+    BodyNumbers,
+    BodyRun,
+    ForceNumbers,
+    LawNumbers,
+    LawRun,
+)
+from ..matrices import State
+from ..standing import spring_length
+
+if TYPE_CHECKING:
+    from ...engine.compiled import Compiled
+
+#: Loss factors of all that is elastic, or by the names of hinges, chains, flexible bodies, springs.
+Losses = float | Mapping[str, float]
+
+#: Places of stiffnesses among the numbers of a law; a rotation's are the three behind shifts.
+_STIFF = {
+    "linear": (0,), "full": (0, 9), "rotation": (0, 1, 2), "six": (0, 1, 2, 9, 10, 11),
+}  # fmt: skip
+
+
+def stiffer(model: Compiled, state: State, losses: Losses) -> Engine:
+    """The scene with stiffness larger by what it loses, its elements as they stand at a state.
+
+    Efforts that expressions give, and elements of a user's own type, lose nothing.
+
+    Raises SceneError for a name that has no stiffness and for a loss factor that is below 0.
+    """
+    engine = model.looped
+    system, lossy = engine.packed.system, by_name(model, losses)
+    bodies = tuple(_stiffer_shapes(model, run, lossy) for run in system.bodies)
+    laws = tuple(law for run in system.laws for law in _stiffer_laws(engine, run, lossy))
+    forces = tuple(
+        _stiffer_spring(engine, force, state, lossy(spring.name))
+        for force, spring in zip(system.forces, engine.packed.scene.spring, strict=True)
+    )
+    made = replace(system, bodies=bodies, laws=laws, forces=forces)
+    return Engine(packed_system(made, engine.packed))
+
+
+def by_name(model: Compiled, losses: Losses) -> Callable[[str], float]:
+    """The loss factor of an element by its name; members of a chain are their chain's."""
+    if not isinstance(losses, Mapping):
+        factor = _factor("structural", losses)
+        return lambda name: factor
+    known = set(_elastic(model))
+    for name in losses:
+        if name not in known:
+            raise SceneError(
+                f'structural: "{name}": expected a hinge with a law, a chain, a flexible body or a '
+                f"spring{near(str(name), sorted(known))}"
+            )
+    factors = {name: _factor(f'structural["{name}"]', value) for name, value in losses.items()}
+    return lambda name: factors.get(name, factors.get(name.partition("[")[0], 0.0))
+
+
+def _factor(what: str, value: float) -> float:
+    factor = real(what, value, "a loss factor, such as 0.02")
+    if factor < 0:
+        raise SceneError(f"{what} = {factor:g}: expected a loss factor of 0 or more, such as 0.02")
+    return factor
+
+
+def _elastic(model: Compiled) -> Iterator[str]:
+    """Names that may lose energy."""
+    packed = model.packed
+    yield from model.layout.modal
+    yield from (spring.name for spring in packed.scene.spring)
+    for run in packed.system.laws:
+        for _, body, _, _ in run.each():
+            name = model.looped.hinge_name(body)
+            yield name
+            yield name.partition("[")[0]
+
+
+def _stiffer_shapes(model: Compiled, run: BodyRun, lossy: Callable[[str], float]) -> BodyRun:
+    names = {slots.q: name for name, slots in model.layout.modal.items()}
+
+    def one(body: BodyNumbers) -> BodyNumbers:
+        if body.modal is None:
+            return body
+        matrices = dict(body.modal.matrices.named)
+        matrices["stiffness"] = matrices["stiffness"] * (1 + lossy(names[body.modal.q]))
+        return replace(body, modal=replace(body.modal, matrices=Arrays(matrices)))
+
+    if all(body.modal is None for body in run.alike):
+        return run
+    return replace(run, alike=tuple(map(one, run.alike)))
+
+
+def _stiffer_laws(engine: Engine, run: LawRun, lossy: Callable[[str], float]) -> Iterator[LawRun]:
+    """The same laws; one by one where a chain's members may lose different parts."""
+    factors = [lossy(engine.hinge_name(body)) for _, body, _, _ in run.each()]
+    if len(set(factors)) == 1:
+        yield replace(run, pattern=tuple(_stiffer_law(law, factors[0]) for law in run.pattern))
+        return
+    for (law, body, twist, places), factor in zip(run.each(), factors, strict=True):
+        alone = replace(law, member=0, turn=min(law.turn, 0), efforts=(places,))
+        yield LawRun(body, 1, 1, (_stiffer_law(alone, factor),), max(twist, 0))
+
+
+def _stiffer_law(law: LawNumbers, factor: float) -> LawNumbers:
+    p = list(law.p)
+    for place in _STIFF[law.kernel]:
+        p[place] *= 1 + factor
+    return replace(law, p=tuple(p))
+
+
+def _stiffer_spring(
+    engine: Engine, force: ForceNumbers, state: State, factor: float
+) -> ForceNumbers:
+    """A stiffer spring whose tension at the state is the same."""
+    if force.element != ("force", "spring") or not factor * force.p[0]:
+        return force
+    stiffness, rest, damping = force.p
+    length, _ = spring_length(engine, force, state)
+    more = stiffness * (1 + factor)
+    return replace(force, p=(more, length - (length - rest) / (1 + factor), damping))
