@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from mstmm.errors import MstmmError
+from mstmm.scene import split
 
 from ..chart.models import Variant
 from ..chart.planar import planar
@@ -16,7 +17,7 @@ from .choice import Bodies
 from .evidence import Evidence, gathered
 from .hinges import Change, applied
 from .merging import merged
-from .renaming import composed
+from .renaming import composed, renamed
 from .splitting import Split, unfit
 from .splitting import in_parts as cut
 from .trials import Tried
@@ -150,14 +151,20 @@ def changed(
 
 
 def lumped(work: Work, base: Tried, enough: float) -> Tried:
-    """The model with welded rigid bodies as one."""
-    found = merged(base.scene)
-    if found is None:
-        return base
-    name = f"{base.name}; welded bodies as one"
-    names = composed(work.bench.names, found.names)
-    tried = work.bench.tried(name, found.scene, names)
-    if tried.error > enough:
-        return base
-    work.told[name] = (*work.told[base.name], *found.words)
-    return tried
+    """The model with welded rigid bodies as one, and with the ground; where what is asked of is
+    gone then, with the bodies and hinges of that as they are."""
+    names_now = work.measure.names_in(base.running)
+    asked = {split(renamed(name, names_now))[0] for name in work.asked.of}
+    for keep in [set(), asked] if asked else [set()]:
+        found = merged(base.scene, keep)
+        if found is None:
+            return base
+        name = f"{base.name}; welded bodies as one" + (", but what is asked of" if keep else "")
+        names = composed(names_now, found.names)
+        still = dict(found.still)
+        still |= {old: still[new] for old, new in names_now.items() if new in still}
+        tried = work.bench.tried(name, found.scene, names, still)
+        if tried.error <= enough:
+            work.told[name] = (*work.told[base.name], *found.words)
+            return tried
+    return base

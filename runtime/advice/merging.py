@@ -2,31 +2,29 @@
 
 A body that is welded to another one becomes part of it.  Its origin and its ends live on as ends of
 that one, under names that tell where they come from: "arm.tip" on "hub" becomes "hub.arm_tip".
+What is welded to the ground becomes part of that: what hung on it hangs on the ground, where its
+ends are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from mstmm.arrays import Array
-from mstmm.expression.expression import Expression
-from mstmm.numbers.rotations import IDENTITY, Matrix, rows, to_quaternion
-from mstmm.scene import Body, End, Hinge, Scene, split
+from mstmm.numbers.rotations import Matrix, Vector, from_orientation
+from mstmm.scene import Body, Chain, Hinge, Load, Scene, Spring, split
 from mstmm.scene.rules.values import GROUND
-from mstmm.scene.tables.rigid import rigid_beam
 
 from ..chart.models import with_tables
+from ..pack.flexible.rigidified import rigidified
+from ..pack.welds import Pose, end_of, together, welded
+from .axes import with_axes_of
 from .choice import RIGID
-
-#: Keys of the tables that refer to a body or to one of its ends.
-REFERENCES = {
-    "hinge": ("inboard", "outboard"), "chain": ("inboard",), "load": ("on",),
-    "spring": ("from_", "to"),
-}  # fmt: skip
+from .references import INERTIAL, with_names
+from .spoken import Spoken, spoken_of
 
 
 @dataclass(frozen=True)
@@ -35,13 +33,17 @@ class Merged:
 
     Attributes:
         scene: with welded bodies as one.
-        names: "arm" and "arm.tip" of the former scene -> "hub.arm", "hub.arm_tip".
-        into: body that is gone -> body that it is part of.
+        names: "arm" and "arm.tip" of the former scene -> "hub.arm", "hub.arm_tip", or "ground".
+        into: body that is gone -> body that it is part of, or "ground".
+        still: place of the former scene -> where it is on the ground, m.
+        idle: loads and springs that are gone, for they do nothing.
     """
 
     scene: Scene
-    names: Mapping[str, str]
-    into: Mapping[str, str]
+    names: Mapping[str, str] = field(default_factory=dict)
+    into: Mapping[str, str] = field(default_factory=dict)
+    still: Mapping[str, Vector] = field(default_factory=dict)
+    idle: tuple[str, ...] = ()
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -49,173 +51,193 @@ class Merged:
         parts: dict[str, list[str]] = {}
         for body, whole in self.into.items():
             parts.setdefault(whole, []).append(body)
-        return tuple(
-            f'body "{whole}": one with {", ".join(gone)}, which are welded to it; '
-            + ", ".join(
-                f"{old} is {new} now" for old, new in self.names.items() if split(old)[0] in gone
-            )
+        said = [
+            f"{_called(whole)}: one with {', '.join(gone)}, which are welded to it; "
+            + ", ".join(self._moved(old) for old in self.names if split(old)[0] in gone)
             for whole, gone in parts.items()
-        )
+        ]
+        return (*said, *(f"{what}: left out, for it does nothing now" for what in self.idle))
+
+    def _moved(self, old: str) -> str:
+        if old not in self.still:
+            return f"{old} is {self.names[old]} now"
+        return f"{old} is at [{', '.join(f'{x:.6g}' for x in self.still[old])}] now"
 
 
-def merged(scene: Scene) -> Merged | None:
-    """The scene with every weld between rigid bodies gone; None where there is none."""
-    found = Merged(_with_rigid_beams(scene), {}, {})
-    spoken = set(_spoken_of(scene))
+def _called(whole: str) -> str:
+    return f"the {GROUND}" if whole == GROUND else f'body "{whole}"'
+
+
+def merged(scene: Scene, keep: Collection[str] = ()) -> Merged | None:
+    """The scene with every weld between rigid bodies, and between these and the ground, gone; None
+    where there is none.  Bodies and hinges to `keep` stay by themselves."""
+    found = Merged(_with_bodies(scene))
     while True:
+        spoken = spoken_of(found.scene, keep)
         bodies = {body.name: body for body in found.scene.body}
-        weld = next((h for h in found.scene.hinge if _goes(h, bodies, found.scene, spoken)), None)
-        if weld is None:
+        for weld in found.scene.hinge:
+            gone = _goes(weld, bodies, found.scene, spoken)
+            if gone is not None:
+                break
+        else:
             return found if found.into else None
-        found = _without(found, weld, bodies)
+        found = _without(found, weld, gone, bodies)
 
 
 # --- what may go ----------------------------------------------------------------------------------
 
 
-def _with_rigid_beams(scene: Scene) -> Scene:
-    """Beams that do not deform, welded at one end at least, as bodies."""
-    spread = {load.on for load in scene.load if load.force_per_length is not None}
-    welded = {
-        split(end)[0] for h in scene.hinge if h.is_weld for end in (h.inboard, h.outboard)
-    }  # fmt: skip
-    stiff = [
-        beam for beam in scene.beam
-        if beam.model == RIGID and beam.name in welded and beam.name not in spread
-    ]  # fmt: skip
-    names = {beam.name for beam in stiff}
+def _with_bodies(scene: Scene) -> Scene:
+    """Flexible bodies that do not deform, welded at one end at least, as bodies."""
+    ends = {split(e)[0] for h in scene.hinge if h.is_weld for e in (h.inboard, h.outboard)}
+    stiff = {one.name for one in (*scene.beam, *scene.elastic) if one.model == RIGID} & ends
+    if not stiff:
+        return scene
+    made = rigidified(scene, {}, stiff).scene
+    slender = {"allow_unphysical_inertia": True}
     return with_tables(
-        scene,
-        body=(*scene.body, *map(_body_of, stiff)),
-        beam=tuple(beam for beam in scene.beam if beam.name not in names),
+        made,
+        body=tuple(
+            one.model_copy(update=slender) if one.name in stiff else one for one in made.body
+        ),
     )
 
 
-def _body_of(beam: Any) -> Body:
-    made = rigid_beam(beam)
-    ends = {name: End(position=end.position, orientation=end.orientation)
-            for name, end in made.ends.items()}  # fmt: skip
-    return Body(
-        name=beam.name, mass=made.mass, center_of_mass=made.center_of_mass, inertia=made.inertia,
-        allow_unphysical_inertia=True, ends=ends,
-    )  # fmt: skip
+def _goes(weld: Hinge, bodies: Mapping[str, Body], scene: Scene, spoken: Spoken) -> str | None:
+    """The body that becomes part of what a hinge welds it to; None where neither may."""
+    if not weld.is_weld or weld.lets_go or weld.name in spoken.hinges:
+        return None
+    pair = (weld.outboard_body, weld.inboard_body)
+    if any(name != GROUND and not _rigid(bodies.get(name)) for name in pair):
+        return None
+    if any(
+        {split(one.from_)[0], split(one.to)[0]} == {*pair} and _own(one) for one in scene.spring
+    ):
+        return None
+    if weld.inboard_body == GROUND:
+        alone = len(scene.skeleton.bodies) == 1
+        return None if alone or weld.outboard_body in spoken.places else weld.outboard_body
+    return next((name for name in pair if name not in spoken.bodies), None)
 
 
-def _goes(weld: Hinge, bodies: Mapping[str, Body], scene: Scene, spoken: set[str]) -> bool:
-    """Whether a hinge is a weld of two rigid bodies whose outboard one nothing speaks of."""
-    if not weld.is_weld or weld.inboard_body == GROUND or weld.lets_go:
-        return False
-    pair = [bodies.get(weld.inboard_body), bodies.get(weld.outboard_body)]
-    if any(body is None or body.type != RIGID for body in pair):
-        return False
-    released = any(event.hinge == weld.name for event in scene.event)
-    own_axes = any(
-        split(load.on)[0] == weld.outboard_body and load.axes != "inertial" for load in scene.load
-    )
-    return not (released or own_axes or {weld.name, weld.outboard_body} & spoken)
+def _rigid(body: Body | None) -> bool:
+    return body is not None and body.type == RIGID
 
 
-def _spoken_of(value: Any) -> Iterator[str]:
-    """Names of bodies and hinges in expressions, and of bodies whose axes loads have."""
-    if isinstance(value, Expression):
-        yield from (part for name in value.names if name.parts[1:] for part in name.parts)
-    elif isinstance(value, (list, tuple)):
-        for entry in value:
-            yield from _spoken_of(entry)
-    elif isinstance(value, dict):
-        for entry in value.values():
-            yield from _spoken_of(entry)
-    elif hasattr(type(value), "model_fields"):
-        if hasattr(value, "axes"):
-            yield str(value.axes)
-        for key in type(value).model_fields:
-            yield from _spoken_of(getattr(value, key))
+def _own(spring: Spring) -> bool:
+    """Whether it is a force element of a user's, which may push a body on its own."""
+    return spring.type != "spring"
 
 
 # --- one weld -------------------------------------------------------------------------------------
 
 
-def _without(found: Merged, weld: Hinge, bodies: Mapping[str, Body]) -> Merged:
-    """The scene in which the outboard body of a weld is part of the inboard one."""
-    scene, whole, part = found.scene, bodies[weld.inboard_body], bodies[weld.outboard_body]
-    turned, place = _pose(weld, whole, part)
-    names = {part.name: _free_name(whole, part.name)}
-    ends = {**whole.ends, names[part.name]: _end(turned, place)}
-    for name, end in part.ends.items():
-        own = f"{part.name}.{name}"
-        names[own] = _free_name(whole, f"{part.name}_{name}")
-        at = place + turned @ np.array(end.position)
-        ends[names[own]] = _end(turned @ np.array(end.rotation), at)
-    renamed = {old: f"{whole.name}.{new}" for old, new in names.items()}
-    together = _together(whole, part, turned, place).model_copy(update={"ends": ends})
-    kept = tuple(
-        together if body.name == whole.name else body
-        for body in scene.body
-        if body.name != part.name
+def _without(found: Merged, weld: Hinge, gone: str, bodies: Mapping[str, Body]) -> Merged:
+    """The scene in which a body is part of what it is welded to."""
+    part = bodies[gone]
+    other = weld.inboard_body if gone == weld.outboard_body else weld.outboard_body
+    whole = bodies.get(other)
+    pose = welded(weld, bodies.get(weld.inboard_body), bodies[weld.outboard_body])
+    if gone != weld.outboard_body:
+        pose = pose.inverse
+    places = {gone: pose} | {f"{gone}.{end}": pose.then(end_of(part, end)) for end in part.ends}
+    scene = with_tables(
+        found.scene, hinge=tuple(one for one in found.scene.hinge if one.name != weld.name)
     )
-    tables: dict[str, Any] = {
-        table: tuple(with_names(one, keys, renamed) for one in getattr(scene, table))
-        for table, keys in REFERENCES.items()
-    }
-    tables["hinge"] = tuple(one for one in tables["hinge"] if one.name != weld.name)
-    former = {old: renamed.get(new, new) for old, new in found.names.items()}
-    into = {
-        gone: whole.name if target == part.name else target for gone, target in found.into.items()
-    }
-    return replace(
-        found, scene=with_tables(scene, body=kept, **tables), names={**former, **renamed},
-        into={**into, part.name: whole.name},
-    )  # fmt: skip
+    scene = with_axes_of(scene, gone, INERTIAL if whole is None else whole.name, pose.turned)
+    if whole is None:
+        return _grounded(found, scene, gone, places)
+    return _joined(found, scene, whole, part, places)
 
 
-def _pose(weld: Hinge, whole: Body, part: Body) -> tuple[Array, Array]:
-    """Axes (3, 3) and origin (3,) of the outboard body in the inboard one's axes."""
-    held = np.array(part.end_rotation(weld.outboard_end))
-    turned = np.array(whole.end_rotation(weld.inboard_end)) @ np.array(weld.rotation) @ held.T
-    at = np.array(whole.end_position(weld.inboard_end))
-    return turned, at - turned @ np.array(part.end_position(weld.outboard_end))
+def _joined(
+    found: Merged, scene: Scene, whole: Body, part: Body, places: Mapping[str, Pose]
+) -> Merged:
+    """The scene in which one body is part of another."""
+    ends, names = dict(whole.ends), {}
+    for old, pose in places.items():
+        own = _free_name(ends, old.replace(".", "_"))
+        ends[own], names[old] = pose.end, f"{whole.name}.{own}"
+    body = together(whole, part, places[part.name]).model_copy(update={"ends": ends})
+    made = with_names(scene, names)
+    others = tuple(one for one in scene.body if one.name != part.name)
+    made = with_tables(made, body=tuple(body if one.name == whole.name else one for one in others))
+    return _gone(found, made, part.name, whole.name, names)
 
 
-def _together(whole: Body, part: Body, turned: Array, place: Array) -> Body:
-    """Mass, mass centre and inertia of both, in the axes of the first (Steiner's theorem)."""
-    mass = whole.mass + part.mass
-    centers = [np.array(whole.center_of_mass), place + turned @ np.array(part.center_of_mass)]
-    masses = [whole.mass, part.mass]
-    inertias = [
-        np.array(whole.inertia_matrix), turned @ np.array(part.inertia_matrix) @ turned.T
-    ]  # fmt: skip
-    middle = centers[0]
-    if mass > 0:
-        middle = (masses[0] * centers[0] + masses[1] * centers[1]) / mass
-    total = np.zeros((3, 3))
-    for m, center, inertia in zip(masses, centers, inertias, strict=True):
-        away = center - middle
-        total += inertia + m * (away @ away * np.eye(3) - np.outer(away, away))
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = total.tolist()
-    return whole.model_copy(
-        update={
-            "mass": mass, "center_of_mass": tuple(middle.tolist()),
-            "inertia": (xx, yy, zz, xy, xz, yz),
-            "allow_unphysical_inertia":
-                whole.allow_unphysical_inertia or part.allow_unphysical_inertia,
-        }
-    )  # fmt: skip
-
-
-def _end(turned: Array, place: Array) -> End:
-    matrix: Matrix = rows(turned.tolist())
-    straight = matrix == IDENTITY
-    orientation = (0.0, 0.0, 0.0) if straight else to_quaternion(matrix)
-    return End(position=tuple(place.tolist()), orientation=orientation)
-
-
-def _free_name(whole: Body, name: str) -> str:
-    while name in whole.ends:
+def _free_name(ends: Collection[str], name: str) -> str:
+    while name in ends:
         name += "_"
     return name
 
 
-def with_names(element: Any, keys: tuple[str, ...], names: Mapping[str, str]) -> Any:
-    """An element of a table whose references have other names."""
-    update = {key: names[at] for key in keys if (at := getattr(element, key)) in names}
-    return element.model_copy(update=update) if update else element
+def _gone(found: Merged, scene: Scene, part: str, whole: str, names: Mapping[str, str]) -> Merged:
+    """What is known after one more body is gone."""
+    into = {body: whole if target == part else target for body, target in found.into.items()}
+    former = {old: names.get(new, new) for old, new in found.names.items()}
+    idle = [one for one in scene.spring if _within(one)]
+    return replace(
+        found,
+        scene=with_tables(scene, spring=tuple(one for one in scene.spring if one not in idle)),
+        names={**former, **names}, into={**into, part: whole},
+        idle=(*found.idle, *(f'spring "{one.name}"' for one in idle)),
+    )  # fmt: skip
+
+
+def _within(spring: Spring) -> bool:
+    """Whether both of its ends are on one body, or on the ground."""
+    return split(spring.from_)[0] == split(spring.to)[0]
+
+
+# --- the ground -----------------------------------------------------------------------------------
+
+
+def _grounded(found: Merged, scene: Scene, gone: str, places: Mapping[str, Pose]) -> Merged:
+    """The scene in which a body is part of the ground."""
+    idle = [load for load in scene.load if _on(load, gone)]
+    made = with_tables(
+        scene,
+        body=tuple(one for one in scene.body if one.name != gone),
+        hinge=tuple(_hung(one, one.rotation, places) for one in scene.hinge),
+        chain=tuple(_hung(one, _first_turn(one), places) for one in scene.chain),
+        spring=tuple(_held(one, places) for one in scene.spring),
+        load=tuple(one for one in scene.load if one not in idle),
+    )
+    # ends of other bodies that became ends of this one are on the ground with it
+    still = {old: pose.position for old, pose in places.items()}
+    still |= {old: still[new] for old, new in found.names.items() if new in still}
+    after = _gone(found, made, gone, GROUND, dict.fromkeys(places, GROUND))
+    said = tuple(f'load "{one.name}"' for one in idle)
+    return replace(after, still={**found.still, **still}, idle=(*said, *after.idle))
+
+
+def _on(load: Load, body: str) -> bool:
+    return split(load.on)[0] == body
+
+
+def _first_turn(chain: Chain) -> Matrix:
+    """Rotation of the first hinge of a chain."""
+    given = chain.orientation
+    return chain.hinge[0].rotation if given is None else from_orientation(given)
+
+
+def _hung(element: Any, rotation: Matrix, places: Mapping[str, Pose]) -> Any:
+    """A hinge or a chain that hangs on the ground where the end was that it hung on."""
+    if element.inboard not in places:
+        return element
+    held = places[element.inboard]
+    return element.model_copy(
+        update={
+            "inboard": GROUND, "position": held.position,
+            "orientation": held.then(Pose(np.array(rotation), np.zeros(3))).orientation,
+        }
+    )  # fmt: skip
+
+
+def _held(spring: Spring, places: Mapping[str, Pose]) -> Spring:
+    """A spring to the place on the ground where its end was."""
+    for key in ("from_", "to"):
+        pose = places.get(getattr(spring, key))
+        if pose is not None:
+            spring = spring.model_copy(update={key: GROUND, "position": pose.position})
+    return spring

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, cast
 
+import numpy as np
+
 from mstmm.arrays import Array
+from mstmm.numbers.rotations import Vector
 
 from ..result.measure import Measure
 
@@ -36,11 +39,13 @@ class Renaming(Measure):
     def __init__(self, inner: Measure) -> None:
         self.inner = inner
         self.name, self.unit, self.scaling = inner.name, inner.unit, inner.scaling
-        self._known: dict[int, tuple[Compiled, Mapping[str, str]]] = {}
+        self._known: dict[int, tuple[Compiled, Mapping[str, str], Mapping[str, Vector]]] = {}
 
-    def know(self, model: Compiled, names: Mapping[str, str]) -> None:
-        """Former name of a place -> its name in a model."""
-        self._known[id(model)] = (model, names)
+    def know(
+        self, model: Compiled, names: Mapping[str, str], still: Mapping[str, Vector] | None = None
+    ) -> None:
+        """Former name of a place -> its name in a model, and -> where it is if it stands still."""
+        self._known[id(model)] = (model, names, still or {})
 
     def names_in(self, model: Compiled) -> Mapping[str, str]:
         """Former name -> its name in a model."""
@@ -48,8 +53,10 @@ class Renaming(Measure):
 
     def read(self, result: Record) -> Array:
         """(n, k) numbers of a run at its samples."""
-        names = self.names_in(result.model)
-        return self.inner.read(cast("Record", _ByFormerNames(result, names)) if names else result)
+        if id(result.model) not in self._known:
+            return self.inner.read(result)
+        _, names, still = self._known[id(result.model)]
+        return self.inner.read(cast("Record", _ByFormerNames(result, names, still)))
 
     def apart(self, a: Array, b: Array) -> Array:
         """(n,) distances of two of them."""
@@ -63,10 +70,14 @@ class Renaming(Measure):
 class _ByFormerNames:
     """What a measure asks of a result, by the former names."""
 
-    def __init__(self, result: Record, names: Mapping[str, str]) -> None:
-        self._result, self._names = result, names
+    def __init__(
+        self, result: Record, names: Mapping[str, str], still: Mapping[str, Vector]
+    ) -> None:
+        self._result, self._names, self._still = result, names, still
 
     def position(self, name: str) -> Array:
+        if name in self._still:
+            return np.tile(self._still[name], (len(self._result.t), 1))
         return self._result.position(renamed(name, self._names))
 
     def quantity(self, name: str) -> Quantity:

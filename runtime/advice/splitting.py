@@ -17,8 +17,7 @@ from mstmm.scene.tables.beam_keys import GIVEN, ROOT, TIP, Modes
 from mstmm.scene.tables.flexible import AUTO
 
 from ..chart.models import with_tables
-from .merging import REFERENCES, with_names
-from .outputs import with_places
+from .references import with_names
 
 
 @dataclass(frozen=True)
@@ -70,16 +69,12 @@ def _cut(found: Split, beam: Beam, count: int) -> Split:
     moved = {f"{beam.name}.{end}": f"{parts[k]}.{end}" for end, k in place.items() if k}
     holder = next((h for h in scene.hinge if h.outboard_body == beam.name), None)
     held = 0 if holder is None else place[holder.outboard_end or ROOT]
-    tables: dict[str, Any] = {
-        table: tuple(with_names(one, keys, moved) for one in getattr(scene, table))
-        for table, keys in REFERENCES.items()
-    }
-    tables["output"] = tuple(with_places(one, moved) for one in scene.output)
-    tables["load"] = tuple(
-        part for load in tables["load"] for part in _loads(load, beam, parts, size)
-    )
+    named = with_names(scene, moved)
     welds = [_weld(scene, *pair, k < held) for k, pair in enumerate(pairwise(parts))]
-    tables["hinge"] = (*tables["hinge"], *welds)
+    tables: dict[str, Any] = {
+        "load": tuple(part for load in named.load for part in _loads(load, beam, parts, size)),
+        "hinge": (*named.hinge, *welds),
+    }
     own = [
         _part(beam, name, k * size, beam.length if k == last else (k + 1) * size,
               {end for end, at in place.items() if at == k})
@@ -89,7 +84,7 @@ def _cut(found: Split, beam: Beam, count: int) -> Split:
         part for one in scene.beam for part in (own if one.name == beam.name else (one,))
     )
     return Split(
-        with_tables(scene, **tables), {**found.names, **moved},
+        with_tables(named, **tables), {**found.names, **moved},
         {**found.parts, **dict.fromkeys(parts, beam.name)},
     )  # fmt: skip
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.errors import MstmmError, NumericalFailure
+from mstmm.numbers.rotations import Vector
 from mstmm.scene import Scene
 
 from ..chart.budget import Budget, OutOfTime
@@ -189,12 +190,15 @@ class Bench:
         self.measure.scale_by(_numbers(trial))
         self._found.clear()
 
-    def tried(self, name: str, scene: Scene, names: Mapping[str, str] | None = None) -> Tried:
+    def tried(
+        self, name: str, scene: Scene, names: Mapping[str, str] | None = None,
+        still: Mapping[str, Vector] | None = None,
+    ) -> Tried:  # fmt: skip
         """A model that was run; `names` are other names that places have in it, those of the
-        reference's scene unless given."""
+        reference's scene unless given, `still` places that are on the ground, m."""
         if name not in self._found:
             self.tell(name)
-            self._found[name] = self._try(name, scene, names)
+            self._found[name] = self._try(name, scene, names, still)
         return self._found[name]
 
     @property
@@ -202,10 +206,13 @@ class Bench:
         """Everything that was tried, in its order."""
         return tuple(self._found.values())
 
-    def _try(self, name: str, scene: Scene, names: Mapping[str, str] | None) -> Tried:
+    def _try(
+        self, name: str, scene: Scene, names: Mapping[str, str] | None,
+        still: Mapping[str, Vector] | None,
+    ) -> Tried:  # fmt: skip
         try:
             model = self.compile(scene)
-            self.measure.know(model, self.names if names is None else names)
+            self.measure.know(model, self.names if names is None else names, still)
         except MstmmError as problem:
             return Tried(name, scene, None, math.inf, math.inf, str(problem))
         limit = self.budget.left() * _ONE

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tomllib
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,7 @@ from advice.scenes import TIP, hub_and_beam, period
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.advice.merging import merged
+from mstmm.runtime.advice.merging import Merged, merged
 from mstmm.runtime.advice.renaming import renamed
 
 
@@ -72,19 +74,119 @@ def test_the_same_motion(rng: np.random.Generator) -> None:
             assert np.abs(one - other).max() < 1e-9
 
 
+def same(scene: mstmm.Scene, keep: Collection[str] = ()) -> Merged:
+    """The scene merged, which moves as it did and reads back from a file."""
+    found = merged(scene, keep)
+    assert found is not None
+    read = mstmm.Scene.from_data(tomllib.loads(found.scene.to_toml()))
+    ends = [f"{body.name}.{end}" for body in scene.body for end in body.ends]
+    for place in (*(body.name for body in scene.body), *ends):
+        before = run(scene, f"{place}.position")
+        after = (
+            np.tile(found.still[place], (len(before), 1))
+            if place in found.still
+            else run(read, f"{renamed(place, found.names)}.position")
+        )
+        assert np.abs(before - after).max() < 1e-9, place
+    return found
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"event": [{"when": "t.a.x + t.z > 100", "do": "stop"}]},
+        {"load": [{"on": "q.a", "force": ["2*t", 1, 0], "moment": [0, "t", 2], "axes": "body"}]},
+        {"load": [{"on": "p.a", "force": [1, "-t", 0], "axes": "r"}]},
+        {"spring": [{"from": "p.a", "to": "r.b", "law": {"stiffness": 10}}]},
+        {"output": [{"name": "high", "of": "t.a.z - q.z"}]},
+    ],
+    ids=lambda more: next(iter(more)),
+)
+def test_what_can_be_said_of_the_whole(rng: np.random.Generator, more: dict[str, Any]) -> None:
+    """Places, axes of loads and springs within a body, in expressions too."""
+    found = same(lumps(rng, **more))
+    assert [body.name for body in found.scene.body] == ["p", "s"]
+    assert found.idle == (('spring "spring1"',) if "spring" in more else ())
+
+
 @pytest.mark.parametrize(
     ("more", "kept"),
     [
-        ({"event": [{"when": "t.x > 100", "do": "stop"}]}, "t"),
-        ({"load": [{"on": "q.a", "force": [1, 0, 0], "axes": "body"}]}, "q"),
-        ({"load": [{"on": "p.a", "force": [1, 0, 0], "axes": "r"}]}, "r"),
+        ({"event": [{"when": "t > 100", "do": "release", "hinge": "weld1"}]}, ["p", "r", "s"]),
+        ({"output": [{"name": "load", "of": "weld2.force.x"}]}, ["p", "s", "t"]),
     ],
 )
-def test_what_is_spoken_of_stays(more: dict[str, Any], kept: str) -> None:
-    found = merged(lumps(np.random.default_rng(1), **more))
-    assert found is not None
-    assert kept in {body.name for body in found.scene.body}
-    assert len(found.into) == 2
+def test_what_is_spoken_of_stays(
+    rng: np.random.Generator, more: dict[str, Any], kept: list[str]
+) -> None:
+    found = same(lumps(rng, **more))
+    assert [body.name for body in found.scene.body] == kept
+
+
+def test_the_inboard_one_becomes_part_where_the_outboard_one_stays(
+    rng: np.random.Generator,
+) -> None:
+    found = same(lumps(rng), keep=["r", "t"])
+    assert found.into == {"q": "r", "p": "r", "s": "t"}
+
+
+def test_welded_to_the_ground(rng: np.random.Generator) -> None:
+    """Two lumps in a row on the ground in any pose: what hung on them hangs on the ground."""
+    given = lumps(rng).model_dump(by_alias=True, exclude_none=True)
+    weld = {"name": "base", "type": "fixed", "inboard": "ground", "outboard": "p.a",
+            "position": [1.0, -2.0, 0.5], "orientation": quaternion(rng)}  # fmt: skip
+    springs = [
+        {"name": "taut", "from": "s.a", "to": "p.b", "law": {"stiffness": 20}},
+        {"name": "idle", "from": "ground", "to": "r.b", "law": {"stiffness": 20}},
+    ]
+    loads = [
+        {"on": "q.a", "force": [1, 0, 0]},
+        {"on": "t.a", "force": [0, "sin(t)", 1], "axes": "q"},
+    ]
+    scene = mstmm.Scene(
+        **given | {"hinge": [weld, *given["hinge"][1:]], "spring": springs, "load": loads}
+    )
+    found = same(scene)
+    assert [body.name for body in found.scene.body] == ["s"]
+    assert found.into == {"p": "ground", "q": "ground", "r": "ground", "t": "s"}
+    assert set(found.idle) == {'load "load1"', 'spring "idle"'}
+    assert any(text.startswith("the ground: one with") for text in found.words)
+    stays = same(scene, keep=["q"])
+    assert [body.name for body in stays.scene.body] == ["q", "s"]
+
+
+def test_the_only_body_stays() -> None:
+    weld = {"name": "weld", "type": "fixed", "inboard": "ground", "outboard": "p"}
+    lone = lump(np.random.default_rng(1), "p")
+    assert merged(mstmm.Scene(gravity=[0, 0, 0], body=[lone], hinge=[weld])) is None
+
+
+def test_what_is_welded_to_the_ground_in_an_advice() -> None:
+    """A pillar on the ground, a rigid shelf on it with a load along it, and an arm on a pin."""
+    scene = mstmm.Scene(
+        gravity=[0, -9.81, 0],
+        body=[{"name": "pillar", "mass": 5, "ends": {"top": [0, 2, 0]}},
+              {"name": "arm", "mass": 1, "inertia": [0.1] * 3, "center_of_mass": [0.5, 0, 0]}],
+        beam=[{"name": "shelf", "length": 1, "mass_per_length": 2, "bending_stiffness": 1e9,
+               "modes": {"y": 1}}],
+        hinge=[
+            {"name": "foot", "type": "fixed", "inboard": "ground", "outboard": "pillar"},
+            {"name": "bracket", "type": "fixed", "inboard": "pillar.top", "outboard": "shelf",
+             "orientation": [0, 0, 0.3]},
+            {"name": "pivot", "type": "pin", "inboard": "shelf.tip", "outboard": "arm"},
+        ],
+        load=[{"on": "shelf", "force_per_length": [0, -3, 0]}],
+    )  # fmt: skip
+    made = mstmm.advise(scene, 0.5, error=1e-3, rounds=0, budget=600)
+    assert [body.name for body in made.scene.body] == ["arm"]
+    assert made.scene.beam == ()
+    (pivot,) = made.scene.hinge
+    assert pivot.inboard == "ground"
+    assert pivot.position == pytest.approx([np.cos(0.3), 2 + np.sin(0.3), 0])
+    assert any("pillar.top is at [0, 2, 0] now" in text for text in made.changes)
+    assert made.error <= 1e-3
+    asked = mstmm.advise(scene, 0.5, error=1e-3, of="pillar.top.position", rounds=0, budget=600)
+    assert "pillar" in {body.name for body in asked.scene.body}
 
 
 def test_nothing_to_merge() -> None:

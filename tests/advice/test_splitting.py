@@ -72,6 +72,15 @@ def test_the_same_bending() -> None:
     assert np.abs(one - other).max() < 0.05 * bent
 
 
+def test_what_speaks_of_an_end_speaks_of_that_of_a_part() -> None:
+    data = scene("root").model_dump(by_alias=True, exclude_none=True)
+    event = {"name": "low", "when": "beam.tip.y + 2*bob.y < -1.5", "do": "stop"}
+    output = {"name": "high", "of": "beam.mid.y - beam.root.y"}
+    found = in_parts(mstmm.Scene(**data | {"event": [event], "output": [output]}), ["beam"], 3)
+    assert found.scene.event[0].when.text == "beam_3.tip.y + 2*bob.y < -1.5"
+    assert found.scene.output[0].of.text == "beam_2.mid.y - beam.root.y"
+
+
 def test_what_cannot_be_split() -> None:
     keys = scene("root").beam[0].model_dump(by_alias=True, exclude_none=True)
     assert unfit(Beam.model_validate(keys)) == ""

@@ -8,7 +8,7 @@ a massless body welded to it, "blade/tip": the load of that weld is all that act
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -68,8 +68,11 @@ def with_level(scene: Scene, flexibility: str | None) -> Scene:
     return Scene.model_construct(**fields)
 
 
-def rigidified(scene: Scene, known: Mapping[str, ModalBody]) -> Rigidified:
-    """The scene with rigid bodies in place of those whose model is "rigid" or "one-way".
+def rigidified(
+    scene: Scene, known: Mapping[str, ModalBody], only: Collection[str] | None = None
+) -> Rigidified:
+    """The scene with rigid bodies in place of those whose model is "rigid" or "one-way"; of `only`
+    these names where they are given.
 
     `known` are the modal bodies that need not be computed.
 
@@ -77,6 +80,7 @@ def rigidified(scene: Scene, known: Mapping[str, ModalBody]) -> Rigidified:
     """
     stiff: list[Beam | Elastic] = [b for b in scene.beam if b.model != "flexible"]
     stiff += [b for b in scene.elastic if b.model != "flexible"]
+    stiff = [b for b in stiff if only is None or b.name in only]
     return _Rigidifying(scene, stiff, known).run() if stiff else Rigidified(scene)
 
 
