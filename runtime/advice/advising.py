@@ -13,10 +13,11 @@ from ..chart.measure import measure_of, whole_length
 from ..chart.models import Variant, ladder
 from ..chart.point import Point, Setting
 from ..integrate.steppers import AUTO
-from .around import SEARCH, changed, in_parts, in_plane, lumped
+from .around import SEARCH, changed, in_plane, lumped
 from .choice import Bodies
 from .evidence import Evidence, gathered
 from .hinges import needless, rigid
+from .parts import in_parts
 from .record import Advice
 from .renaming import Renaming
 from .request import Request
@@ -66,16 +67,17 @@ def advised(
     work.length = whole_length(richest)
     first = work.least(work.scene)
     work.size = size_of(work.measure, first)
-    evidence, why = gathered(first, work.length)
+    work.bench, base = _bench(work, top, richest, gathered(first, work.length)[0], state)
+    evidence, why = work.known(first, richest)
     if why:
         work.notes.append(f"nothing is known of the flexible bodies beforehand: {why}")
-    work.bench, base = _bench(work, top, richest, evidence, state)
     base = in_plane(work, top, richest, base)
     q = work.bench.reference.q
     work.whole = Bodies(top.scene).richest
     base, evidence = in_parts(work, base, evidence)
     still = rigid(base.scene, richest, q, work.length)
     base = changed(work, base, "rigid", still, _RIGID * asked.error, cheap=True)
+    work.bench.names = work.measure.names_in(base.running)
     return _reduced(work, base, evidence)
 
 

@@ -39,7 +39,7 @@ _RECOIL, _MOST = 3.0, 2.0
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a one-way run tells of one body.
+    """What a run tells of one body.
 
     Attributes:
         deflection: d, m, the largest of its ends, with what its rotation displaces.
@@ -98,21 +98,30 @@ class Evidence:
 
 
 def evidence_of(result: Result, reach: float) -> dict[str, Evidence]:
-    """Body -> what a one-way run tells; `reach` (m) is how far rotations of ends displace what is
-    fixed there.
+    """Body -> what a run tells in which it responds one way, or coupled; `reach` (m) is how far
+    rotations of ends displace what is fixed there.
 
     Raises NumericalFailure where the response cannot be had.
     """
-    if not isinstance(result, OneWayResult):
-        return {}
+    model = result.model
+    bodies: Mapping[str, ModalBody] = model.flexible
+    if isinstance(result, OneWayResult):
+        bodies = rigidity(model).one_way
     known = {one.name: one for one in result.certificate.flexible}
     found = {}
-    for name, body in rigidity(result.model).one_way.items():
+    for name, body in bodies.items():
         if name in known:
-            eta = result.response(name).eta
+            eta = _coordinates(result, name)
             loaded = _loaded(result.model, name)
             found[name] = _one(body, result.t, np.abs(eta), known[name], loaded, reach)
     return found
+
+
+def _coordinates(result: Result, name: str) -> Array:
+    """(n, modes) modal coordinates."""
+    if isinstance(result, OneWayResult):
+        return np.asarray(result.response(name).eta)
+    return result.q[:, result.model.layout.modal[name].q_slice]
 
 
 def _loaded(model: Compiled, name: str) -> set[str]:

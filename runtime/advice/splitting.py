@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from mstmm.scene import Hinge, Load, Scene, split
+from mstmm.scene import Damping, Hinge, Load, Scene, split
 from mstmm.scene.tables.beam import Beam
 from mstmm.scene.tables.beam_keys import GIVEN, ROOT, TIP, Modes
 from mstmm.scene.tables.flexible import AUTO
@@ -39,13 +39,28 @@ def unfit(beam: Beam) -> str:
     """Why an advice cannot split a beam; "" where it can."""
     if beam.modes is None:
         return "its number of shapes is left open"
-    if beam.basis == GIVEN:
-        return "its shapes are given for the whole"
-    if any(beam.damping.ratio):
-        return "its modal damping belongs to shapes of the whole"
     if beam.initial.eta is not None or beam.initial.etad is not None:
         return "its start is given by shapes of the whole"
     return ""
+
+
+def divisible(beam: Beam, frequency: float) -> tuple[Beam, str]:
+    """A beam without what belongs to shapes of the whole, and what was changed in words, "" for
+    nothing.
+
+    Modal damping becomes what its stiffness damps its first shape alike, of `frequency` (rad/s):
+    2 zeta omega m = s k with k = omega^2 m.
+    """
+    update: dict[str, Any] = {}
+    words = []
+    if any(beam.damping.ratio):
+        time = 2 * beam.damping.ratio[0] / frequency
+        update["damping"] = Damping(stiffness=beam.damping.stiffness + time)
+        words.append(f"damped by {time:.3g} s times its stiffness instead of by its modes")
+    if beam.basis == GIVEN:
+        update |= {"basis": AUTO, "shapes": None}
+        words.append("with shapes of our own choice instead of the given ones")
+    return beam.model_copy(update=update) if update else beam, " and ".join(words)
 
 
 def in_parts(scene: Scene, names: Collection[str], count: int) -> Split:

@@ -17,16 +17,17 @@ from ..chart.point import Setting
 from ..chart.trial import Runs
 from ..integrate.steppers import AUTO
 from ..result.flexible.risks import SLOPE
+from .evidence import Evidence, gathered
 from .request import Request
 from .trials import first_rtol
 
 if TYPE_CHECKING:
     from mstmm.scene import Scene
 
+    from ..model.model import Model
     from ..result.measure import Measure
     from ..result.result import Result
     from .choice import Bodies, Choice
-    from .evidence import Evidence
     from .renaming import Renaming
     from .trials import Bench, Compile, Tell
 
@@ -90,6 +91,20 @@ class Work:
             return runs.simulate(model, setting, _FIRST * self.budget.left())[0]
         except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
             return None
+
+    def known(self, first: Result | None, richest: Model) -> tuple[dict[str, Evidence], str]:
+        """The evidence of a one-way run, of one of the richest model where there is none, and why
+        there is none at all."""
+        evidence, why = gathered(first, self.length)
+        if evidence or not richest.flexible:
+            return evidence, why
+        setting = Setting(AUTO, RICHEST, self.bench.rtol)
+        limit = _FIRST * self.budget.left()
+        try:
+            result, _ = self.bench.runs.simulate(richest, setting, limit)
+        except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError) as problem:
+            return {}, why or str(problem)
+        return gathered(result, self.length)
 
     @property
     def in_measure(self) -> float:

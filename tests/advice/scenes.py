@@ -38,11 +38,11 @@ def hub_and_beam(name: str, shapes: int = 3, **beam: Any) -> mstmm.Scene:
     )  # fmt: skip
 
 
-def hub_and_pieces(name: str, count: int) -> mstmm.Scene:
+def hub_and_pieces(name: str, count: int, **more: Any) -> mstmm.Scene:
     """The same with the beam in welded pieces, which have frames of their own."""
     whole = hub_and_beam(name).model_dump(by_alias=True, exclude_none=True)
     beam = {"length": 1 / count, "mass_per_length": 1.0, "bending_stiffness": HUBS[name][1],
-            "modes": {"y": 2}}  # fmt: skip
+            "modes": {"y": 2}, **more}  # fmt: skip
     names = [f"piece{k}" for k in range(count - 1)] + ["arm"]
     welds = [
         {"name": f"weld{k}", "type": "fixed", "inboard": f"{a}.tip" if k else "hub", "outboard": b}

@@ -29,12 +29,13 @@ def test_nothing_to_reduce_is_an_answer() -> None:
 
 
 def test_bodies_that_respond_no_way_but_coupled() -> None:
-    """A viscous drag is refused below the coupled level: nothing is known beforehand."""
+    """A viscous drag is refused below the coupled level: the richest model itself tells."""
     made = mstmm.advise(
         hub(drag=0.5), 1.2, error=1e-2, of="blade.tip.position", rounds=0, budget=600
     )
     (body,) = made.bodies
-    assert body.evidence is None
+    assert body.evidence is not None
+    assert body.evidence.deflection == pytest.approx(1.07e-2, rel=0.01)
     assert body.choice.coupled
     assert made.error <= 1e-2
     refused = [one for one in made.tried if one.error is None]

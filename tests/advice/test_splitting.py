@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import mstmm
 from mstmm.runtime.advice.renaming import renamed
-from mstmm.runtime.advice.splitting import in_parts, unfit
+from mstmm.runtime.advice.splitting import divisible, in_parts, unfit
 from mstmm.runtime.chart.models import at_level
 from mstmm.scene.tables.beam import Beam
 
@@ -84,6 +84,18 @@ def test_what_speaks_of_an_end_speaks_of_that_of_a_part() -> None:
 def test_what_cannot_be_split() -> None:
     keys = scene("root").beam[0].model_dump(by_alias=True, exclude_none=True)
     assert unfit(Beam.model_validate(keys)) == ""
-    assert "modal damping" in unfit(Beam.model_validate(keys | {"damping": 0.01}))
     assert "start" in unfit(Beam.model_validate(keys | {"initial": {"eta": [0.0] * 4}}))
     assert "left open" in unfit(Beam.model_validate(keys | {"modes": "auto"}))
+
+
+def test_shapes_and_damping_of_the_whole_are_left() -> None:
+    keys = scene("root").beam[0].model_dump(by_alias=True, exclude_none=True)
+    plain = Beam.model_validate(keys)
+    assert divisible(plain, 20.0) == (plain, "")
+    given = keys | {"damping": 0.03, "shapes": {"y": ["x^2", "x^3"]}, "modes": {"y": 2}}
+    made, words = divisible(Beam.model_validate(given | {"basis": "auto"}), 20.0)
+    assert made.damping.ratio == (0.0,)
+    assert made.damping.stiffness == pytest.approx(0.003)
+    assert (made.basis, made.shapes) == ("auto", None)
+    assert "0.003 s times its stiffness" in words
+    assert "given ones" in words
