@@ -49,23 +49,30 @@ def changed(
     work: Work, base: Tried, word: str, changes: list[Change], enough: float, cheap: bool
 ) -> Tried:
     """The model with as many of these changes as it bears within an error that is enough, and
-    within the time of the one before if they are to be `cheap`: all at once, or one after the
-    other."""
+    within the time of the one before if they are to be `cheap`: all at once, else each half of
+    them, down to parts of one."""
     if not work.bench.span.whole:
         return base
-    likely = [one for one in changes if one.expected * work.in_measure <= _UNLIKELY * enough]
+    names = work.measure.names_in(base.running)
     kept: list[Change] = []
     best = base
-    tries = [likely, *([one] for one in likely if len(likely) > 1)] if likely else []
-    for more in tries:
-        if not work.budget.left(SEARCH) or len(kept) == len(likely):
-            break
-        names = ", ".join(one.name for one in (*kept, *more))
-        scene = applied(base.scene, [*kept, *more])
-        found = work.bench.tried(f"{base.name}; {word}: {names}", scene)
+    waiting = [[one for one in changes if one.expected * work.in_measure <= _UNLIKELY * enough]]
+    told = work.told[base.name]
+    while waiting and work.budget.left(SEARCH):
+        more = waiting.pop()
+        if not more:
+            continue
+        made = applied(base.scene, [*kept, *more])
+        name = f"{base.name}; {word}: {', '.join(one.name for one in (*kept, *more))}"
+        found = work.bench.tried(name, made.scene, composed(names, made.names))
         if found.error <= enough and (not cheap or work.bench.as_cheap(found, best)):
             kept, best = [*kept, *more], found
-    work.told[best.name] = (*work.told[base.name], *map(str, kept))
+            work.told[name] = (*told, *map(str, kept), *made.words)
+        elif len(more) > 1:
+            half = len(more) // 2
+            waiting += [more[half:], more[:half]]
+        else:
+            waiting.append(list(more[0].parts))
     return best
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -12,13 +12,17 @@ from mstmm.arrays import Array
 from mstmm.expression.expression import number
 from mstmm.ir.facts import builtin_hinges
 from mstmm.numbers.rotations import about, product, to_quaternion
-from mstmm.scene import Hinge, Scene
+from mstmm.scene import Chain, Hinge, Scene
+from mstmm.scene.tables.hinge import HingeTable
 from mstmm.scene.tables.law import Law
 
 from ..chart.models import with_tables
+from .chains import Written, members, short, written_out
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
+
+T = TypeVar("T", bound=HingeTable)
 
 #: Coordinates nearer to zero than this part of the scene's length count as zero.
 _AT_REST = 1e-9
@@ -32,31 +36,52 @@ class Change:
     """One thing that may be done to a scene.
 
     Attributes:
-        what: hinge or spring, with its name.
+        what: hinge, chain or spring, with its name.
         words: what is done, and the figures that speak for it.
         expected: m, how far it may displace what is fixed there; 0 where nothing is known.
-        hinge, spring: name of what is changed; the new hinge, None for a spring that is left out.
+        name: of what is changed; of a chain's member the one that it gets.
+        made: the new hinge or chain, None for a spring that is left out.
+        parts: what may be done where this is too much.
     """
 
     what: str
     words: str
     expected: float
     name: str
-    hinge: Hinge | None = None
+    made: Hinge | Chain | None = None
+    parts: tuple[Change, ...] = ()
 
     def __str__(self) -> str:
         return f"{self.what}: {self.words}"
 
 
-def applied(scene: Scene, changes: Sequence[Change]) -> Scene:
-    """The scene with these changes."""
-    hinges = {one.name: one.hinge for one in changes if one.hinge is not None}
-    springs = {one.name for one in changes if one.hinge is None}
-    return with_tables(
+def applied(scene: Scene, changes: Sequence[Change]) -> Written:
+    """The scene with these changes; chains of which members are changed are written out."""
+    made = {one.name: one.made for one in changes if isinstance(one.made, Hinge)}
+    chains = {one.name: one.made for one in changes if isinstance(one.made, Chain)}
+    springs = {one.name for one in changes if one.made is None}
+    whole = with_tables(
         scene,
-        hinge=tuple(hinges.get(one.name, one) for one in scene.hinge),
+        chain=tuple(chains.get(one.name, one) for one in scene.chain),
         spring=tuple(one for one in scene.spring if one.name not in springs),
     )
+    touched = [
+        chain for chain in short(whole) if any(m.new_hinge in made for m in members(whole, chain))
+    ]
+    found = written_out(whole, touched)
+    hinges = tuple(made.get(one.name, one) for one in found.scene.hinge)
+    return replace(found, scene=with_tables(found.scene, hinge=hinges))
+
+
+def _hinges(scene: Scene) -> Iterator[tuple[str, Hinge]]:
+    """Every hinge with the name that it has in the scene; members of chains as they are written
+    out."""
+    yield from ((hinge.name, hinge) for hinge in scene.hinge)
+    chains = short(scene)
+    written = written_out(scene, chains).scene.hinge
+    known = {one.name: one for one in written[len(scene.hinge) :]}
+    for chain in chains:
+        yield from ((one.hinge, known[one.new_hinge]) for one in members(scene, chain))
 
 
 # --- rigid ----------------------------------------------------------------------------------------
@@ -67,24 +92,21 @@ def rigid(scene: Scene, model: Compiled, q: Array, reach: float) -> list[Change]
     least motion first.  `reach` (m) is how far a rotation of 1 rad displaces what is behind it.
     """
     found: list[Change] = []
-    for hinge in scene.hinge:
-        known = next((one for one in model.scene.hinge if one.name == hinge.name), None)
+    released = {event.hinge for event in scene.event}
+    for name, hinge in _hinges(scene):
+        known = model.scene.hinges.by_name.get(name)
         facts = hinge.builtin
         if facts is None or facts.welds or known is None or known.type != hinge.type:
             continue
-        if hinge.drive is not None or _released(scene, hinge):
+        if hinge.drive is not None or hinge.lets_go or name in released:
             continue
-        own = q[:, model.layout.hinges[hinge.name].q_slice]
+        own = q[:, model.layout.hinges[name].q_slice]
         change = _turned(hinge, own, reach) if facts.quaternion is not None else None
         if facts.quaternion is None and facts.straight:
             change = _straight(hinge, own, reach)
         if change is not None:
-            found.append(change)
+            found.append(replace(change, what=f'hinge "{name}"'))
     return sorted(found, key=lambda one: one.expected)
-
-
-def _released(scene: Scene, hinge: Hinge) -> bool:
-    return hinge.lets_go or any(event.hinge == hinge.name for event in scene.event)
 
 
 def _straight(hinge: Hinge, own: Array, reach: float) -> Change:
@@ -138,26 +160,52 @@ def _weld(hinge: Hinge, orientation: Sequence[float]) -> Hinge:
 
 
 def needless(scene: Scene) -> list[Change]:
-    """Springs, dampers and friction of hinges, and springs between bodies, each left out."""
-    found = []
-    for hinge in scene.hinge:
-        if hinge.builtin is not None and hinge.drive is None and _acts(hinge.law):
-            law = hinge.law.model_copy(
-                update={key: getattr(_nothing(hinge), key) for key in _PASSIVE}
+    """Springs, dampers and friction of hinges, and springs between bodies, each left out; of a
+    chain those of all its hinges, or of each."""
+    rows = {chain.name: [one.hinge for one in members(scene, chain)] for chain in short(scene)}
+    of_chains = {name for row in rows.values() for name in row}
+    found = {
+        name: Change(
+            f'hinge "{name}"', _without(_acting(hinge.law)), 0.0, hinge.name, _slack(hinge)
+        )
+        for name, hinge in _hinges(scene)
+        if _acts(hinge)
+    }
+    changes = [one for name, one in found.items() if name not in of_chains]
+    for chain in scene.chain:
+        if any(_acts(one) for one in chain.hinge):
+            made = chain.model_copy(
+                update={"hinge": tuple(_slack(h) if _acts(h) else h for h in chain.hinge)}
             )
-            made = hinge.model_copy(update={"law": law})
-            acting = " and ".join(_acting(hinge.law))
-            words = f"without its {acting}, which hardly matters"
-            found.append(Change(f'hinge "{hinge.name}"', words, 0.0, hinge.name, made))
-    found += [
+            acting = dict.fromkeys(word for hinge in chain.hinge for word in _acting(hinge.law))
+            words = _without(acting)
+            parts = [found[name] for name in rows.get(chain.name, ()) if name in found]
+            changes.append(
+                Change(f'chain "{chain.name}"', words, 0.0, chain.name, made, tuple(parts))
+            )
+    changes += [
         Change(f'spring "{one.name}"', "left out, for it hardly matters", 0.0, one.name)
         for one in scene.spring
     ]
-    return found
+    return changes
 
 
-def _acts(law: Law) -> bool:
-    return next(_acting(law), None) is not None
+def _slack(hinge: T) -> T:
+    """A hinge without springs, dampers and friction."""
+    update = {key: getattr(_nothing(hinge), key) for key in _PASSIVE}
+    return hinge.model_copy(update={"law": hinge.law.model_copy(update=update)})
+
+
+def _without(acting: Iterable[str]) -> str:
+    return f"without its {' and '.join(acting)}, which hardly matters"
+
+
+def _acts(hinge: HingeTable) -> bool:
+    return (
+        hinge.builtin is not None
+        and hinge.drive is None
+        and next(_acting(hinge.law), None) is not None
+    )
 
 
 def _acting(law: Law) -> Iterator[str]:
@@ -169,7 +217,7 @@ def _acting(law: Law) -> Iterator[str]:
         yield "friction"
 
 
-def _nothing(hinge: Hinge) -> Law:
+def _nothing(hinge: HingeTable) -> Law:
     """A law that does nothing, with as many entries as the hinge has speeds."""
     facts = hinge.builtin
     assert facts is not None

@@ -22,8 +22,10 @@ from ..chart.models import with_tables
 from ..pack.flexible.rigidified import rigidified
 from ..pack.welds import Pose, end_of, together, welded
 from .axes import with_axes_of
+from .chains import Written, short, written_out
 from .choice import RIGID
 from .references import INERTIAL, with_names
+from .renaming import composed, renamed
 from .spoken import Spoken, spoken_of
 
 
@@ -37,6 +39,7 @@ class Merged:
         into: body that is gone -> body that it is part of, or "ground".
         still: place of the former scene -> where it is on the ground, m.
         idle: loads and springs that are gone, for they do nothing.
+        written: a sentence for each chain that was written out.
     """
 
     scene: Scene
@@ -44,6 +47,7 @@ class Merged:
     into: Mapping[str, str] = field(default_factory=dict)
     still: Mapping[str, Vector] = field(default_factory=dict)
     idle: tuple[str, ...] = ()
+    written: tuple[str, ...] = ()
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -56,7 +60,11 @@ class Merged:
             + ", ".join(self._moved(old) for old in self.names if split(old)[0] in gone)
             for whole, gone in parts.items()
         ]
-        return (*said, *(f"{what}: left out, for it does nothing now" for what in self.idle))
+        return (
+            *self.written,
+            *said,
+            *(f"{what}: left out, for it does nothing now" for what in self.idle),
+        )
 
     def _moved(self, old: str) -> str:
         if old not in self.still:
@@ -71,20 +79,38 @@ def _called(whole: str) -> str:
 def merged(scene: Scene, keep: Collection[str] = ()) -> Merged | None:
     """The scene with every weld between rigid bodies, and between these and the ground, gone; None
     where there is none.  Bodies and hinges to `keep` stay by themselves."""
-    found = Merged(_with_bodies(scene))
+    written = written_out(scene, [one for one in short(scene) if _welded(one, scene)])
+    found = Merged(_with_bodies(written.scene))
+    stays = {renamed(name, written.names) for name in keep}
     while True:
-        spoken = spoken_of(found.scene, keep)
+        spoken = spoken_of(found.scene, stays)
         bodies = {body.name: body for body in found.scene.body}
         for weld in found.scene.hinge:
             gone = _goes(weld, bodies, found.scene, spoken)
             if gone is not None:
                 break
         else:
-            return found if found.into else None
+            return _of_chains(found, written) if found.into else None
         found = _without(found, weld, gone, bodies)
 
 
+def _of_chains(found: Merged, written: Written) -> Merged:
+    """What is merged of the scene as it was before its chains were written out."""
+    still = {old: found.still[new] for old, new in written.names.items() if new in found.still}
+    return replace(
+        found, names=composed(written.names, found.names), still={**found.still, **still},
+        written=written.words,
+    )  # fmt: skip
+
+
 # --- what may go ----------------------------------------------------------------------------------
+
+
+def _welded(chain: Chain, scene: Scene) -> bool:
+    """Whether members are welded to each other, or something is welded to one."""
+    return any(hinge.is_weld for hinge in chain.hinge) or any(
+        hinge.is_weld and hinge.inboard.startswith(f"{chain.name}[") for hinge in scene.hinge
+    )
 
 
 def _with_bodies(scene: Scene) -> Scene:
