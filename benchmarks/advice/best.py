@@ -14,11 +14,12 @@ import numpy as np
 import mstmm
 from mstmm.runtime.advice.choice import LINEAR, ONE_WAY, RIGID, STIFFENED, Bodies, Choice
 from mstmm.runtime.advice.renaming import Renaming
-from mstmm.runtime.advice.splitting import in_parts
+from mstmm.runtime.advice.splitting import divisible, in_parts
 from mstmm.runtime.chart.families import PROMISING
 from mstmm.runtime.chart.measure import Places
-from mstmm.runtime.chart.models import Variant, ladder
+from mstmm.runtime.chart.models import Variant, ladder, with_tables
 from mstmm.runtime.chart.planar import planar
+from mstmm.runtime.result.flexible.energy import frequencies
 from mstmm.runtime.result.one_way.result import OneWayResult
 
 #: Samples at which errors are looked at: others than an advice looks at.
@@ -99,11 +100,23 @@ def truth(scene: mstmm.Scene, t_end: float) -> Truth | None:
 
 def truth_in_parts(known: Truth, wholes: set[str], t_end: float) -> Truth | None:
     """The same with beams that one frame cannot follow in sixteen welded parts each."""
-    parts = in_parts(known.base, wholes, _PARTS)
+    parts = in_parts(_divisible(known.base, wholes), wholes, _PARTS)
     model = mstmm.compile(parts.scene, engine="looped")
     known.measure.know(model, parts.names)
     found = _agreed(model, known.measure, t_end)
     return None if found is None else Truth(found[1], found[0], known.measure, known.base)
+
+
+def _divisible(scene: mstmm.Scene, wholes: set[str]) -> mstmm.Scene:
+    """The scene whose beams have nothing that belongs to shapes of the whole."""
+    bodies = mstmm.compile(scene, engine="looped").flexible
+    beams = (
+        divisible(beam, float(frequencies(bodies[beam.name])[0]))[0]
+        if beam.name in wholes
+        else beam
+        for beam in scene.beam
+    )
+    return with_tables(scene, beam=tuple(beams))
 
 
 def _agreed(
