@@ -11,8 +11,8 @@ from mstmm.scene import split
 from ..chart.models import Variant
 from ..chart.planar import planar
 from .hinges import Change, applied
-from .merging import merged
 from .renaming import composed, renamed
+from .rewriting.merging import merged
 from .trials import Tried
 from .work import Work
 

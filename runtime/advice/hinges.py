@@ -17,7 +17,7 @@ from mstmm.scene.tables.hinge import HingeTable
 from mstmm.scene.tables.law import Law
 
 from ..chart.models import with_tables
-from .chains import Written, members, short, written_out
+from .rewriting.chains import Written, members, short, written_out
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled

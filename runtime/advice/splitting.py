@@ -17,7 +17,7 @@ from mstmm.scene.tables.beam_keys import GIVEN, ROOT, TIP, Modes
 from mstmm.scene.tables.flexible import AUTO
 
 from ..chart.models import with_tables
-from .references import with_names
+from .rewriting.references import with_names
 
 
 @dataclass(frozen=True)

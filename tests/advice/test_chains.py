@@ -11,10 +11,10 @@ from advice.scenes import tip
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.advice import chains
-from mstmm.runtime.advice.chains import short, written_out
-from mstmm.runtime.advice.merging import merged
 from mstmm.runtime.advice.renaming import renamed
+from mstmm.runtime.advice.rewriting import chains
+from mstmm.runtime.advice.rewriting.chains import short, written_out
+from mstmm.runtime.advice.rewriting.merging import merged
 
 OF = "rope[last].tip.position"
 

@@ -12,8 +12,8 @@ from advice.scenes import TIP, hub_and_beam, period
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.advice.merging import Merged, merged
 from mstmm.runtime.advice.renaming import renamed
+from mstmm.runtime.advice.rewriting.merging import Merged, merged
 
 
 def quaternion(rng: np.random.Generator) -> list[float]:

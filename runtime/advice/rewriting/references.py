@@ -8,8 +8,8 @@ from typing import Any
 from mstmm.expression.expression import Expression, Name, parse
 from mstmm.scene import Scene
 
-from ..chart.models import with_tables
-from .renaming import renamed
+from ...chart.models import with_tables
+from ..renaming import renamed
 
 #: Keys of the tables that refer to a body or to one of its ends, and to a hinge.
 _PLACES: dict[str, tuple[str, ...]] = {

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from mstmm.scene import Body, Chain, Hinge, Scene
 from mstmm.scene.tables.chain import HINGE
 
-from ..chart.models import with_tables
+from ...chart.models import with_tables
 from .references import with_names
 
 #: Chains of more members stay chains.

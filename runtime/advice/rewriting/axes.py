@@ -9,7 +9,7 @@ from mstmm.arrays import Array
 from mstmm.expression.expression import Expression, number, parse
 from mstmm.scene import Load, Scene, split
 
-from ..chart.models import with_tables
+from ...chart.models import with_tables
 from .references import OWN_AXES
 
 Entries = tuple[Expression, ...]

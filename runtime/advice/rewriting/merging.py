@@ -18,14 +18,14 @@ from mstmm.numbers.rotations import Matrix, Vector, from_orientation
 from mstmm.scene import Body, Chain, Hinge, Load, Scene, Spring, split
 from mstmm.scene.rules.values import GROUND
 
-from ..chart.models import with_tables
-from ..pack.flexible.rigidified import rigidified
-from ..pack.welds import Pose, end_of, together, welded
+from ...chart.models import with_tables
+from ...pack.flexible.rigidified import rigidified
+from ...pack.merge.welds import Pose, end_of, together, welded
+from ..choice import RIGID
+from ..renaming import composed, renamed
 from .axes import with_axes_of
 from .chains import Written, short, written_out
-from .choice import RIGID
 from .references import INERTIAL, with_names
-from .renaming import composed, renamed
 from .spoken import Spoken, spoken_of
 
 
