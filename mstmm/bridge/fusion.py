@@ -10,11 +10,14 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
 
 from ..border import columns as columns_abi
 from ..border.fused import ABI, FLAGS, TUNING
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
     from ..runtime.linear.symbolic import Symbolic
     from ..runtime.pack.elements import Known
     from ..runtime.pack.packed import Packed
+    from ..runtime.pack.system import System
 
 #: More bodies (ends and sections of flexible bodies count) than this are not fused unless the user
 #: asks for it: compilers take seconds, while the advantage shrinks.
@@ -121,6 +125,16 @@ class Fusion:
                 self.build()
             except EnvironmentFailure as error:
                 self.obstacle = str(error)
+
+    def under(self, system: System) -> Self:
+        """The same of a system that differs from this one in its inputs alone."""
+        found = copy(self)
+        if not self.obstacle:
+            start = system.inputs_at(0.0)
+            found.numbers = np.array(self.numbers)
+            for entry, place in self.inputs:
+                found.numbers[place] = start[entry]
+        return found
 
     def ready(self, evaluations: float) -> FusedLibrary | None:
         """The scalar library if it is there, or if so many evaluations are worth a compiler run."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from mstmm.expression.expression import Expression
@@ -19,7 +19,8 @@ class Acting:
 
     `hinges` are the numbers of the hinges whose own q, u and parameters it names; `spring` is the
     one whose length it reads.  Of a `drive` the second derivative acts; a `condition` (an event or
-    a release) acts by becoming true.  `inputs` are those it names, signals too.
+    a release) acts by becoming true.  `inputs` are those it names, signals too, but for those that
+    are `held`: nobody knows before the run what they will be.
     """
 
     expression: Expression
@@ -30,19 +31,26 @@ class Acting:
     condition: bool = False
     constants: tuple[tuple[str, float], ...] = field(default=())
     inputs: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
 
 
-def acting(scene: Scene) -> list[Acting]:
-    """All that are not constant, in the order of the file."""
+def acting(scene: Scene, held: Collection[str] = ()) -> list[Acting]:
+    """All that are not constant, in the order of the file; `held` are inputs set during the run."""
     inputs = scene.channels
-    return [_with(one, inputs) for one in _all(scene) if not one.expression.is_constant]
+    return [_with(one, inputs, held) for one in _all(scene) if not one.expression.is_constant]
 
 
-def _with(one: Acting, inputs: Inputs) -> Acting:
+def _with(one: Acting, inputs: Inputs, held: Collection[str]) -> Acting:
     """The same with the inputs it names, of which those that stand still are constants."""
     used = {n.text: inputs[n.text] for n in one.expression.names if n.text in inputs}
-    still = ((name, channel.value(0.0)) for name, channel in used.items() if channel.stands)
-    return replace(one, constants=(*one.constants, *still), inputs=tuple(used)) if used else one
+    if not used:
+        return one
+    known = {name: channel for name, channel in used.items() if name not in held}
+    still = ((name, channel.value(0.0)) for name, channel in known.items() if channel.stands)
+    return replace(
+        one, constants=(*one.constants, *still), inputs=tuple(known),
+        held=tuple(name for name in used if name in held),
+    )  # fmt: skip
 
 
 def _all(scene: Scene) -> Iterator[Acting]:
@@ -77,7 +85,7 @@ def _of_hinge(hinge: HingeTable, what: str, numbers: Sequence[int]) -> Iterator[
 def owners(one: Acting, hinges: Hinges) -> Iterator[Hinge | None]:
     """The hinges whose own names an expression means: every one where it reads their q and u, else
     the first alone, for all."""
-    common = ("t", *one.inputs)
+    common = ("t", *one.inputs, *one.held)
     own = any(len(n.parts) == 1 and n.text not in common for n in one.expression.names)
     for number in one.hinges if own else one.hinges[:1]:
         yield hinges[number]

@@ -64,7 +64,7 @@ def accelerations(
     state and the hinge.
     """
     n, udot = len(states.q), np.empty((len(states.q), engine.nu))
-    live = LiveInputs(engine.packed.system.inputs, fusing.inputs)
+    live = LiveInputs(engine.packed.system, fusing.inputs)
     if not states.lead and fusing.library is not None:
         numbers = live.at(fusing.numbers, states.t).ravel()
         failed = _one(engine, fusing.library, numbers, states, udot)

@@ -77,8 +77,13 @@ class Calls:
         return self.ffi.from_buffer("real[]", array)
 
     def start_memory(self) -> Array:
-        """Memory at the start: nothing released, no turns counted."""
-        return np.zeros(max(1, self.packed.system.n_memory))
+        """Memory at the start: nothing released, no turns counted, inputs held where they begin."""
+        system = self.packed.system
+        memory = np.zeros(max(1, system.n_memory))
+        memory[system.n_memory - len(system.held.start) :][: len(system.held.start)] = (
+            system.held.start
+        )
+        return memory
 
     @cached_property
     def inertia_alone(self) -> Self:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from .live import Places
 if TYPE_CHECKING:
     from ..kernels.columns import ColumnsLibrary
     from ..kernels.fused import FusedLibrary
+    from ..pack.system import System
 
 
 class Fusing(Protocol):
@@ -25,7 +26,8 @@ class Fusing(Protocol):
     library came from, `obstacle` why there can be none.  `ready(n)` gives a library if it is there
     or if n evaluations are worth a compiler run; `find()` only looks; `build()` raises
     EnvironmentFailure where there can be none; `follow(other)` takes over the libraries of the same
-    scene with other numbers.  `symbolic` is a linear model as formulas.
+    scene with other numbers, `under(system)` is the same of a system that differs in its inputs.
+    `symbolic` is a linear model as formulas.
     """
 
     library: FusedLibrary | None
@@ -40,6 +42,7 @@ class Fusing(Protocol):
     def find(self) -> FusedLibrary | None: ...
     def build(self) -> FusedLibrary: ...
     def follow(self, other: Any) -> None: ...
+    def under(self, system: System) -> Self: ...
     def ready(self, evaluations: float) -> FusedLibrary | None: ...
     def ready_lanes(self, evaluations: float) -> FusedLibrary | None: ...
     def ready_implicit(self, evaluations: float) -> FusedLibrary | None: ...
@@ -75,6 +78,9 @@ class NotFused:
 
     def follow(self, other: Any) -> None:
         pass
+
+    def under(self, system: System) -> Self:
+        return self
 
     def ready(self, evaluations: float) -> None:
         return None

@@ -17,7 +17,8 @@ from ..pack.pack import pack
 from ..pack.packed import Packed
 from .code import Fusing, NotFused
 from .engine import Engine
-from .given import GivenInput, with_inputs
+from .given import GivenInput, at_once, with_inputs
+from .renewed import with_values
 from .slopes import Slopes
 
 
@@ -144,7 +145,22 @@ class Compiled:
 
         Raises SceneError for an unknown name (the nearest one is suggested) or an impossible value.
         """
+        values = at_once(self.scene, inputs)
+        if values is not None:
+            return self.renewed(with_values(self.packed, values))
         return self._with(with_inputs(self.scene, inputs))
+
+    def renewed(self, packed: Packed) -> Self:
+        """The same of its packed scene under other inputs, which fits the compiled code that there
+        is; nothing is validated."""
+        known = {
+            name: value for name, value in vars(self).items()
+            if not isinstance(getattr(type(self), name, None), cached_property)
+        }  # fmt: skip
+        found = object.__new__(type(self))
+        found.__dict__.update(known, scene=packed.described, looped=Engine(packed))
+        found.fusion = self.fusion.under(packed.system)
+        return found
 
     def _with(self, scene: Scene) -> Self:
         """What was asked of this scene, of the same one with other numbers."""

@@ -13,12 +13,32 @@ from mstmm.scene import Scene
 from mstmm.scene.checks.inputs import users
 from mstmm.scene.rules.messages import near
 
+from ..breaks.acting import acting
 from ..pack.parameters import data_of, made_of
 
 #: A number, the name of a signal, (times, values), or the keys of a [[signal]].
 GivenInput = float | str | tuple[ArrayLike, ArrayLike] | Mapping[str, Any]
 
 _EXPECTED = "a number, the name of a signal, (times, values) or the keys of a [[signal]]"
+
+
+def at_once(scene: Scene, inputs: Mapping[str, GivenInput]) -> dict[str, float | str] | None:
+    """What inputs are given, where they are numbers or names of signals and drive nothing: then
+    nothing but their values changes.  None where the scene has to be validated afresh.
+
+    Raises SceneError for names of no input, and for what no input can be.
+    """
+    known, signals = {one.name for one in scene.input}, {one.name for one in scene.signal}
+    driving = {name for one in acting(scene) if one.drive for name in one.inputs}
+    found: dict[str, float | str] = {}
+    for name, given in by_name("inputs", inputs).items():
+        if name not in known:
+            raise _unknown(name, scene)
+        unknown = isinstance(given, str) and given not in signals
+        if name in driving or unknown or _over_time(given):
+            return None
+        found[name] = given if isinstance(given, str) else real(_at(name), given)
+    return found
 
 
 def with_inputs(scene: Scene, inputs: Mapping[str, GivenInput]) -> Scene:
@@ -62,13 +82,17 @@ def _signal(name: str, given: Any) -> dict[str, Any] | None:
     """The table of what is given over time; None for a number or a name."""
     if isinstance(given, Mapping):
         return {key: _plain(name, key, value) for key, value in given.items()}
-    if isinstance(given, str) or not hasattr(given, "__len__"):
+    if not _over_time(given):
         return None
     if len(given) != 2 or any(not hasattr(row, "__len__") for row in given):
         raise SceneError(f"{_at(name)}: expected {_EXPECTED}")
     return {
         key: _plain(name, key, row) for key, row in zip(("times", "values"), given, strict=True)
     }
+
+
+def _over_time(given: Any) -> bool:
+    return not isinstance(given, str) and hasattr(given, "__len__")
 
 
 def _plain(name: str, key: str, value: Any) -> Any:

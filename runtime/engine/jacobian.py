@@ -102,7 +102,7 @@ def _tape(
         return None, _nothing
     kernel = kernels["accelerations_power" if "power" in outputs else "accelerations"]
     tape = TapeKernel(tangent(kernel, ["q", "u"], outputs, values=False, guards=False))
-    live = LiveInputs(packed.system.inputs, structure.inputs)
+    live = LiveInputs(packed.system, structure.inputs)
     return tape, lambda t: live.at(numbers, np.array([t])).ravel()
 
 

@@ -189,10 +189,8 @@ class Run:
             )
         given = np.asarray(settings.atol if atol is None else atol, dtype=np.float64)
         run.atol = self._doubles(np.broadcast_to(given, (system.n_error,)))
-        self._times(run, settings.output_times, breaks)
-        starts, longest = (np.asarray(x, dtype=np.float64) for x in bounds)
-        run.n_bounds = len(starts)
-        run.bound_starts, run.bounds = self._doubles(starts), self._doubles(longest)
+        self._outputs(run, settings.output_times)
+        self.map_times(breaks, bounds)
         self._buffer(run, capacity)
         run.workspace = self._space = self._room(run.tableau)
         start = np.array(y0, dtype=np.float64)
@@ -223,9 +221,7 @@ class Run:
         self._kept += [copy, pointer]
         return pointer
 
-    def _times(self, run: Any, output_times: ArrayLike | None, breaks: ArrayLike) -> None:
-        stops = np.atleast_1d(np.asarray(breaks, dtype=np.float64))
-        run.n_breaks, run.breaks = len(stops), self._doubles(stops)
+    def _outputs(self, run: Any, output_times: ArrayLike | None) -> None:
         run.n_outputs = -1
         if output_times is not None:
             outputs = np.atleast_1d(np.asarray(output_times, dtype=np.float64))
@@ -263,6 +259,24 @@ class Run:
                 return status
             if left == 0.0:
                 return Status.RUNNING
+
+    @property
+    def record(self) -> Any:
+        """`mstmm_run *`, for C that advances the run itself."""
+        return self._run
+
+    def map_times(self, breaks: ArrayLike, bounds: tuple[ArrayLike, ArrayLike]) -> None:
+        """Breaks and bounds, as at the making, to look out for from now on instead."""
+        rows = [np.atleast_1d(np.array(x, dtype=np.float64)) for x in (breaks, *bounds)]
+        stops, starts, longest = (self._ffi.from_buffer("double[]", row) for row in rows)
+        self._mapped = (len(rows[0]), stops, len(rows[1]), starts, longest)
+        self._lib.mstmm_run_map(self._run, *self._mapped)
+
+    def take_over(self, other: Run) -> None:
+        """Stand where another run of the same settings does, and look out for the same times."""
+        self._mapped, self._run.t_end = other._mapped, other._run.t_end
+        self._lib.mstmm_run_map(self._run, *self._mapped)
+        self.restore(other.state())
 
     def call_back(self, signs: int, look: int = 0, short_step: float = 0.0) -> None:
         """Have `advance` come back between steps, with `asked`.

@@ -77,7 +77,7 @@ class Differentiation:
         else:
             structure, self.p = structure_of(model.packed.system, known)
             self.slopes = np.zeros((len(self.p), 0))
-        self._live = LiveInputs(model.packed.system.inputs, structure.inputs)
+        self._live = LiveInputs(model.packed.system, structure.inputs)
         self.tangents = Tangents(model.fusion, structure, bool(names))
         self._memory = np.zeros(structure.n_memory)
         #: Without drives all speeds are free, and time acts at coordinates that stay.

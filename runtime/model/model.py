@@ -14,15 +14,12 @@ from mstmm.arrays import Array, batch, one, one_row, pair, real
 from mstmm.arrays import columns as columns_of
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import NumericalFailure
-from mstmm.scene import Scene
+from mstmm.risk import Risk
 
-from ..engine.code import Fusing
 from ..engine.compiled import Compiled
 from ..engine.given import GivenInput
 from ..integrate.settings import Settings, checked, times_of
-from ..pack.elements import Known
 from ..pack.layout import refuse_dense
-from ..pack.packed import Packed
 
 if TYPE_CHECKING:
     from ..engine.solver import Solver
@@ -40,6 +37,7 @@ if TYPE_CHECKING:
     from .derivatives import Derivatives, Differentiation
     from .equilibrium import Equilibrium
     from .linearize import Linearising
+    from .session import Session
 
 
 class Model(Compiled):
@@ -49,16 +47,9 @@ class Model(Compiled):
     quaternions of ball and free hinges in outboard axes, quaternions w, x, y, z.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        known: Known | None = None,
-        fusing: Callable[[Packed, Known], Fusing] | None = None,
-        product_accuracy: float | None = None,
-        least_squares: bool = False,
-    ) -> None:
-        super().__init__(scene, known, fusing, product_accuracy, least_squares)
-        self._differentiations: dict[tuple[str, ...], Differentiation] = {}
+    @cached_property
+    def _differentiations(self) -> dict[tuple[str, ...], Differentiation]:
+        return {}
 
     def initial_state(self) -> tuple[Array, Array]:
         """(q, u) at t = 0 as the scene gives them, driven coordinates included."""
@@ -435,6 +426,59 @@ class Model(Compiled):
                 certify=certify, progress=progress, checkpoint=checkpoint, resume=resume,
             )  # fmt: skip
         return ended(result, on_risk)
+
+    def session(
+        self,
+        q: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        t: float = 0.0,
+        method: str | None = None,
+        step: float | None = None,
+        rtol: float | None = None,
+        atol: float | None = None,
+        *,
+        max_step: float = 0.0,
+        radius: float | None = None,
+        tangent: str = "auto",
+    ) -> Session:
+        """A run in the caller's hands: `advance(dt, inputs={...})` goes on tick by tick.
+
+        From q (nq,) and u (nu,), the scene's start where they are not given, at t (s).  method,
+        step, rtol, atol, max_step, radius and tangent as in `simulate`, but for the methods auto,
+        SciPy's, SUNDIALS' and the classical ones, which make whole runs.  A fixed step is checked
+        once per model and step: what speaks against it is in `warnings` of every such session.
+
+        Raises SceneError for settings or a state that make no sense.
+        """
+        from .session import Session
+
+        at = real("t", t, "a time in s")
+        given = METHOD if method is None else method
+        tolerances = RTOL if rtol is None else rtol, ATOL if atol is None else atol
+        settings = checked(
+            Settings(at, at, given, step, *tolerances, (), max_step, radius=radius, tangent=tangent)
+        )
+        start, instead = self.initial_state(), "make a session for each of several"
+        state = (
+            start[0] if q is None else one("q", q, self.nq, instead),
+            start[1] if u is None else one("u", u, self.nu, instead),
+        )
+        return Session(self, settings, *state, self._step_risks(settings, *state))
+
+    def _step_risks(self, settings: Settings, q: Array, u: Array) -> tuple[Risk, ...]:
+        """What speaks against a fixed step at the first state from which it is to be taken."""
+        if settings.step is None:
+            return ()
+        key = settings.method, settings.step, settings.radius
+        if key not in self._steps_checked:
+            from .session import step_risks
+
+            self._steps_checked[key] = step_risks(self, settings, q, u)
+        return self._steps_checked[key]
+
+    @cached_property
+    def _steps_checked(self) -> dict[tuple[str, float, float | None], tuple[Risk, ...]]:
+        return {}
 
     def simulate_batch(
         self,

@@ -22,7 +22,7 @@ from .frames import Frames
 from .laws import laws_of
 from .letting_go import releasable
 from .slots import layout_of
-from .system import ForceNumbers, LoadNumbers, Numbers, System
+from .system import ForceNumbers, Held, LoadNumbers, Numbers, System
 from .values import MOVING, Moving, Values, drive_kernel, effort_kernel
 
 
@@ -81,12 +81,12 @@ def system_of(
         values.kernel() if len(values) else None,
         drive_kernel([drive for _, _, drive in driven], layout, ports) if driven else None,
         tuple((place, k) for place, k, _ in driven), tuple(scene.channels.values()),
-        _by_time(nodes), moving or {},
+        Held((-1,) * len(scene.channels)), by_time(nodes), moving or {},
     )  # fmt: skip
     return system, frames
 
 
-def _by_time(scene: Scene) -> bool:
+def by_time(scene: Scene) -> bool:
     """Whether an effort or load names the time, or an input that does not stand still."""
     inputs = scene.channels
     loads = (one for one in acting(scene) if not (one.drive or one.condition))

@@ -26,7 +26,7 @@ class Packed(Frames):
 
     `scratch` is the first number of the workspace behind what the bodies need, `tape_slots` the
     largest workspace of a tape, `workspace` the whole length; `qr` is whether the sweep is that of
-    least squares.
+    least squares.  `held` are the inputs that are set during a run, by name.
     """
 
     system: System
@@ -39,6 +39,7 @@ class Packed(Frames):
     workspace: int = 0
     product: Any = None
     qr: bool = False
+    held: frozenset[str] = frozenset()
     _time_maps: dict[tuple[float, float], TimeMap] = field(default_factory=dict)
     _slopes: Slopes | None = None
 
@@ -49,7 +50,8 @@ class Packed(Frames):
             if len(self._time_maps) >= _MAPS:
                 self._time_maps.clear()
             inputs = self.described.channels
-            self._time_maps[span] = time_map(acting(self.scene), start, end, inputs)
+            found = time_map(acting(self.scene, self.held), start, end, inputs)
+            self._time_maps[span] = found
         return self._time_maps[span]
 
     def slopes(self) -> Slopes:
@@ -62,7 +64,15 @@ class Packed(Frames):
     @cached_property
     def watched(self) -> Watched:
         """Events, releases and switches as one tape."""
-        return watched(self.scene, self.layout)
+        return watched(self.scene, self.layout, self.held)
+
+    @cached_property
+    def goes_by_time(self) -> bool:
+        """Whether steps of a run may have to end, or to be short, somewhere known before."""
+        return any(
+            one.inputs or one.drive or "t" in {name.text for name in one.expression.names}
+            for one in acting(self.scene, self.held)
+        )
 
 
 def resize(packed: Packed, slots: int) -> None:

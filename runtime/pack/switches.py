@@ -7,7 +7,7 @@ event; a window that the motion passes in a moment is then met, however narrow i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from itertools import islice
 
@@ -47,10 +47,11 @@ class Watched:
     switches: tuple[Switch, ...]
 
 
-def watched(scene: Scene, layout: Layout) -> Watched:
-    """Events in the order of the file, then releases, then switches."""
+def watched(scene: Scene, layout: Layout, held: Collection[str] = ()) -> Watched:
+    """Events in the order of the file, then releases, then switches; `held` are inputs that are set
+    during the run."""
     graph, probes = Graph(), Probes()
-    found = switches(scene, layout, graph, probes)
+    found = switches(scene, layout, graph, probes, held)
     conditions: list[tuple[Expression, Hinge | None]] = [(e.when, None) for e in scene.event]
     conditions += [(h.release, h) for h in scene.hinge if h.release is not None]
     if not conditions and not found:
@@ -65,11 +66,13 @@ def has_switches(scene: Scene) -> bool:
     return any(_terms(one) for one in acting(scene))
 
 
-def switches(scene: Scene, layout: Layout, graph: Graph, probes: Probes) -> list[Switch]:
+def switches(
+    scene: Scene, layout: Layout, graph: Graph, probes: Probes, held: Collection[str]
+) -> list[Switch]:
     """All margins that depend on the state, each once and no more than MOST + 1; positions of ends
     are asked for through `probes`."""
     found: dict[int, Switch] = {}
-    for one in acting(scene):
+    for one in acting(scene, held):
         chosen = _terms(one)
         for own in islice(owners(one, scene.hinges), MOST + 1) if chosen else ():
             resolve = resolver(graph, layout, own, probes=probes)
@@ -87,9 +90,13 @@ def switches(scene: Scene, layout: Layout, graph: Graph, probes: Probes) -> list
 
 
 def _terms(one: Acting) -> list[int]:
-    """Terms that switch with the state; what an event itself waits for is not among them."""
-    expression: Expression = one.expression
-    alone = set(of_time(expression, dict(one.constants))[0])
+    """Terms that switch with the state; what an event itself waits for is not among them, nor what
+    goes by inputs alone that stand still within a step."""
+    expression, constants = one.expression, dict(one.constants)
+    alone = set(of_time(expression, constants)[0])
+    if one.held:
+        order, moving = of_time(expression, constants | dict.fromkeys(one.held, 0.0))
+        alone |= set(order) - set(moving)
     return [
         number
         for number in sorted(expression.needed - alone)

@@ -208,15 +208,24 @@ class ForceNumbers:
     effort: KernelIR | None
 
 
+@dataclass(frozen=True, slots=True)
+class Held:
+    """Inputs that stand in memory, where they are set as a run goes on: `places` of all inputs
+    there, -1 for those that go by time, and what the last numbers of memory are at the start."""
+
+    places: tuple[int, ...]
+    start: Numbers = ()
+
+
 @dataclass(frozen=True)
 class System:
     """A scene in internal frames.
 
     `values` gives efforts and load components of (t, q, u); `drives` value, rate and acceleration
     of each of `driven` (place of the body, coordinate).  `inputs` are inputs and signals over time,
-    whose numbers expressions read; `by_time` says whether an effort or load names the time, or an
-    input that does not stand still.  `moving` are the numbers in expressions that carry
-    derivatives, by their places in the port "moving".
+    whose numbers expressions read, of which some may be `held`; `by_time` says whether an
+    effort or load names the time, or an input that does not stand still.  `moving` are the numbers
+    in expressions that carry derivatives, by their places in the port "moving".
     """
 
     nq: int
@@ -231,6 +240,7 @@ class System:
     drives: KernelIR | None
     driven: tuple[tuple[int, int], ...]
     inputs: tuple[Pieces, ...]
+    held: Held
     by_time: bool
     moving: Mapping[int, Any]
 

@@ -161,7 +161,7 @@ def _lanes(model: Compiled) -> FusedLibrary | None:
     packed = model.packed
     if has_switches(packed.scene):
         return None
-    if LiveInputs(packed.system.inputs, model.fusion.inputs).varies:
+    if LiveInputs(packed.system, model.fusion.inputs).varies:
         return None
     if packed.system.n_memory or packed.scene.event or packed.system.driven:
         return None

@@ -52,6 +52,12 @@ def at_once(model: Compiled, settings: Settings, recorded: str | None) -> SceneC
     return None if library is None else _compiled(model, settings, library, math.inf)
 
 
+def for_many(model: Compiled, settings: Settings) -> SceneCode | None:
+    """Code for steps without a known end, compiled where it is worth it for any number of them."""
+    library = model.fusion.ready(math.inf)
+    return None if library is None else _compiled(model, settings, library, math.inf)
+
+
 def look_after(model: Compiled, settings: Settings) -> int:
     """Steps of a looped run after which `worth_compiling` is to be asked; 0 for never."""
     if model.fusion.obstacle:

@@ -34,8 +34,10 @@ _QUATERNIONS = 2**18
 _WORK_TOLERANCE = 10.0
 
 
-def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike) -> Run:
-    """The integrator at the start of the run."""
+def make_run(
+    system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike, capacity: int | None = None
+) -> Run:
+    """The integrator at the start of the run, with room for so many samples at a time."""
     tableau = get(settings.first_method, settings.radius)
     if tableau.implicit:
         system.offer_tangent()
@@ -45,7 +47,7 @@ def make_run(system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike
     return Run(
         system.engine.ffi, system.engine.lib, system.system, tableau, settings, start,
         atol=tolerances(system, settings, start), breaks=known.breaks,
-        bounds=(known.starts, known.longest),
+        bounds=(known.starts, known.longest), capacity=capacity,
     )  # fmt: skip
 
 
@@ -189,6 +191,8 @@ def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Arr
     """
     engine, y, residual = system.engine, y.copy(), 0.0
     quaternions = engine.packed.layout.quaternions
+    if not len(quaternions) and not engine.packed.system.driven:
+        return y, residual
     entries = quaternions[:, None] + np.arange(4) if len(quaternions) else quaternions
     rows = max(1, _QUATERNIONS // max(1, len(entries)))
     for first in range(0, len(y) if len(entries) else 0, rows):

@@ -106,7 +106,7 @@ class SceneSystem:
         engine, lib = self.engine, self.engine.lib
         lanes = engine.ffi.NULL if code.lanes is None else code.lanes.descriptor
         numbers = np.array(code.numbers)  # where inputs are written as time goes on
-        live = LiveInputs(engine.packed.system.inputs, code.inputs)
+        live = LiveInputs(engine.packed.system, code.inputs)
         if live.varies:
             self.run.live.n, self.run.live.inputs = len(live.places), engine.packed.model.inputs
             self.run.live.places = engine.ffi.from_buffer("int[]", live.places)

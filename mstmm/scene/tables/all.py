@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import Field
 
@@ -69,6 +70,19 @@ class SceneTables(Table):
             for one in self.input
         }  # fmt: skip
         return inputs | signals
+
+    def with_inputs(self, values: Mapping[str, float | str]) -> Self:
+        """The same with inputs at other numbers, or following other signals of the scene.  Nothing
+        is validated: the values are what an input may have, and none of them drives anything."""
+        inputs = tuple(
+            one.model_copy(update={"value": values[one.name], "rates": None})
+            if one.name in values else one
+            for one in self.input
+        )  # fmt: skip
+        found = self.model_copy(update={"input": inputs})
+        for known in ("channels", "_skeleton"):
+            found.__dict__.pop(known, None)
+        return found
 
     @property
     def skeleton(self) -> SceneTables:

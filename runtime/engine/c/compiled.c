@@ -55,7 +55,7 @@ static int accelerations(void *context, double t, const double *y, double *dy)
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused;
-    mstmm_renew_inputs(&run->live, t, run->fused_p);
+    mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
     const int code = fused->accelerations(run->fused_p, &t, y, y + fused->nq, run->memory,
                                           run->fused_numbers, dy, dy + fused->nq);
     return code ? failed(run, fused, code) : 0;
@@ -66,7 +66,7 @@ static int accelerations_and_power(void *context, double t, const double *y, dou
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused;
     real power = 0, potential;
-    mstmm_renew_inputs(&run->live, t, run->fused_p);
+    mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
     const int code = fused->accelerations_power(run->fused_p, &t, y, y + fused->nq, run->memory,
                                                 run->fused_numbers, dy, dy + fused->nq, &power,
                                                 &potential);

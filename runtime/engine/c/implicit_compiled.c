@@ -9,7 +9,7 @@
 /* The numbers that the code reads, with those of inputs at t. */
 static const real *parameters(const mstmm_scene_run *run, real t)
 {
-    mstmm_renew_inputs(&run->live, t, run->implicit_code.p);
+    mstmm_renew_inputs(&run->live, t, run->memory, run->implicit_code.p);
     return run->implicit_code.p;
 }
 

@@ -288,7 +288,8 @@ static inline real *mstmm_spare_udot(const mstmm_state *state)
 static inline const real *mstmm_input_numbers(const mstmm_state *state)
 {
     real *numbers = mstmm_spare_udot(state) + state->model->nu;
-    mstmm_inputs_at(state->model->n_inputs, state->model->inputs, state->t, numbers);
+    mstmm_inputs_at(state->model->n_inputs, state->model->inputs, state->t, state->memory,
+                    numbers);
     return numbers;
 }
 

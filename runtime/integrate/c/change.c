@@ -1,5 +1,6 @@
-/* The sign that another kind of method would suit a run better, and the change to it between
- * steps. */
+/* The sign that another kind of method would suit a run better, the change to it between steps, and
+ * a run that goes on behind its end. */
+#include <math.h>
 #include <string.h>
 
 #include "step.h"
@@ -76,4 +77,34 @@ int mstmm_run_change(mstmm_run *run, const mstmm_tableau *tableau, double *works
   forget_method(&changed);
   *run = changed;
   return 0;
+}
+
+int mstmm_run_go_on(mstmm_run *run, double t_end, int changed) {
+  mstmm_run_count *count = &run->count;
+  const int ended = count->phase == PHASE_END;
+  if (!(t_end >= run->real.t) || isinf(t_end) || count->status == MSTMM_BAD_ARGUMENT ||
+      count->status == MSTMM_STOPPED || (!ended && count->phase > PHASE_STEP))
+    return MSTMM_BAD_ARGUMENT;
+  const int failed = count->status < 0;
+  run->t_end = t_end;
+  if (changed || failed) count->first_stage_valid = 0;
+  if (failed) run->real.h_next = 0.0;
+  if (count->phase != PHASE_START && (ended || changed))
+    count->phase = changed ? PHASE_HERE : PHASE_SAMPLE;
+  count->no_step = 0;
+  count->status = MSTMM_RUNNING;
+  return 0;
+}
+
+void mstmm_run_map(mstmm_run *run, int64_t n_breaks, const double *breaks, int64_t n_bounds,
+                   const double *bound_starts, const double *bounds) {
+  const int64_t at_break = run->count.at_break; /* of a break that the new ones may begin behind */
+  run->n_breaks = n_breaks;
+  run->breaks = breaks;
+  run->n_bounds = n_bounds;
+  run->bound_starts = bound_starts;
+  run->bounds = bounds;
+  run->count.break_index = run->count.bound_index = 0;
+  mstmm_pass_breaks(run);
+  run->count.at_break = at_break;
 }

@@ -229,6 +229,14 @@ int mstmm_advance(mstmm_run *run, double wall_seconds);
  * unchanged: within a step, with fixed steps, for a method that the system does not allow.  A run
  * that failed goes on if it was for want of a step (count.no_step). */
 int mstmm_run_change(mstmm_run *run, const mstmm_tableau *tableau, double *workspace);
+/* To another end, not before the current good state: what has finished there goes on as if that end
+ * had been meant from the start, and what has failed tries again from its last good state.
+ * `changed` says that the caller has changed memory, as an event may.  Returns 0, or
+ * MSTMM_BAD_ARGUMENT with the run unchanged: within a step, and for a run that an event stopped. */
+int mstmm_run_go_on(mstmm_run *run, double t_end, int changed);
+/* Times to look out for from now on, in the place of those that the run was started with. */
+void mstmm_run_map(mstmm_run *run, int64_t n_breaks, const double *breaks, int64_t n_bounds,
+                   const double *bound_starts, const double *bounds);
 /* The current good state, n_state doubles inside the workspace. */
 const double *mstmm_run_y(const mstmm_run *run);
 /* State of a run as plain numbers: sizes, writing, and reading back into a run whose problem part

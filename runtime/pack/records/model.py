@@ -68,11 +68,7 @@ def write(system: System, elements: Elements) -> Written:
         record.own = int(own)
     model.forces, model.n_forces = forces, len(system.forces)
     model.needs_pose = int(bool(system.forces or system.loads or system.dragged))
-    inputs = memory.new("mstmm_input[]", max(1, len(system.inputs)))
-    for record, one in zip(inputs, system.inputs, strict=False):
-        record.n_knots, record.knots = len(one.knots), memory.reals(one.knots)
-        record.numbers = memory.reals([x for piece in one.pieces for x in piece])
-    model.inputs, model.n_inputs = inputs, len(system.inputs)
+    write_inputs(model, system, memory)
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
     scratch = attach_runs(model, system, memory, lib, bodies.end)
     modal = bodies.modal
@@ -86,6 +82,16 @@ def write(system: System, elements: Elements) -> Written:
         memory.slots,
         reach,
     )
+
+
+def write_inputs(model: Any, system: System, memory: Memory) -> None:
+    """Records of inputs and signals: over time, or where they are held."""
+    inputs = memory.new("mstmm_input[]", max(1, len(system.inputs)))
+    for record, one, held in zip(inputs, system.inputs, system.held.places, strict=False):
+        record.n_knots, record.knots = len(one.knots), memory.reals(one.knots)
+        record.numbers = memory.reals([x for piece in one.pieces for x in piece])
+        record.held = held
+    model.inputs, model.n_inputs = inputs, len(system.inputs)
 
 
 def _load(record: Any, load: LoadNumbers) -> None:
