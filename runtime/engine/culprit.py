@@ -132,7 +132,7 @@ class _State:
         """t, inputs, q and u of hinges, the own ones, parameters of the own hinge."""
         if name.text == "t":
             return self.t
-        inputs = self.engine.packed.described.channels
+        inputs = self.engine.packed.channels
         if name.text in inputs:
             return inputs[name.text].value(self.t)
         if name.quantity not in ("q", "u") and own is not None:

@@ -21,9 +21,9 @@ def with_values(packed: Packed, values: Mapping[str, float | str]) -> Packed:
     described = expanded.described.with_inputs(values)
     alone = expanded.scene is expanded.described
     nodes = described if alone else expanded.scene.with_inputs(values)
-    system = replace(
-        packed.system, inputs=tuple(described.channels.values()), by_time=by_time(nodes)
-    )
+    channels = described.channels
+    by = by_time(nodes, channels)
+    system = replace(packed.system, inputs=tuple(channels.values()), by_time=by)
     found = _rewritten(packed, system)
     found.scene, found.expanded = nodes, replace(expanded, scene=nodes, described=described)
     return found
@@ -43,16 +43,21 @@ def with_held(packed: Packed, names: Sequence[str], t: float) -> Packed:
     return found
 
 
-def with_pieces(packed: Packed, inputs: Sequence[Pieces]) -> Packed:
-    """The same with all inputs and signals as these."""
-    return _rewritten(packed, replace(packed.system, inputs=tuple(inputs)))
+def with_pieces(packed: Packed, named: Mapping[str, Pieces]) -> Packed:
+    """The same with some inputs as these over time; none of them drives anything.  The scene does
+    not know of it."""
+    channels = packed.channels | dict(named)
+    system = replace(
+        packed.system, inputs=tuple(channels.values()), by_time=by_time(packed.scene, channels)
+    )
+    return _rewritten(packed, system)
 
 
 def _rewritten(packed: Packed, system: System) -> Packed:
     slopes, memory = packed.slopes(), Memory(packed.ffi)  # made once, for the records are shared
     model = memory.new("mstmm_model *", packed.model[0])
     model.n_memory = system.n_memory
-    write_inputs(model, system, memory)
+    model.inputs = write_inputs(system.inputs, system.held.places, memory)
     written = replace(packed.written, model=model, kept=[packed.written, *memory.kept])
     return replace(
         packed, system=system, model=model, written=written, _time_maps={}, _slopes=slopes

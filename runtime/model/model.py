@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from ..linear.response import FrequencyResponse
     from ..linear.waterfall import Waterfall
     from ..result.result import Result
-    from ..run.batch import BatchResult
+    from ..run.batch.batch import BatchResult
+    from ..run.batch.inputs import BatchInput
     from .derivatives import Derivatives, Differentiation
     from .equilibrium import Equilibrium
     from .linearize import Linearising
@@ -486,6 +487,7 @@ class Model(Compiled):
         parameters: Mapping[str, ArrayLike] | None = None,
         *,
         t_end: float,
+        inputs: Mapping[str, BatchInput] | None = None,
         output_times: ArrayLike | Sequence[float] | None = None,
         method: str = METHOD,
         step: float | None = None,
@@ -503,6 +505,8 @@ class Model(Compiled):
         Args:
             initial_states: q (n, nq) and u (n, nu); one of them may be a single row for all.
             parameters: numbers by name (as in `with_parameters`), (n,) or one for all.
+            inputs: what inputs of the scene are, by their names: as in `simulate`, and numbers (n,)
+                for each, or (times, values) and the keys of a [[signal]] with values (n, m).
             output_times: times of the samples (s, increasing); otherwise `t_end` alone.
             threads: as many as the machine has processors if not given.
             method, step, rtol, atol, t_start, max_step, max_steps, radius, tangent: as in
@@ -516,7 +520,7 @@ class Model(Compiled):
 
         Raises SceneError for settings, shapes or parameters that make no sense.
         """
-        from ..run.batch import prepared, simulate_batch
+        from ..run.batch.batch import prepared, simulate_batch
 
         settings = Settings(
             t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step, max_steps,
@@ -524,7 +528,7 @@ class Model(Compiled):
         )  # fmt: skip
         settings, q, u = prepared(self, settings, initial_states)
         return simulate_batch(
-            self, settings, q, u, {} if parameters is None else parameters, threads
+            self, settings, q, u, {} if parameters is None else parameters, inputs, threads
         )
 
 

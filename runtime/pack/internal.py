@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from mstmm.expression.expression import Expression
+from mstmm.expression.inputs import Inputs
 from mstmm.ir import Port
 from mstmm.scene import Scene, split
 from mstmm.scene.checks.topology import Topology, build
@@ -81,14 +82,13 @@ def system_of(
         values.kernel() if len(values) else None,
         drive_kernel([drive for _, _, drive in driven], layout, ports) if driven else None,
         tuple((place, k) for place, k, _ in driven), tuple(scene.channels.values()),
-        Held((-1,) * len(scene.channels)), by_time(nodes), moving or {},
+        Held((-1,) * len(scene.channels)), by_time(nodes, nodes.channels), moving or {},
     )  # fmt: skip
     return system, frames
 
 
-def by_time(scene: Scene) -> bool:
+def by_time(scene: Scene, inputs: Inputs) -> bool:
     """Whether an effort or load names the time, or an input that does not stand still."""
-    inputs = scene.channels
     loads = (one for one in acting(scene) if not (one.drive or one.condition))
     names = {name.text for one in loads for name in one.expression.names}
     return "t" in names or any(not inputs[name].stands for name in names & inputs.keys())

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from mstmm.numbers.pieces import COUNT
+from mstmm.numbers.pieces import COUNT, Pieces
 
 from ..breaks.acting import acting
 from ..breaks.times import TimeMap, time_map
@@ -43,14 +43,19 @@ class Packed(Frames):
     _time_maps: dict[tuple[float, float], TimeMap] = field(default_factory=dict)
     _slopes: Slopes | None = None
 
+    @property
+    def channels(self) -> dict[str, Pieces]:
+        """Inputs and signals over time by their names, as this system has them."""
+        return dict(zip(self.layout.inputs, self.system.inputs, strict=True))
+
     def time_map(self, start: float, end: float) -> TimeMap:
         """Where the steps of a run from `start` to `end` (s) end, and how long they may be."""
         span = (start, end)
         if span not in self._time_maps:
             if len(self._time_maps) >= _MAPS:
                 self._time_maps.clear()
-            inputs = self.described.channels
-            found = time_map(acting(self.scene, self.held), start, end, inputs)
+            inputs = self.channels
+            found = time_map(acting(self.scene, self.held, inputs), start, end, inputs)
             self._time_maps[span] = found
         return self._time_maps[span]
 

@@ -106,11 +106,27 @@ static int settle_one(void *context, double t, double *y)
     return mstmm_scene_settle(lanes->settle, t, y);
 }
 
+/* The inputs of every lane's trajectory at its own time. */
+static void renew_lanes(const mstmm_scene_lanes *lanes, const double *t)
+{
+    const mstmm_live_inputs *live = &lanes->live;
+    const int width = lanes->fused->lanes;
+    for (int lane = 0; lane < width; lane++)
+        for (int i = 0; i < live->n; i++) {
+            const mstmm_input *input = &live->inputs[lanes->trajectory[lane] * live->n + i];
+            const int *places = live->places + MSTMM_INPUT_NUMBERS * i;
+            const real *numbers = mstmm_input_at(input, t[lane]);
+            for (int k = 0; k < MSTMM_INPUT_NUMBERS; k++)
+                if (places[k] >= 0) lanes->numbers[places[k] * width + lane] = numbers[k];
+        }
+}
+
 static int lanes_rhs(void *context, const double *t, const double *y, double *dy, int *codes)
 {
     const mstmm_scene_lanes *lanes = context;
     const mstmm_fused *fused = lanes->fused;
     const int64_t width = fused->lanes, start = fused->nq * width;
+    if (lanes->live.n) renew_lanes(lanes, t);
     const real *efforts = lanes->numbers + width * fused->np;
     return fused->accelerations_lanes(lanes->numbers, t, y, y + start, efforts, efforts, dy,
                                       dy + start, codes);
@@ -118,8 +134,9 @@ static int lanes_rhs(void *context, const double *t, const double *y, double *dy
 
 static void lanes_enter(void *context, int lane, int64_t trajectory)
 {
-    const mstmm_scene_lanes *lanes = context;
+    mstmm_scene_lanes *lanes = context;
     const real *p = lanes->p + trajectory * lanes->p_stride;
+    lanes->trajectory[lane] = trajectory;
     for (int64_t i = 0; i < lanes->fused->np; i++)
         lanes->numbers[i * lanes->fused->lanes + lane] = p[i];
 }

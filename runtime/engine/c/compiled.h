@@ -30,6 +30,8 @@ typedef struct {
     int64_t p_stride;        /* distance of rows, 0 for one row */
     real *numbers;           /* mstmm_lanes_numbers */
     mstmm_scene_run *settle; /* of this thread: what it settles after every step */
+    mstmm_live_inputs live;  /* of each trajectory so many inputs change with time, in a row */
+    int64_t trajectory[8];   /* in each lane */
 } mstmm_scene_lanes;
 
 int64_t mstmm_lanes_numbers(const mstmm_fused *fused);

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from mstmm.arrays import Integers
+from mstmm.numbers.pieces import Pieces
 
 from ...kernels import prebuilt
 from ..elements import Elements
@@ -68,7 +70,8 @@ def write(system: System, elements: Elements) -> Written:
         record.own = int(own)
     model.forces, model.n_forces = forces, len(system.forces)
     model.needs_pose = int(bool(system.forces or system.loads or system.dragged))
-    write_inputs(model, system, memory)
+    model.inputs = write_inputs(system.inputs, system.held.places, memory)
+    model.n_inputs = len(system.inputs)
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
     scratch = attach_runs(model, system, memory, lib, bodies.end)
     modal = bodies.modal
@@ -84,14 +87,14 @@ def write(system: System, elements: Elements) -> Written:
     )
 
 
-def write_inputs(model: Any, system: System, memory: Memory) -> None:
-    """Records of inputs and signals: over time, or where they are held."""
-    inputs = memory.new("mstmm_input[]", max(1, len(system.inputs)))
-    for record, one, held in zip(inputs, system.inputs, system.held.places, strict=False):
+def write_inputs(inputs: Sequence[Pieces], held: Sequence[int], memory: Memory) -> Any:
+    """`mstmm_input[]` of inputs and signals: over time, or where they are held."""
+    records = memory.new("mstmm_input[]", max(1, len(inputs)))
+    for record, one, place in zip(records, inputs, held, strict=False):
         record.n_knots, record.knots = len(one.knots), memory.reals(one.knots)
         record.numbers = memory.reals([x for piece in one.pieces for x in piece])
-        record.held = held
-    model.inputs, model.n_inputs = inputs, len(system.inputs)
+        record.held = place
+    return records
 
 
 def _load(record: Any, load: LoadNumbers) -> None:

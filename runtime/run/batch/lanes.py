@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,16 +11,47 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
+from mstmm.numbers.pieces import Pieces
 
-from ..engine.engine import Engine
-from ..integrate.loop import Status
-from ..integrate.settings import Settings
-from ..integrate.steppers import get
-from ..integrate.tableau_in_c import c_tableau
-from ..kernels.fused import FusedLibrary
-from .simulate import SLICE
-from .system import SceneSystem
+from ...engine.engine import Engine
+from ...engine.live import LiveInputs, Places
+from ...integrate.loop import Status
+from ...integrate.settings import Settings
+from ...integrate.steppers import get
+from ...integrate.tableau_in_c import c_tableau
+from ...kernels.fused import FusedLibrary
+from ...pack.records.memory import Memory
+from ...pack.records.model import write_inputs
+from ..simulate import SLICE
+from ..system import SceneSystem
 from .threads import on_threads
+
+
+class LaneInputs:
+    """Inputs of every trajectory as compiled code reads them: what stands still in its row of
+    `numbers` (n, np), which is filled in, the others as records."""
+
+    def __init__(
+        self, engine: Engine, read: Places, channels: Sequence[Sequence[Pieces]], numbers: Array
+    ) -> None:
+        places = LiveInputs(engine.packed.system, read).places
+        self.memory = Memory(engine.ffi)
+        self.moving = [
+            k for k, row in enumerate(places)
+            if (row >= 0).any() and any(channel[k].varies for channel in channels)
+        ]  # fmt: skip
+        for k, row in enumerate(places):
+            there = row >= 0
+            if there.any() and k not in self.moving:
+                numbers[:, row[there]] = [np.array(one[k].at(0.0))[there] for one in channels]
+        self.places = np.ascontiguousarray(places[self.moving])
+        several = [channel[k] for channel in channels for k in self.moving]
+        self.records = write_inputs(several, [-1] * len(several), self.memory)
+
+    def fill(self, view: Any, ffi: Any) -> None:
+        """Tell the lanes of a thread."""
+        view.live.n, view.live.inputs = len(self.moving), self.records
+        view.live.places = ffi.from_buffer("int[]", self.places)
 
 
 @dataclass
@@ -32,6 +64,7 @@ class Lanes:
     systems: list[SceneSystem]
     numbers: Array  # (n, np)
     width: int
+    inputs: LaneInputs
 
 
 def run_lanes(lanes: Lanes, start: Array) -> tuple[Array, Any]:
@@ -91,5 +124,6 @@ def _group(lanes: Lanes, many: Any, settling: SceneSystem, numbers: Any, kept: l
     group.many = many
     workspace = np.zeros(max(1, lib.mstmm_group_size(system, many.problem.tableau)))
     group.workspace = lanes.engine.pointer(workspace)
-    kept += [system, view, scratch, workspace]
+    lanes.inputs.fill(view, ffi)
+    kept += [system, view, scratch, workspace, lanes.inputs]
     return group

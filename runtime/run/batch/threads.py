@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from typing import TypeVar
 
-from ..host.interruptible import interruptible
-from .simulate import SLICE
+from ...host.interruptible import interruptible
+from ..simulate import SLICE
 
 T = TypeVar("T")
 

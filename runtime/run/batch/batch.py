@@ -1,6 +1,6 @@
 """Many independent runs of a model: side by side in the lanes of vectors, and on several threads.
 
-Where the scene has compiled code and neither events, releases, memory, drives nor signals, every
+Where the scene has compiled code and neither events, releases, memory nor drives, every
 thread advances as many trajectories at a time as a vector has lanes, each with its own error
 control.  Other scenes run one trajectory after the other on every thread.  Which way is taken
 depends on the scene and the machine alone, so that the numbers of a trajectory depend neither on
@@ -22,22 +22,22 @@ from numpy.typing import ArrayLike, NDArray
 from mstmm.arrays import Array, batch, by_name, numbers, pair, threads_of
 from mstmm.errors import MstmmError, SceneError
 
-from ..breaks.acting import acting
-from ..engine.live import LiveInputs
-from ..integrate.loop import Failure, Run, Status, failure_text
-from ..integrate.settings import Settings, checked
-from ..integrate.steppers import AUTO, check_size, check_steps, get
-from ..pack.switches import has_switches
-from . import classical, second_opinion
-from .lanes import Lanes, run_lanes
-from .simulate import advance, choice_of, make_run, said, settled, trajectory
-from .stretches import Stretch
-from .system import SceneCode, SceneSystem
+from ...breaks.acting import acting
+from ...integrate.loop import Failure, Run, Status, failure_text
+from ...integrate.settings import Settings, checked
+from ...integrate.steppers import AUTO, check_size, check_steps, get
+from ...pack.switches import has_switches
+from .. import classical, second_opinion
+from ..simulate import advance, choice_of, make_run, said, settled, trajectory
+from ..stretches import Stretch
+from ..system import SceneCode, SceneSystem
+from .inputs import BatchInput, BatchInputs, batch_inputs
+from .lanes import LaneInputs, Lanes, run_lanes
 from .threads import on_threads
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
-    from ..kernels.fused import FusedLibrary
+    from ...engine.compiled import Compiled
+    from ...kernels.fused import FusedLibrary
 
 
 @dataclass(frozen=True)
@@ -86,13 +86,15 @@ def simulate_batch(
     q: Array,
     u: Array,
     parameters: Mapping[str, ArrayLike],
+    inputs: Mapping[str, BatchInput] | None,
     threads: int | None,
 ) -> BatchResult:
     """See `Model.simulate_batch`; settings hold the output times."""
     n, times = len(q), np.asarray(settings.output_times)
     alone_only = settings.method == AUTO or get(settings.method).implicit
+    models, given = _models(model, parameters, n), batch_inputs(model, inputs, n)
+    alone_only = alone_only or (n > 0 and given.moves_breaks(model))
     library = None if alone_only else _lanes(model)
-    models = _models(model, parameters, n)
     count = min(threads_of(threads) or os.cpu_count() or 1, max(1, n))
     rows = _Rows(
         np.full((n, len(times), model.nq + model.nu), np.nan),
@@ -102,10 +104,11 @@ def simulate_batch(
     ours = np.array([library is not None and alike[id(m)] and m.fusion.lanes is library
                      for m in models], bool)  # fmt: skip
     if library is not None and ours.any():
-        _side_by_side(model, library, models, settings, q, u, np.flatnonzero(ours), rows, count)
+        which = np.flatnonzero(ours)
+        _side_by_side(model, library, models, given, settings, q, u, which, rows, count)
     alone = np.flatnonzero(~ours)
     if len(alone):
-        _one_by_one(models, settings, q, u, alone, rows, count)
+        _one_by_one(models, given, settings, q, u, alone, rows, count)
     how = "one after the other" if library is None else f"{library.lanes} side by side"
     nq = model.nq
     return BatchResult(
@@ -161,23 +164,23 @@ def _lanes(model: Compiled) -> FusedLibrary | None:
     packed = model.packed
     if has_switches(packed.scene):
         return None
-    if LiveInputs(packed.system, model.fusion.inputs).varies:
-        return None
     if packed.system.n_memory or packed.scene.event or packed.system.driven:
         return None
     return model.fusion.ready_lanes(math.inf)
 
 
 def _side_by_side(
-    model: Compiled, library: FusedLibrary, models: list[Compiled], settings: Settings,
-    q: Array, u: Array, which: NDArray[np.int64], rows: _Rows, threads: int,
+    model: Compiled, library: FusedLibrary, models: list[Compiled], given: BatchInputs,
+    settings: Settings, q: Array, u: Array, which: NDArray[np.int64], rows: _Rows, threads: int,
 ) -> None:  # fmt: skip
-    engine = model.looped
+    engine = given.timed(model).looped
     systems = [SceneSystem(engine, with_power=False) for _ in range(threads)]
     start = np.ascontiguousarray(np.concatenate([q[which], u[which]], axis=1))
     start, _ = settled(systems[0], np.zeros(len(start)), start, np.zeros((len(start), 1)))
     numbers = np.ascontiguousarray([models[i].fusion.numbers for i in which])
-    lanes = Lanes(engine, library, settings, systems, numbers, model.nq + model.nu)
+    channels = [list((models[i].packed.channels | given.rows[i]).values()) for i in which]
+    live = LaneInputs(engine, model.fusion.inputs, channels, numbers)
+    lanes = Lanes(engine, library, settings, systems, numbers, model.nq + model.nu, live)
     samples, outcomes = run_lanes(lanes, start)
     for place, (i, outcome) in enumerate(zip(which, outcomes, strict=True)):
         rows.samples[i] = samples[place]
@@ -208,7 +211,7 @@ def _lanes_message(
 
 
 def _one_by_one(
-    models: list[Compiled], settings: Settings, q: Array, u: Array,
+    models: list[Compiled], given: BatchInputs, settings: Settings, q: Array, u: Array,
     which: NDArray[np.int64], rows: _Rows, threads: int,
 ) -> None:  # fmt: skip
     compiled = {id(m): _scalar(m, settings) for m in models}
@@ -220,7 +223,10 @@ def _one_by_one(
 
     def run(i: int) -> None:
         try:
-            _alone(models[i], compiled[id(models[i])], settings, q[i], u[i], i, rows, look)
+            model, code = given.model(models[i], i), compiled[id(models[i])]
+            if code is not None:
+                code = replace(code, numbers=model.fusion.numbers)
+            _alone(model, code, settings, q[i], u[i], i, rows, look)
         except _Stopped:
             return
         except MstmmError as error:  # this trajectory's own affair
