@@ -26,3 +26,5 @@ class Failed(IntEnum):
     """The modal mass matrix of a flexible body is not positive definite."""
     TANGENT = 9
     """The tangent of a step leaves a motion undetermined."""
+    CONTROLLER = 10
+    """A controller measures, or gives, what is not finite."""

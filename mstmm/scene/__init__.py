@@ -15,9 +15,9 @@ from .tables.elastic_keys import Arrays, Box, ElasticEnd
 from .tables.flexible import Damping, Start
 from .tables.hinge import Hinge
 from .tables.hinge_keys import Initial
-from .tables.inputs import Input, Output, Signal
 from .tables.law import Friction, Law, LawEntry, Limits, SpringLaw
 from .tables.loads import Event, Load, Spring
+from .tables.outside.inputs import Input, Output, Signal
 
 __all__ = [
     "Arrays", "Beam", "Body", "Box", "Chain", "Damping", "Elastic", "ElasticEnd", "End", "Event",

@@ -35,9 +35,11 @@ class Acting:
 
 
 def acting(scene: Scene, held: Collection[str] = (), inputs: Inputs | None = None) -> list[Acting]:
-    """All that are not constant, in the order of the file; `held` are inputs set during the run,
-    `inputs` what all are over time where that is not what the scene says."""
+    """All that are not constant, in the order of the file; `held` are inputs set during the run
+    besides those that controllers set, `inputs` what all are over time where that is not what the
+    scene says."""
     inputs = scene.channels if inputs is None else inputs
+    held = {*held, *scene.controlled}
     return [_with(one, inputs, held) for one in _all(scene) if not one.expression.is_constant]
 
 

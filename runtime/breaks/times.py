@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,6 +28,8 @@ from .view import View
 
 #: Part of the run within which two times are one at its ends.
 _ROUNDING = 1e-15
+#: Samples of a controller that a run takes at most.
+_MOST_SAMPLES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -63,10 +65,14 @@ class TimeMap:
 
 
 def time_map(
-    expressions: Iterable[Acting], start: float, end: float, inputs: Inputs | None = None
+    expressions: Iterable[Acting],
+    start: float,
+    end: float,
+    inputs: Inputs | None = None,
+    samples: Iterable[float] = (),
 ) -> TimeMap:
     """The map of all expressions for a run from `start` to `end` (s); `inputs` are what they may
-    name, whose knots are breaks.
+    name, whose knots are breaks, `samples` times (s) whose multiples are.
 
     Raises SceneError for a drive that jumps on the way.
     """
@@ -74,7 +80,24 @@ def time_map(
         return TimeMap(np.zeros(0), np.zeros(0), np.zeros(0))
     once = {(e.expression, e.constants, e.drive): e for e in reversed(list(expressions))}
     with np.errstate(all="ignore"):
-        return _mapped(list(reversed(once.values())), start, end, inputs or {})
+        found = _mapped(list(reversed(once.values())), start, end, inputs or {})
+    sampled = [_multiples(step, start, end) for step in samples]
+    if not sampled:
+        return found
+    breaks = _inside({*found.breaks.tolist(), *np.concatenate(sampled).tolist()}, start, end)
+    return replace(found, breaks=breaks)
+
+
+def _multiples(step: float, start: float, end: float) -> Array:
+    """All whole multiples of a step (s) from `start` to `end`."""
+    count = (end - start) / step
+    if count > _MOST_SAMPLES:
+        raise SceneError(
+            f"a controller with sample_time = {step:g} s acts {count:.0f} times from t = {start:g} "
+            f"to {end:g} s; a run takes {_MOST_SAMPLES} samples at most: make it in parts"
+        )
+    first, last = math.floor(start / step), math.ceil(end / step)
+    return np.asarray(np.arange(first, last + 1) * step)
 
 
 def _mapped(expressions: list[Acting], start: float, end: float, inputs: Inputs) -> TimeMap:

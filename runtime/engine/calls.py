@@ -80,9 +80,7 @@ class Calls:
         """Memory at the start: nothing released, no turns counted, inputs held where they begin."""
         system = self.packed.system
         memory = np.zeros(max(1, system.n_memory))
-        memory[system.n_memory - len(system.held.start) :][: len(system.held.start)] = (
-            system.held.start
-        )
+        memory[system.held.first : system.n_memory] = system.held.start
         return memory
 
     @cached_property
@@ -240,6 +238,12 @@ class Calls:
                 f"the product of transfer matrices {at}: its deviation from the Riccati sweep "
                 "exceeds the accuracy asked for (errors grow geometrically along the chain); "
                 'use sweep = "riccati"'
+            )
+        if reason == Failed.CONTROLLER:
+            name = self.packed.described.controller[element].name
+            return (
+                f'controller "{name}" {at}: what it measures or gives is not finite; see whether '
+                "the closed loop is stable, with a shorter sample_time perhaps"
             )
         return f"an expression of the scene cannot be evaluated {at}"
 

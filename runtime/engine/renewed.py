@@ -36,7 +36,7 @@ def with_held(packed: Packed, names: Sequence[str], t: float) -> Packed:
     start = [packed.described.channels[name].value(t) for name in names]
     for k, name in enumerate(names):
         places[packed.layout.inputs[name]] = system.n_memory + k
-    held = Held(tuple(places), (*system.held.start, *start))
+    held = Held(system.held.first, tuple(places), (*system.held.start, *start))
     longer = replace(system, held=held, n_memory=system.n_memory + len(names))
     found = _rewritten(packed, longer)
     found.held = packed.held | set(names)

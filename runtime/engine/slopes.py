@@ -108,7 +108,7 @@ class Slopes:
 
     def _made(self) -> Call:
         assert self._library is not None
-        live = LiveInputs(self._engine.packed.system.inputs, self._fusion.inputs)
+        live = LiveInputs(self._engine.packed.system, self._fusion.inputs)
         return Call(self._engine, self._library, self._fusion.numbers, live, self._n)
 
 

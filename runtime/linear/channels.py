@@ -25,12 +25,12 @@ from mstmm.scene.rules.messages import near
 
 from ..breaks.acting import acting
 from ..engine.engine import Engine
+from ..engine.references import References
+from ..engine.shown import effort_names
 from ..engine.tangent import Tangent
 from ..pack.pack import packed_system
 from ..pack.system import LoadNumbers
 from ..pack.values import constant_kernel
-from ..result.observed import References
-from ..result.quantities import effort_names
 from .matrices import State
 from .standing import INERTIAL
 
@@ -175,7 +175,9 @@ def _rate(engine: Engine, state: State, place: int, rate: float) -> Array:
         Pieces((), ((state.t, one.value(state.t), rate if k == place else 0.0, 0.0, 0.0),))
         for k, one in enumerate(system.inputs)
     ]
-    tangent = Tangent(Engine(packed_system(replace(system, inputs=tuple(inputs)), engine.packed)))
+    still = replace(system.held, places=(-1,) * len(inputs))
+    going = replace(system, inputs=tuple(inputs), held=still)
+    tangent = Tangent(Engine(packed_system(going, engine.packed)))
     tangent.residual(state.t, state.q, state.u, state.a)
     nothing = np.zeros(engine.nu)
     return tangent.slope(1.0, np.zeros(engine.nq), nothing, nothing)

@@ -42,6 +42,11 @@ def warnings_of(linear: Equations, found: Modes) -> Iterator[str]:
     for name, column in zip(linear.inputs, linear.V.T, strict=True):
         if len(linear) and not column.any():
             yield f"input {name} moves nothing at this state"
+    for one in linear.model.scene.controller:
+        yield (
+            f'controller "{one.name}" is left out: its inputs ({_some(list(one.outputs))}) stand '
+            "still at the values of the scene"
+        )
     if linear.model.packed.system.timed:
         yield f"what acts goes by time: the model is that of t = {linear.state.t:g} s"
     growing = found.eigenvalues.real.max(initial=0)

@@ -20,10 +20,10 @@ from mstmm.ir.tangent import jacobian
 from mstmm.scene.rules.messages import near
 
 from ..engine.calls import Probe
+from ..engine.references import References
+from ..engine.shown import BODY, COLUMNS, acceleration_name, rate_unit
 from ..kernels import vectorized
-from ..result.observed import References
 from ..result.outputs import kernel_of, one_quantity
-from ..result.quantities import BODY, COLUMNS, acceleration_name, rate_unit
 from .channels import Channel, columns, names_of
 
 if TYPE_CHECKING:

@@ -71,8 +71,9 @@ class Model(Compiled):
         refuse_undetermined_start(self, *self.initial_state())
 
     def refuse_unknown_outputs(self) -> None:
-        """SceneError for the first output of the scene of a quantity that results do not have."""
-        if self.scene.output:
+        """SceneError for the first output of the scene of a quantity that results do not have, and
+        for what controllers cannot measure."""
+        if self.scene.output or self.scene.controller:
             from ..result.outputs import quantity_of
 
             start = self.simulate(0.0, "dop853")

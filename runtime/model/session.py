@@ -253,13 +253,17 @@ def refuse_method(settings: Settings) -> None:
 
 
 def settable(model: Compiled) -> tuple[str, ...]:
-    """The inputs that may be set while a model moves: those that nothing is driven by."""
+    """The inputs that may be set while a model moves: those that nothing is driven by and that
+    no controller sets."""
     driving = {name for one in acting(model.scene) if one.drive for name in one.inputs}
-    return tuple(one.name for one in model.scene.input if one.name not in driving)
+    taken = {*driving, *model.scene.controlled}
+    return tuple(one.name for one in model.scene.input if one.name not in taken)
 
 
 def not_settable(model: Compiled, name: str, names: Sequence[str]) -> str:
     """Why an input cannot be set while a model moves."""
+    if name in model.scene.controlled:
+        return f'inputs["{name}"]: controller "{model.scene.controlled[name]}" sets this input'
     for one in acting(model.scene):
         if one.drive and name in one.inputs and any(i.name == name for i in model.scene.input):
             return (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -76,15 +77,28 @@ def system_of(
     driven, values = list(_driven(nodes, tree)), Values(layout, ports)
     laws = tuple(laws_of(nodes, tree, layout, values, len(releases)))
     loads = tuple(_load(frames, load, values) for load in nodes.load)
+    held = _held(scene, laws[-1].next_twist if laws else len(releases))
     system = System(
-        layout.nq, layout.nu, laws[-1].next_twist if laws else len(releases), nodes.gravity, runs,
+        layout.nq, layout.nu, held.first + len(held.start), nodes.gravity, runs,
         laws, loads, tuple(_force(frames, spring, ports) for spring in nodes.spring),
         values.kernel() if len(values) else None,
         drive_kernel([drive for _, _, drive in driven], layout, ports) if driven else None,
         tuple((place, k) for place, k, _ in driven), tuple(scene.channels.values()),
-        Held((-1,) * len(scene.channels)), by_time(nodes, nodes.channels), moving or {},
+        held, by_time(nodes, nodes.channels), moving or {},
     )  # fmt: skip
     return system, frames
+
+
+def _held(scene: Scene, first: int) -> Held:
+    """The inputs that controllers set, in memory from `first` on: of each controller the number of
+    its next sample, its state, and what it holds."""
+    places, start = dict.fromkeys(scene.channels, -1), list[float]()
+    for one in scene.controller:
+        start += [math.nan, *one.filled["initial"]]
+        for name in one.outputs:
+            places[name] = first + len(start)
+            start.append(scene.channels[name].value(0.0))
+    return Held(first, tuple(places.values()), tuple(start))
 
 
 def by_time(scene: Scene, inputs: Inputs) -> bool:

@@ -54,8 +54,8 @@ class Packed(Frames):
         if span not in self._time_maps:
             if len(self._time_maps) >= _MAPS:
                 self._time_maps.clear()
-            inputs = self.channels
-            found = time_map(acting(self.scene, self.held, inputs), start, end, inputs)
+            inputs, samples = self.channels, [one.sample_time for one in self.scene.controller]
+            found = time_map(acting(self.scene, self.held, inputs), start, end, inputs, samples)
             self._time_maps[span] = found
         return self._time_maps[span]
 
@@ -74,7 +74,7 @@ class Packed(Frames):
     @cached_property
     def goes_by_time(self) -> bool:
         """Whether steps of a run may have to end, or to be short, somewhere known before."""
-        return any(
+        return bool(self.scene.controller) or any(
             one.inputs or one.drive or "t" in {name.text for name in one.expression.names}
             for one in acting(self.scene, self.held)
         )

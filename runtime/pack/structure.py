@@ -50,9 +50,8 @@ def structure_and_numbers(
     used |= {force.element for force in forces}
     values, prescribed = sorting.expression(system.values), sorting.expression(system.drives)
     read = tuple(sorted(sorting.inputs.items()))
-    remembered = system.n_memory - len(system.held.start)
     structure = Structure(
-        system.nq, system.nu, len(sorting.numbers), remembered, gravity, bodies, laws, loads,
+        system.nq, system.nu, len(sorting.numbers), system.held.first, gravity, bodies, laws, loads,
         forces, values, prescribed, system.driven,
         {key: elements[key].hash for key in sorted(used)}, read,
     )  # fmt: skip

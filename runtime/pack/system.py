@@ -211,8 +211,9 @@ class ForceNumbers:
 @dataclass(frozen=True, slots=True)
 class Held:
     """Inputs that stand in memory, where they are set as a run goes on: `places` of all inputs
-    there, -1 for those that go by time, and what the last numbers of memory are at the start."""
+    there, -1 for those that go by time; memory begins from `first` on with `start`."""
 
+    first: int
     places: tuple[int, ...]
     start: Numbers = ()
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from mstmm.arrays import Array
 
-from .kinds import Kind
+from ..engine.shown import Kind
 
 Values = Callable[[], Array]
 

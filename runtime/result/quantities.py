@@ -17,9 +17,20 @@ from mstmm.ir.facts import effort_unit
 from mstmm.scene import Output
 from mstmm.scene.rules.messages import near
 
+from ..engine.shown import (
+    BODY,
+    COLUMNS,
+    HINGE,
+    SUMS,
+    WXYZ,
+    XYZ,
+    Kind,
+    acceleration_name,
+    effort_names,
+    rate_unit,
+)  # fmt: skip
 from ..pack.layout import HingeSlots
 from .flexible.names import add_body
-from .kinds import Kind
 from .names import Quantity, Table, Values
 from .observed import quaternions
 from .outputs import component_of, one_quantity, quantity_of
@@ -29,49 +40,9 @@ if TYPE_CHECKING:
     from .observed import Observed
 
 
-_XYZ, _WXYZ = ("x", "y", "z"), ("w", "x", "y", "z")
-
-
-#: Quantities of a body or an end, in the order of `Observation.points`.
-BODY = {
-    "position": Kind("m", "position of the origin", _XYZ, _XYZ),
-    "velocity": Kind("m/s", "velocity of the origin", _XYZ, ("vx", "vy", "vz")),
-    "acceleration": Kind("m/s2", "acceleration of the origin", _XYZ, ("ax", "ay", "az")),
-    "orientation": Kind("", "quaternion, body to inertial axes", _WXYZ, ("qw", "qx", "qy", "qz")),
-    "angular_velocity": Kind("rad/s", "angular velocity", _XYZ, ("wx", "wy", "wz")),
-    "angular_acceleration": Kind(
-        "rad/s2", "angular acceleration", _XYZ, ("alphax", "alphay", "alphaz")
-    ),
-}  # fmt: skip
-
-#: Loads of the inboard on the outboard side of a hinge.
-HINGE = {
-    "force": Kind("N", "force of the inboard on the outboard side", _XYZ, ("fx", "fy", "fz")),
-    "moment": Kind(
-        "N*m", "moment of the inboard on the outboard side at P", _XYZ, ("mx", "my", "mz")
-    ),
-}  # fmt: skip
-
-#: Sums over the scene: unit, long name, columns of `Observation.sums`.
-SUMS: dict[str, tuple[str, str, slice]] = {
-    "energy": ("J", "total energy", slice(0, 3)),
-    "energy.kinetic": ("J", "kinetic energy", slice(0, 1)),
-    "energy.gravity": ("J", "potential energy of gravity", slice(1, 2)),
-    "energy.springs": ("J", "energy of springs and of deformed bodies", slice(2, 3)),
-    "power": ("W", "power of everything that is not stored", slice(3, 4)),
-    "momentum": ("kg*m/s", "linear momentum", slice(4, 7)),
-    "angular_momentum": ("kg*m2/s", "angular momentum about the inertial origin", slice(7, 10)),
-}
-
 #: Quantities whose time derivatives are quantities too.
 RATES = {
     "position": "velocity", "velocity": "acceleration", "angular_velocity": "angular_acceleration",
-}  # fmt: skip
-
-#: Where they stand in a row of `Observation.points`.
-COLUMNS = {
-    "position": slice(0, 3), "velocity": slice(3, 6), "acceleration": slice(6, 9),
-    "angular_velocity": slice(9, 12), "angular_acceleration": slice(12, 15),
 }  # fmt: skip
 
 
@@ -229,7 +200,7 @@ class Quantities:
             if name == "energy" or columns.stop - columns.start == 1:
                 table.scalar(name, unit, long_name, get)
             else:
-                table.vector(name, "the scene", Kind(unit, long_name, _XYZ, ()), get)
+                table.vector(name, "the scene", Kind(unit, long_name, XYZ, ()), get)
         about = "work of everything that is not stored"
         power = self._summed("power")
         table.scalar("work", "J", about, lambda: self.run.work, rates=power)
@@ -237,6 +208,12 @@ class Quantities:
         for word, given in (("input", scene.input), ("signal", scene.signal)):
             for one in given:
                 table.scalar(one.name, one.unit, f"{word} {one.name}", self._over_time(one.name))
+        place = self.observed.engine.packed.system.held.first
+        for controller in scene.controller:
+            for k in range(len(controller.A)):
+                name, about = f"{controller.name}.x[{k}]", f"state {k} of controller"
+                table.scalar(name, "", f"{about} {controller.name}", self._kept(place + 1 + k))
+            place += 1 + len(controller.A) + len(controller.outputs)
         for output in scene.output:
             self._output(table, output)
 
@@ -259,7 +236,7 @@ class Quantities:
 
         table.entries[output.name] = whole
         source = one_quantity(output)
-        labels = [label for label in _WXYZ if source and is_there(f"{source}.{label}")]
+        labels = [label for label in WXYZ if source and is_there(f"{source}.{label}")]
         for label in labels:
             table.entries[f"{output.name}.{label}"] = component(label)
         table.scalars += [f"{output.name}.{label}" for label in labels] or [output.name]
@@ -292,8 +269,15 @@ class Quantities:
         return lambda: self.sum(name)
 
     def _over_time(self, name: str) -> Values:
+        packed = self.observed.engine.packed
+        held = packed.system.held.places[packed.layout.inputs[name]]
+        if held >= 0:
+            return lambda: self.run.memory[:, held]
         channel = self.observed.references.scene.channels[name]
         return lambda: np.array([channel.value(t) for t in self.run.t.tolist()])
+
+    def _kept(self, place: int) -> Values:
+        return lambda: self.run.memory[:, place]
 
     @staticmethod
     def _bound(method: Callable[[str, str], Array], name: str, kind: str) -> Values:
@@ -319,21 +303,3 @@ class _Group:
             self.table.entries[f"{self.hinge}.{short}[{k}]"] = self.table.entries[full]
         if len(names) == 1 and names[0] != short:
             self.table.entries[f"{self.hinge}.{short}"] = self.table.entries[full]
-
-
-def effort_names(speeds: Sequence[str]) -> list[str]:
-    """Names of the efforts along the speeds of a hinge: effort, or effort_wx and so on."""
-    if len(speeds) == 1:
-        return ["effort"]
-    return [f"effort_{name.removesuffix('_rate')}" for name in speeds]
-
-
-def acceleration_name(speed: str) -> str:
-    """Name of a speed's derivative: angle_rate -> angle_acceleration, vx -> vx_dot."""
-    stem = speed.removesuffix("_rate")
-    return f"{stem}_acceleration" if stem != speed else f"{speed}_dot"
-
-
-def rate_unit(unit: str) -> str:
-    """Unit of the time derivative: m/s -> m/s2."""
-    return f"{unit}2" if unit.endswith("/s") else f"{unit or '1'}/s"

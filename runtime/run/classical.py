@@ -52,6 +52,10 @@ def integrate(
     """One run.  Raises SceneError without a step, and for what there are no matrices for."""
     if settings.step is None:
         raise SceneError(f'method "{settings.method}" takes fixed steps: give step in s')
+    for one in model.scene.controller:
+        raise SceneError(
+            f'controller "{one.name}": method "{settings.method}" has no samples; take another one'
+        )
     scheme_of(settings.scheme)
     refuse_steps(model.packed)
     return _Run(model, settings, tell).run(q, u)

@@ -170,7 +170,7 @@ class _Loop:
 
     def run(self, q: Array, u: Array) -> Trajectory:
         scene, settings = self.system.scene, self.settings
-        y = scene.start(settings.t_start, q, u)
+        y = scene.begin(settings.t_start, q, u)
         self.last, self.atol = y, tolerances(scene, settings, y)
         stops = np.union1d(self.known.breaks, self.known.starts).tolist()
         inner = [b for b in stops if settings.t_start < b < settings.t_end]
@@ -236,15 +236,14 @@ class _Loop:
             event = self.first_event(solver, switch)
             end = solver.t if event is None else event[1]
             dense = solver.dense_output()
-            self.outputs_until(dense, end)
+            self.outputs_until(dense, end, event is not None)
             y = solver.y if event is None else dense(end)
             self.t, self.last = float(end), self.system.remember(end, y)
             self.tell(end)
             if event is not None:
                 self.crossed(event)
                 return np.array(self.last)
-            if self.outputs is None:
-                self.sample(end, solver.y)
+            self.sample(end, solver.y)
             self.truth &= self.events(end, solver.y) >= 0
         return np.array(self.last)
 
@@ -452,8 +451,10 @@ class _Loop:
                 self.outputs.popleft()
         self.rows.append((t, np.array(y), np.array(self.system.scene.memory), 0))
 
-    def outputs_until(self, dense: Any, end: float) -> None:
-        while self.outputs and self.outputs[0] <= end:
+    def outputs_until(self, dense: Any, end: float, there: bool) -> None:
+        """Samples within a step, and at its end where an event is `there`; else that is settled
+        first."""
+        while self.outputs and (self.outputs[0] < end or (there and self.outputs[0] == end)):
             t = self.outputs.popleft()
             self.rows.append((t, dense(t), np.array(self.system.scene.memory), 0))
 

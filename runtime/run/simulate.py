@@ -42,7 +42,7 @@ def make_run(
     if tableau.implicit:
         system.offer_tangent()
     check_steps(tableau, settings.step)
-    start = system.start(settings.t_start, q, u)
+    start = system.begin(settings.t_start, q, u)
     known = system.engine.packed.time_map(settings.t_start, settings.t_end)
     return Run(
         system.engine.ffi, system.engine.lib, system.system, tableau, settings, start,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
 from mstmm.ir.tape import Tape
 
 from ..engine.calls import Probe
@@ -22,6 +23,7 @@ from ..pack.layout import StateNames
 from ..pack.packed import resize
 from ..pack.qr import refuse_steps
 from ..pack.switches import MOST
+from .controllers import Controllers
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,10 @@ class SceneSystem:
         self.kept += [model, first]
         if packed.watched.tape is not None:
             self._events(packed.watched.tape, packed.watched.ends, actions)
+        if packed.described.controller:
+            controllers = Controllers(engine)
+            run.n_controllers, run.controllers = controllers.count, controllers.records
+            self.kept.append(controllers)
         self.workspace = np.zeros(packed.workspace)
         run.workspace = engine.pointer(self.workspace)
         self._code = compiled
@@ -138,6 +144,14 @@ class SceneSystem:
     def with_power(self) -> bool:
         """True if the state ends with the work of everything that is not stored."""
         return bool(self.run.with_power)
+
+    def begin(self, t: float, q: ArrayLike, u: ArrayLike) -> Array:
+        """`start` of a run: controllers that act at t have done so."""
+        y = self.start(t, q, u)
+        lib = self.engine.lib
+        if lib.mstmm_controllers_act(self.run, t, self.engine.pointer(y)) > 0:
+            raise NumericalFailure(self.engine.failure_text(self.run.failure, t))
+        return y
 
     def start(self, t: float, q: ArrayLike, u: ArrayLike) -> Array:
         """State vector at t with driven coordinates, quaternions and memory in order."""

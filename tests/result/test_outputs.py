@@ -18,7 +18,7 @@ from mstmm.errors import SceneError
 from mstmm.runtime.advice.outputs import with_outputs_there
 from mstmm.runtime.advice.splitting import in_parts
 from mstmm.runtime.chart.models import at_level
-from mstmm.runtime.result.quantities import SUMS
+from mstmm.runtime.engine.shown import SUMS
 from mstmm.runtime.result.result import Result
 from mstmm.scene.checks.inputs import OF_SCENE
 

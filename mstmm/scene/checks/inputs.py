@@ -12,14 +12,15 @@ from ...risk import Risk
 from ..rules.messages import Problem, near
 from ..rules.values import Location, found
 from ..tables.constants import problem_with_name
-from ..tables.inputs import Input
+from ..tables.outside.inputs import Input
 from .types import tables
 
 if TYPE_CHECKING:
     from ..tables.all import SceneTables
 
 
-_WORDS = {"input": "an input", "signal": "a signal", "output": "an output"}
+_WORDS = {"input": "an input", "signal": "a signal", "output": "an output",
+          "controller": "a controller"}  # fmt: skip
 
 #: Quantities of results that belong to no body and no hinge.
 OF_SCENE = ("energy", "power", "work", "momentum", "angular_momentum")
@@ -39,6 +40,7 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
             if problem:
                 yield (table, i, "name"), problem
     yield from _outputs(scene)
+    yield from _controllers(scene)
     signals = [signal.name for signal in scene.signal]
     for i, one in enumerate(scene.input):
         if isinstance(one.value, str) and one.value not in signals:
@@ -62,6 +64,12 @@ def _outputs(scene: SceneTables) -> Iterator[Problem]:
     outputs = {output.name for output in scene.output}
     owners = {body.name for body in scene.skeleton.body} | {hinge.name for hinge in scene.hinge}
     owners |= {chain.name for chain in scene.chain}
+    hinges = {hinge.name for hinge in scene.hinge}
+    for table, names in (("input", hinges), ("signal", hinges), ("controller", owners)):
+        for i, one in enumerate(getattr(scene, table)):
+            if one.name in names:
+                what = "a hinge" if one.name in hinges else "a body, hinge or chain"
+                yield (table, i, "name"), f'"{one.name}" is also the name of {what}; rename one'
     for i, output in enumerate(scene.output):
         if output.name in owners:
             problem = f'"{output.name}" is also the name of a body, hinge or chain; rename one'
@@ -70,6 +78,29 @@ def _outputs(scene: SceneTables) -> Iterator[Problem]:
             if name.parts[0] in outputs:
                 problem = f'"{name.text}" is an output itself; write what it is of'
                 yield ("output", i, "of"), problem
+
+
+def _controllers(scene: SceneTables) -> Iterator[Problem]:
+    """Controllers that set what is no input, what drives, or what another one sets.  Whether what
+    they measure can be measured the engine knows."""
+    setting: dict[str, str] = {}
+    inputs = [one.name for one in scene.input]
+    driving = {
+        name.text
+        for kind, _, table in tables(scene) if kind == "hinge"
+        for entry in table.drive or () if entry is not None
+        for name in entry.names
+    }  # fmt: skip
+    for i, one in enumerate(scene.controller):
+        for k, name in enumerate(one.outputs):
+            place: Location = ("controller", i, "outputs", k)
+            other = setting.setdefault(name, one.name)
+            if name not in inputs:
+                yield place, f'there is no input "{name}"{near(name, inputs)}'
+            elif name in driving:
+                yield place, f'"{name}" drives a hinge, whose motion would jump; push instead'
+            elif other != one.name:
+                yield place, f'"{name}" is set by controller "{other}" already'
 
 
 def drives(scene: SceneTables) -> Iterator[Problem]:

@@ -31,8 +31,8 @@ RESERVED = {
 
 #: The lists of tables of a scene.
 TABLES = (
-    "input", "signal", "output", "body", "hinge", "chain", "beam", "elastic", "load", "event",
-    "spring",
+    "input", "signal", "output", "controller", "body", "hinge", "chain", "beam", "elastic",
+    "load", "event", "spring",
 )  # fmt: skip
 
 Problem = tuple[Location, str]

@@ -19,9 +19,10 @@ from .chain import Chain
 from .constants import constants as named_numbers
 from .elastic import Elastic
 from .hinge import Hinge
-from .inputs import Input, Output, Signal
 from .loads import Event, Load, Spring
 from .members import Bodies, Hinges
+from .outside.controller import Controller
+from .outside.inputs import Input, Output, Signal
 from .rigid import bare
 
 
@@ -41,6 +42,7 @@ class SceneTables(Table):
     input: tuple[Input, ...] = ()
     signal: tuple[Signal, ...] = ()
     output: tuple[Output, ...] = ()
+    controller: tuple[Controller, ...] = ()
     body: tuple[Body, ...] = ()
     hinge: tuple[Hinge, ...] = ()
     chain: tuple[Chain, ...] = ()
@@ -70,6 +72,11 @@ class SceneTables(Table):
             for one in self.input
         }  # fmt: skip
         return inputs | signals
+
+    @property
+    def controlled(self) -> dict[str, str]:
+        """The inputs that controllers set, with the names of those."""
+        return {name: one.name for one in self.controller for name in one.outputs}
 
     def with_inputs(self, values: Mapping[str, float | str]) -> Self:
         """The same with inputs at other numbers, or following other signals of the scene.  Nothing

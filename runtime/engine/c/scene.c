@@ -3,6 +3,7 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "control.h"
 #include "kernel_calls.h"
 #include "scene.h"
 #include "sweep_steps.h"
@@ -258,7 +259,8 @@ int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, cons
 
 static int scene_accept(void *context, double t, double *y)
 {
-    return mstmm_scene_settle(context, t, y);
+    const int code = mstmm_scene_settle(context, t, y);
+    return code ? code : mstmm_controllers_act(context, t, y);
 }
 
 static int scene_events(void *context, double t, const double *y, double *g)
@@ -298,13 +300,13 @@ static int scene_fire(void *context, int event, double t, double *y)
     return action->action;
 }
 
-/* Is there anything for `mstmm_scene_settle` to do? */
+/* Is there anything to do behind a step? */
 static int needs_settling(const mstmm_scene_run *run)
 {
     const mstmm_model *model = run->model;
     for (int k = 0; k < model->n_laws; k++)
         if (model->laws[k].twist >= 0) return 1;
-    return run->n_quaternions > 0 || model->n_drives > 0;
+    return run->n_quaternions > 0 || model->n_drives > 0 || run->n_controllers > 0;
 }
 
 void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system)

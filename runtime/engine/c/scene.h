@@ -69,6 +69,8 @@ typedef struct {
     int looped_tangent; /* the last tangent was factored there */
 } mstmm_implicit_code;
 
+struct mstmm_controller;
+
 /* State y = [q, u] and, with `with_power`, the work of everything not stored. */
 typedef struct {
     const mstmm_model *model;
@@ -84,6 +86,8 @@ typedef struct {
     int n_probes;
     const mstmm_probe *probes;
     real *probe_values; /* n_probes x 6, and MSTMM_PROBE_NUMBERS of scratch */
+    int n_controllers;
+    const struct mstmm_controller *controllers; /* see control.h */
     /* Code compiled for this scene, or NULL: see mstmm_scene_compiled */
     const mstmm_fused *fused, *fused_lanes;
     real *fused_p;

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from mstmm.scene import split
 
-from ..kinds import Kind
+from ...engine.shown import Kind
 
 if TYPE_CHECKING:
     from ..names import Table

@@ -9,8 +9,8 @@ import numpy as np
 from mstmm.extras import missing
 from mstmm.ir.facts import effort_unit
 
+from ...engine.shown import BODY, HINGE, SUMS, acceleration_name, rate_unit
 from ..flexible import dataset as flexible
-from ..quantities import BODY, HINGE, SUMS, acceleration_name, rate_unit
 from . import provenance
 from .table import flat
 

@@ -10,14 +10,14 @@ from typing import Annotated, Any
 
 from pydantic import model_validator
 
-from ...expression.expression import Expression
-from ...numbers.pieces import INTERPOLATIONS, Pieces, through
-from ..rules import text as texts
-from ..rules import values as rules
-from ..rules import written
-from ..rules.columns import read_columns
-from ..rules.values import NAME, Refused, Rule, Table, finite, found, plain, refuse
-from .elastic_keys import FOLDER
+from ....expression.expression import Expression
+from ....numbers.pieces import INTERPOLATIONS, Pieces, through
+from ...rules import text as texts
+from ...rules import values as rules
+from ...rules import written
+from ...rules.columns import read_columns
+from ...rules.values import NAME, Refused, Rule, Table, finite, found, plain, refuse
+from ..elastic_keys import FOLDER
 
 Numbers = tuple[float, ...]
 

@@ -1,0 +1,1 @@
+"""What a scene has to do with the outside."""

@@ -1,0 +1,52 @@
+"""Bodies and ends of a scene by the names that results and measurements have for them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+
+from mstmm.scene import split
+from mstmm.scene.tables.all import SceneTables
+from mstmm.scene.tables.body import BodyTable
+
+
+class References(Collection[str]):
+    """Every body and every end of the scene: "rod1", "rod1.tip".
+
+    `scene` is the skeleton: flexible bodies count as bodies with ends like all others.
+    """
+
+    def __init__(self, scene: SceneTables) -> None:
+        self.scene, self.bodies = scene, scene.bodies
+
+    def canonical(self, reference: str) -> str | None:
+        """The reference with the number of a chain's member; None if there is no such end."""
+        name, at = split(reference)
+        number = self.bodies.find(name)
+        ends = self.bodies.ends(name)
+        if number is None or ends is None or (at and at not in ends):
+            return None
+        return self.bodies.name(number) + (f".{at}" if at else "")
+
+    def __contains__(self, reference: object) -> bool:
+        return isinstance(reference, str) and self.canonical(reference) is not None
+
+    def __iter__(self) -> Iterator[str]:
+        for body in self.scene.body:
+            yield from _with_ends(body.name, body)
+        for chain in self.scene.chain:
+            for k in range(chain.count):
+                yield from _with_ends(f"{chain.name}[{k}]", chain.body_of(k))
+
+    def __len__(self) -> int:
+        found = sum(1 + len(body.ends) for body in self.scene.body)
+        for chain in self.scene.chain:
+            repeats, rest = divmod(chain.count, len(chain.body))
+            ends = [1 + len(body.ends) for body in chain.body]
+            found += repeats * sum(ends) + sum(ends[:rest])
+        return found
+
+
+def _with_ends(name: str, body: BodyTable) -> Iterator[str]:
+    yield name
+    for end in body.ends:
+        yield f"{name}.{end}"

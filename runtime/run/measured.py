@@ -1,0 +1,156 @@
+"""What a state shows, by C: expressions of quantities that a run can look at as it goes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+from mstmm.expression.expression import Expression, Name
+from mstmm.expression.inputs import input_at
+from mstmm.ir import Port
+from mstmm.ir.graph import Graph, Node
+from mstmm.ir.tape import compile_tape
+
+from ..engine.calls import Probe
+from ..engine.engine import Engine
+from ..engine.references import References
+from ..engine.shown import BODY, COLUMNS, HINGE, SUMS, acceleration_name, effort_names
+from ..kernels.tape import c_tape
+from ..pack.layout import HingeSlots
+from ..pack.packed import resize
+from ..pack.values import inputs_port, state_ports
+
+#: Where a number stands: the port of the tape and the place in it.
+Place = tuple[str, int]
+_SHOWN = ("points", "loads", "efforts", "udot", "sums")
+
+
+class Measured:
+    """`record` is `mstmm_measure *` of expressions; `numbers` are how many they are.
+
+    Raises SceneError for a name of what a run cannot look at.
+    """
+
+    def __init__(self, engine: Engine, expressions: Sequence[Expression]) -> None:
+        self._engine, self._graph = engine, Graph()
+        self._references = References(engine.packed.described.skeleton)
+        self._probes: dict[str, int] = {}
+        self._read = set[str]()
+        nodes = [one.build(self._graph, self._node) for one in expressions]
+        self.numbers = len(nodes)
+        packed, lib, ffi = engine.packed, engine.lib, engine.ffi
+        sizes = {
+            "points": int(lib.MSTMM_PROBE_NUMBERS) * len(self._probes),
+            "loads": 6 * packed.topology.count, "efforts": engine.nu, "udot": engine.nu,
+            "sums": int(lib.MSTMM_SUM_NUMBERS),
+        }  # fmt: skip
+        sizes = {name: n if name in self._read else 0 for name, n in sizes.items()}
+        ports = [*state_ports(packed.layout), *(Port(name, (n,)) for name, n in sizes.items())]
+        ports.append(inputs_port(packed.layout))
+        kernel = self._graph.kernel(
+            "measured", ports, [Port("values", (len(nodes),))], {"values": nodes}
+        )
+        tape, self._kept = compile_tape(kernel), list[object]()
+        resize(packed, tape.slots)
+        self.record = ffi.new("mstmm_measure *")
+        self.record.tape, self.record.observes = c_tape(ffi, tape, self._kept), bool(self._read)
+        shown = self.record.shown
+        for name, n in sizes.items():
+            array = np.zeros(max(1, n))
+            self._kept.append(array)
+            if name in self._read:
+                setattr(shown, name, engine.pointer(array))
+        records = engine.probes([Probe(*packed.end(one)) for one in self._probes])
+        shown.n_probes, shown.probes = len(self._probes), records
+        self._kept.append(records)
+
+    def _node(self, name: Name) -> Node:
+        graph, inputs = self._graph, self._engine.packed.layout.inputs
+        if name.text == "t":
+            return graph.element("t", 0)
+        if name.text in inputs:
+            return input_at(inputs[name.text], graph.element("t", 0))
+        if name.text == "energy":
+            a, b, c = (self._element(("sums", k)) for k in range(3))
+            return a + b + c
+        place = self._of_scene(name.text) or self._of_owner(name.text)
+        if place is None:
+            raise SceneError(
+                f'"{name.text}": this cannot be looked at within a run; of hinges there are '
+                "coordinates, speeds, accelerations, efforts, components of force and moment, of "
+                "bodies and ends components of position, velocity, acceleration and of their "
+                "turning (no quaternions), of the scene energies, power and momenta"
+            )
+        return self._element(place)
+
+    def _element(self, place: Place) -> Node:
+        if place[0] in _SHOWN:
+            self._read.add(place[0])
+        return self._graph.element(*place)
+
+    def _of_scene(self, text: str) -> Place | None:
+        for name, (_, _, columns) in SUMS.items():
+            if text == name and columns.stop == columns.start + 1:
+                return "sums", columns.start
+            if columns.stop == columns.start + 3 and text.startswith(f"{name}."):
+                label = text.removeprefix(f"{name}.")
+                if label in ("x", "y", "z"):
+                    return "sums", columns.start + "xyz".index(label)
+        return None
+
+    def _of_owner(self, text: str) -> Place | None:
+        parts = text.split(".")
+        packed = self._engine.packed
+        for k in range(len(parts) - 1, 0, -1):
+            owner, rest = ".".join(parts[:k]), ".".join(parts[k:])
+            slots = packed.layout.hinges.get(owner) or packed.layout.modal.get(owner)
+            place = None if slots is None else self._of_hinge(slots, owner, rest)
+            reference = self._references.canonical(owner)
+            if place is None and reference is not None:
+                place = self._of_end(reference, rest)
+            if place is not None:
+                return place
+        return None
+
+    def _of_hinge(self, slots: HingeSlots, owner: str, rest: str) -> Place | None:
+        groups = [("q", "q", slots.q, slots.q_names), ("u", "u", slots.u, slots.u_names)]
+        rates = [acceleration_name(name) for name in slots.u_names]
+        groups.append(("udot", "udot", slots.u, tuple(rates)))
+        modal = owner in self._engine.packed.layout.modal
+        if not modal:
+            efforts = tuple(effort_names(slots.u_names))
+            groups.append(("efforts", "effort", slots.u, efforts))
+        for port, short, first, names in groups:
+            known = [*names, *(f"{short}[{k}]" for k in range(len(names)))]
+            known += [short] if len(names) == 1 else []
+            if rest in known:
+                return port, first + known.index(rest) % len(names)
+        if modal:
+            return None
+        body = self._engine.packed.hinge_position[owner]
+        for first, (kind, about) in enumerate(HINGE.items()):
+            for axis, label in enumerate(about.labels):
+                if rest in (f"{kind}.{label}", about.short[axis]):
+                    return "loads", 6 * body + 3 * first + axis
+        return None
+
+    def _of_end(self, reference: str, rest: str) -> Place | None:
+        for kind, columns in COLUMNS.items():
+            about = BODY[kind]
+            for axis, label in enumerate(about.labels):
+                if rest in (f"{kind}.{label}", about.short[axis]):
+                    probe = self._probes.setdefault(reference, len(self._probes))
+                    width = int(self._engine.lib.MSTMM_PROBE_NUMBERS)
+                    return "points", width * probe + columns.start + axis
+        return None
+
+
+def numbers_at(engine: Engine, run: object, measured: Measured, t: float, y: Array) -> Array:
+    """The numbers at a state y of a scene's run; nan where they have none."""
+    found = np.full(max(1, measured.numbers), np.nan)
+    state = np.ascontiguousarray(y)
+    engine.lib.mstmm_measured(run, measured.record, t, engine.pointer(state), engine.pointer(found))
+    return found[: measured.numbers]
