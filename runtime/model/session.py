@@ -24,6 +24,7 @@ from ..integrate.steppers import AUTO
 from ..run import classical, second_opinion
 from ..run.endings import message_of
 from ..run.engine_choice import for_many
+from ..run.measured import MeasuredOutputs
 from ..run.simulate import SLICE, make_run, settled, split
 from ..run.stability import check_step
 from ..run.system import SceneSystem
@@ -64,6 +65,7 @@ class Session:
         self._names = settable(model)
         self._packed = with_held(model.packed, self._names, settings.t_start)
         self._code = for_many(model, settings)
+        self._outputs: MeasuredOutputs | None = MeasuredOutputs(Engine(self._packed))
         self._make(q, u, -math.inf if self._packed.goes_by_time else math.inf)
 
     def _make(self, q: Array, u: Array, reach: float) -> None:
@@ -198,8 +200,13 @@ class Session:
 
     def outputs(self) -> dict[str, Any]:
         """The outputs of the scene at this state, by their names: numbers, or arrays of vectors."""
-        found = self.result().outputs()
-        return {name: values[0] for name, values in found.items()}
+        if self._outputs is None:
+            self._outputs = MeasuredOutputs(self._system.engine)
+        found = self._outputs.at(self._system.run, self.t, self._state())
+        if self._outputs.others:
+            shown = self.result().outputs()
+            found |= {name: shown[name][0] for name in self._outputs.others if name in shown}
+        return found
 
     def result(self) -> Result:
         """This state as a result of one sample, which knows every quantity of the scene."""
@@ -225,6 +232,7 @@ class Session:
     def copy(self) -> Self:
         """A session of its own that stands where this one does, and goes on alike."""
         other = copy(self)
+        other._outputs = None
         other._make(self.q, self.u, float(self._record.reach))
         other._run.take_over(self._run)
         other._forget_given()

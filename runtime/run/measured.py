@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.errors import SceneError
-from mstmm.expression.expression import Expression, Name
+from mstmm.errors import NumericalFailure, SceneError
+from mstmm.expression.expression import Expression, Name, parse
 from mstmm.expression.inputs import input_at
 from mstmm.ir import Port
 from mstmm.ir.graph import Graph, Node
 from mstmm.ir.tape import compile_tape
+from mstmm.scene import Output
 
 from ..engine.calls import Probe
 from ..engine.engine import Engine
@@ -147,10 +149,51 @@ class Measured:
                     return "points", width * probe + columns.start + axis
         return None
 
+    def at(self, run: Any, t: float, y: Array) -> Array:
+        """The numbers at a state y (n_state,) of a scene's run, `mstmm_scene_run *`."""
+        found, state = np.zeros(max(1, self.numbers)), np.ascontiguousarray(y)
+        pointers = self._engine.pointer(state), self._engine.pointer(found)
+        if self._engine.lib.mstmm_measured(run, self.record, t, *pointers):
+            raise NumericalFailure(self._engine.failure_text(run.failure, t))
+        return found[: self.numbers]
 
-def numbers_at(engine: Engine, run: object, measured: Measured, t: float, y: Array) -> Array:
-    """The numbers at a state y of a scene's run; nan where they have none."""
-    found = np.full(max(1, measured.numbers), np.nan)
-    state = np.ascontiguousarray(y)
-    engine.lib.mstmm_measured(run, measured.record, t, engine.pointer(state), engine.pointer(found))
-    return found[: measured.numbers]
+
+class MeasuredOutputs:
+    """The outputs of a scene that C gives; `others` are the names of those that it does not."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.others, self._labels = list[str](), dict[str, int]()
+        expressions = list[Expression]()
+        packed = engine.packed
+        rigidified = None if packed.expanded is None else packed.expanded.rigidified
+        one_way = rigidified is not None and bool(rigidified.one_way)
+        for output in packed.described.output:
+            found = [] if one_way else _of_output(engine, output)
+            expressions += found
+            self._labels[output.name] = len(found)
+            self.others += [] if found else [output.name]
+        self._measured = Measured(engine, expressions)
+
+    def at(self, run: Any, t: float, y: Array) -> dict[str, Any]:
+        """Numbers, and arrays of vectors, by the names of outputs."""
+        numbers, found, first = self._measured.at(run, t, y), dict[str, Any](), 0
+        for name, count in self._labels.items():
+            if count:
+                part = numbers[first : first + count]
+                found[name] = float(part[0]) if count == 1 else part
+            first += count
+        return found
+
+
+def _of_output(engine: Engine, output: Output) -> list[Expression]:
+    """What gives an output: an expression, or one for each component; none where C does not."""
+    for labels in ([""], [".x", ".y", ".z"]):
+        try:
+            found = [output.of] if labels == [""] else [
+                parse(output.of.text + label) for label in labels
+            ]  # fmt: skip
+            Measured(engine, found)
+        except SceneError:
+            continue
+        return found
+    return []
