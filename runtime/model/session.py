@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from copy import copy
+from copy import copy as shallow
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Self
 
@@ -24,7 +24,7 @@ from ..integrate.steppers import AUTO
 from ..run import classical, second_opinion
 from ..run.endings import message_of
 from ..run.engine_choice import for_many
-from ..run.measured import MeasuredOutputs
+from ..run.measured import MeasuredOutputs, refuse_one_way
 from ..run.simulate import SLICE, make_run, settled, split
 from ..run.stability import check_step
 from ..run.system import SceneSystem
@@ -61,6 +61,7 @@ class Session:
         self, model: Compiled, settings: Settings, q: Array, u: Array, risks: tuple[Risk, ...] = ()
     ) -> None:
         refuse_method(settings)
+        refuse_one_way(model.packed, "a session")
         self.model, self.settings, self.risks = model, settings, risks
         self._names = settable(model)
         self._packed = with_held(model.packed, self._names, settings.t_start)
@@ -144,7 +145,7 @@ class Session:
 
     def _failure(self) -> str:
         """How the motion ended, told with the inputs as they are."""
-        system = copy(self._system)
+        system = shallow(self._system)
         system.engine = self._now().looped
         return message_of(system, self._run)
 
@@ -231,12 +232,17 @@ class Session:
 
     def copy(self) -> Self:
         """A session of its own that stands where this one does, and goes on alike."""
-        other = copy(self)
-        other._outputs = None
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__, _outputs=None)
         other._make(self.q, self.u, float(self._record.reach))
         other._run.take_over(self._run)
         other._forget_given()
         return other
+
+    __copy__ = copy
+
+    def __deepcopy__(self, _: object) -> Self:
+        return self.copy()
 
     def __repr__(self) -> str:
         return f"<Session: t = {self.t:.9g} s{self.stopped and ', '}{self.stopped}>"

@@ -11,7 +11,7 @@ from mstmm.expression.expression import Expression, parse
 from mstmm.scene.tables.all import SceneTables
 
 from ..engine.engine import Engine
-from .measured import Measured
+from .measured import Measured, refuse_one_way
 
 
 class Controllers:
@@ -23,6 +23,7 @@ class Controllers:
     def __init__(self, engine: Engine) -> None:
         scene, ffi = engine.packed.described, engine.ffi
         self.count = len(scene.controller)
+        refuse_one_way(engine.packed, f'controller "{scene.controller[0].name}"')
         self.records = ffi.new("mstmm_controller[]", self.count)
         self._kept: list[Any] = []
         place = engine.packed.system.held.first

@@ -22,7 +22,7 @@ from ..engine.references import References
 from ..engine.shown import BODY, COLUMNS, HINGE, SUMS, acceleration_name, effort_names
 from ..kernels.tape import c_tape
 from ..pack.layout import HingeSlots
-from ..pack.packed import resize
+from ..pack.packed import Packed, resize
 from ..pack.values import inputs_port, state_ports
 
 #: Where a number stands: the port of the tape and the place in it.
@@ -158,17 +158,25 @@ class Measured:
         return found[: self.numbers]
 
 
+def refuse_one_way(packed: Packed, what: str) -> None:
+    """SceneError for bodies whose deflection is found behind a whole run: within one there is
+    nothing of it to see."""
+    rigidified = packed.expanded.rigidified
+    for name in rigidified.one_way if rigidified is not None else ():
+        raise SceneError(
+            f'"{name}": {what} sees nothing of the deflection of a body with model = "one-way", '
+            'which is found behind a whole run; take model = "flexible" or "rigid"'
+        )
+
+
 class MeasuredOutputs:
     """The outputs of a scene that C gives; `others` are the names of those that it does not."""
 
     def __init__(self, engine: Engine) -> None:
         self.others, self._labels = list[str](), dict[str, int]()
         expressions = list[Expression]()
-        packed = engine.packed
-        rigidified = None if packed.expanded is None else packed.expanded.rigidified
-        one_way = rigidified is not None and bool(rigidified.one_way)
-        for output in packed.described.output:
-            found = [] if one_way else _of_output(engine, output)
+        for output in engine.packed.described.output:
+            found = _of_output(engine, output)
             expressions += found
             self._labels[output.name] = len(found)
             self.others += [] if found else [output.name]

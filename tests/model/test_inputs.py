@@ -226,3 +226,36 @@ def test_an_input_on_a_flexible_body_pushes_as_the_force_does() -> None:
 def test_an_input_that_drives_is_no_push() -> None:
     with pytest.raises(SceneError, match='the drive of hinge "crank" follows this input'):
         model("looped").linearize([0.1, 0.2], inputs=["angle"])
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_numbers_and_names_of_signals_are_not_validated_anew(
+    engine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside a flexible body, whose scene of nodes has the inputs too."""
+    beam = {"name": "arm", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 50.0,
+            "modes": {"y": 1}}  # fmt: skip
+    hinge = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "arm",
+             "law": {"effort": "motor"}}  # fmt: skip
+    bent = mstmm.compile(
+        mstmm.Scene(
+            gravity=(0, -9.81, 0), beam=[beam], hinge=[hinge], input=[{"name": "motor"}],
+            load=[{"on": "arm.tip", "force": [0, "motor*t", 0]}],
+            signal=[{"name": "gust", "times": [0, 0.1, 0.2], "values": [0, 3, 1]}],
+        ),
+        engine=engine,
+    )  # fmt: skip
+    expected = bent.with_parameters({"motor.value": 2.5}).simulate(0.3)
+    signal = {"times": [0, 0.1, 0.2], "values": [0, 3, 1]}
+    followed = bent.with_inputs({"motor": signal}).simulate(0.3)
+
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise AssertionError("the scene is validated anew")
+
+    monkeypatch.setattr(mstmm.Scene, "from_data", refuse)
+    found = bent.with_inputs({"motor": 2.5}).simulate(0.3)
+    np.testing.assert_array_equal(found.q, expected.q)
+    assert found.model.parameters["motor.value"] == 2.5 and found.model.engine == bent.engine
+    named = bent.with_inputs({"motor": 1.0}).with_inputs({"motor": "gust"}).simulate(0.3)
+    np.testing.assert_array_equal(named.q, followed.q)
+    assert named.model.scene.input[0].value == "gust" and {0.1, 0.2} & set(named.t)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from functools import cache
 from typing import Any
 
@@ -98,7 +99,7 @@ def test_a_tick_between_two_steps_cuts_one_and_the_grid_stays() -> None:
 def test_a_copy_goes_on_alike_and_alone(engine: str) -> None:
     model = arm(engine)
     stepped = ticks(model.session(method="rk4", step=0.01), 0.01, 20, motor=1.0)
-    other = stepped.copy()
+    other = copy.copy(stepped)
     assert other.inputs == stepped.inputs
     ticks(other, 0.01, 20, motor=-3.0)
     q = stepped.q
@@ -200,6 +201,21 @@ def test_an_input_that_drives_is_refused() -> None:
     stepped = mstmm.compile(scene).session()
     with pytest.raises(SceneError, match=r'drive of hinge "crank" follows this input.*blow'):
         stepped.advance(0.1, {"angle": 1.0})
+
+
+def test_bodies_that_answer_to_whole_runs_are_refused() -> None:
+    beam = {"name": "arm", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 50.0,
+            "modes": {"y": 1}, "model": "one-way"}  # fmt: skip
+    hinge = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "arm",
+             "law": {"effort": "push"}}  # fmt: skip
+    gain = {"name": "gain", "sample_time": 0.1, "inputs": ["arm.tip.x"], "outputs": ["push"],
+            "D": [[1.0]]}  # fmt: skip
+    tables: Any = {"gravity": (0, -9.81, 0), "beam": [beam], "hinge": [hinge],
+                   "input": [{"name": "push"}]}  # fmt: skip
+    with pytest.raises(SceneError, match='"arm": a session sees nothing of the deflection'):
+        mstmm.compile(mstmm.Scene(**tables)).session()
+    with pytest.raises(SceneError, match='"arm": controller "gain" sees nothing'):
+        mstmm.compile(mstmm.Scene(**tables, controller=[gain]))
 
 
 @pytest.mark.parametrize("method", ["auto", "scipy-RK45", "dttmm-classical"])
