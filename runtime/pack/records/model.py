@@ -90,9 +90,12 @@ def write(system: System, elements: Elements) -> Written:
 def write_inputs(inputs: Sequence[Pieces], held: Sequence[int], memory: Memory) -> Any:
     """`mstmm_input[]` of inputs and signals: over time, or where they are held."""
     records = memory.new("mstmm_input[]", max(1, len(inputs)))
+    written: dict[int, tuple[Any, Any]] = {}  # many trajectories may share a long signal
     for record, one, place in zip(records, inputs, held, strict=False):
-        record.n_knots, record.knots = len(one.knots), memory.reals(one.knots)
-        record.numbers = memory.reals([x for piece in one.pieces for x in piece])
+        if id(one) not in written:
+            numbers = [x for piece in one.pieces for x in piece]
+            written[id(one)] = memory.reals(one.knots), memory.reals(numbers)
+        record.n_knots, (record.knots, record.numbers) = len(one.knots), written[id(one)]
         record.held = place
     return records
 
