@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import SceneError
 from ..runtime.pack import parameters
+from ..runtime.pack.slopes import folded
 from ..scene.rules.messages import near
 
 if TYPE_CHECKING:
@@ -57,9 +58,12 @@ def kept(linear: Equations, keep: Sequence[str]) -> Kept:
             (full,) = parameters.resolved(linear.model.scene, [name])
             twice = found.parameters.setdefault(full, name) != name
         else:
+            without = set(folded(linear.model.scene, numbers))
+            known = [x for x in numbers if x not in without]
+            known += (x for x, motion in motions.items() if motion.free)
             raise SceneError(
                 f'keep "{name}": expected a number, coordinate or speed of the scene'
-                f"{near(name, [*numbers, *motions])}"
+                f"{near(name, known)}"
             )
         if twice:
             raise SceneError(f'keep "{name}": this number has been named already; name it once')

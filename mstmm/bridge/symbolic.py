@@ -66,6 +66,11 @@ def symbolic(linear: Equations, keep: Sequence[str], kernels: Kernels) -> Symbol
 
 
 def _refuse(linear: Equations) -> None:
+    if linear.drives:
+        raise SceneError(
+            f"symbolic: the motion of the drive of {linear.driven[0]} is an input, which formulas "
+            "have no column of; take it out of the inputs"
+        )
     if len(linear) > MOST_COORDINATES:
         raise SceneError(
             f"symbolic: the scene has {len(linear)} coordinates; the limit is {MOST_COORDINATES}; "

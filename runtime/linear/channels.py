@@ -22,15 +22,17 @@ from mstmm.errors import SceneError
 from mstmm.ir.facts import effort_unit
 from mstmm.numbers.pieces import Pieces
 from mstmm.scene.rules.messages import near
+from mstmm.scene.tables.outside.inputs import Input
 
 from ..breaks.acting import acting
 from ..engine.engine import Engine
 from ..engine.references import References
-from ..engine.shown import effort_names
+from ..engine.shown import acceleration_name, effort_names
 from ..engine.tangent import Tangent
 from ..pack.pack import packed_system
 from ..pack.system import LoadNumbers
 from ..pack.values import constant_kernel
+from .drives import Moves, accelerations, columns_of, followers, motions
 from .matrices import State
 from .standing import INERTIAL
 
@@ -46,7 +48,9 @@ GROUND = tuple(f"ground.acceleration.{axis}" for axis in _AXES)
 @dataclass(frozen=True)
 class Channel:
     """One push: its name, unit, and which place pushes: `speed`, or `end` with `kind` and `axis`,
-    or the place of an `input` among all; an acceleration of the ground where there is none."""
+    or the place of an `input` or of a `spring` among all; an acceleration of the ground where there
+    is none.  Where drives move, `moves` says which, and `drive` how often they are differentiated.
+    """
 
     name: str
     unit: str
@@ -55,6 +59,9 @@ class Channel:
     kind: str = ""
     axis: int = 0
     input: int = -1
+    spring: int = -1
+    drive: int = -1
+    moves: Moves = ()
 
 
 def names_of(what: str, names: Sequence[str]) -> Sequence[str]:
@@ -73,6 +80,27 @@ def some_names(what: str, names: Sequence[str]) -> Sequence[str]:
     return names
 
 
+def pushes_of(model: Compiled, what: str, names: Sequence[str]) -> tuple[Channel, ...]:
+    """The pushes of a list of names, as matrices take them: of drives the accelerations."""
+    found = tuple(channel(model, name) for name in names_of(what, names))
+    for one in found:
+        if 0 <= one.drive < 2:
+            instead = ", ".join(f'"{x}"' for x in accelerations(model, one.moves))
+            raise SceneError(
+                f'"{one.name}": matrices take the acceleration of a drive, {instead}, for an '
+                "input, and make the rest states; frequency_response takes this one too"
+            )
+    return found
+
+
+def inputs_of(model: Compiled) -> list[str]:
+    """Inputs of the scene, but those that drive: they are motions and no pushes."""
+    if not model.scene.input:
+        return []
+    driving = {name for one in acting(model.scene) if one.drive for name in one.inputs}
+    return [one.name for one in model.scene.input if one.name not in driving]
+
+
 def channel(model: Compiled, name: str) -> Channel:
     """The push of a name: "shoulder.effort" (of hinges with several speeds "ball.effort_wx"),
     "boom.tip.force.x" or short "boom.tip.fx", "boom.tip.moment.z" or "boom.tip.mz" (inertial axes),
@@ -83,13 +111,21 @@ def channel(model: Compiled, name: str) -> Channel:
     owner, _, last = name.rpartition(".")
     given = next((one for one in model.scene.input if one.name == name), None)
     if given is not None:
-        _refuse_drive(model, name)
+        if any(one.drive and name in one.inputs for one in acting(model.scene)):
+            return _following(model, given)
         return Channel(name, given.unit, input=model.layout.inputs[name])
     if name in GROUND:
         return Channel(name, "m/s2", axis=_AXES.index(last))
+    driven = motions(model)
+    if name in driven:
+        motion = driven[name]
+        return Channel(name, motion.unit, drive=motion.order, moves=((motion.speed, 1.0),))
     ends = References(model.scene.skeleton)
     if last.startswith("effort") and owner in model.layout.hinges:
         return _effort(model, name, owner, last)
+    springs = [one.name for one in model.scene.spring]
+    if last == "effort" and owner in springs:
+        return Channel(name, "N", spring=springs.index(owner))
     for letter, (kind, unit) in _KINDS.items():
         for axis, component in enumerate(_AXES):
             end = owner.removesuffix(f".{kind}")
@@ -99,24 +135,29 @@ def channel(model: Compiled, name: str) -> Channel:
     given_names = [one.name for one in model.scene.input]
     known = [
         *given_names,
+        *driven,
+        *(f"{spring}.effort" for spring in springs),
         *_efforts(model),
         *(f"{end}.force.{axis}" for end in ends for axis in _AXES),
         *GROUND,
     ]
     raise SceneError(
-        f'"{name}": expected an effort of a hinge such as "shoulder.effort", a force or moment at '
-        'an end such as "boom.tip.force.x", an acceleration of the ground such as '
-        f'"ground.acceleration.x", or an input of the scene{near(name, known)}'
+        f'"{name}": expected an effort of a hinge or spring such as "shoulder.effort", a force or '
+        'moment at an end such as "boom.tip.force.x", an acceleration of the ground such as '
+        '"ground.acceleration.x", a motion of a drive, or an input of the scene'
+        f"{near(name, known)}"
     )
 
 
-def _refuse_drive(model: Compiled, name: str) -> None:
-    for one in acting(model.scene):
-        if one.drive and name in one.inputs:
-            raise SceneError(
-                f'"{name}": the {one.what} follows this input, which is a motion and no push; '
-                "push somewhere else, or take the drive out"
-            )
+def _following(model: Compiled, given: Input) -> Channel:
+    """An input that drives follow: the motion of these."""
+    pushing = [x.what for x in acting(model.scene) if given.name in x.inputs and not x.drive]
+    if pushing:
+        raise SceneError(
+            f'"{given.name}": drives follow this input, and the {pushing[0]} reads it besides; '
+            "give each an input of its own"
+        )
+    return Channel(given.name, given.unit, drive=0, moves=followers(model, given.name, 0.0))
 
 
 def _effort(model: Compiled, name: str, hinge: str, last: str) -> Channel:
@@ -128,7 +169,8 @@ def _effort(model: Compiled, name: str, hinge: str, last: str) -> Channel:
     if slots.u + k not in model.free_speeds:
         raise SceneError(
             f'"{name}": hinge "{hinge}" is driven there, so that an effort moves nothing; push '
-            "somewhere else, or take the drive out"
+            "somewhere else, or take the motion of the drive for an input, such as "
+            f'"{hinge}.{acceleration_name(slots.u_names[k])}"'
         )
     return Channel(name, effort_unit(slots.u_units[k]), speed=slots.u + k)
 
@@ -158,8 +200,12 @@ def columns(engine: Engine, state: State, channels: Sequence[Channel], free: lis
             found.append(
                 _rate(engine, state, one.input, 0.0) - _rate(engine, state, one.input, 1.0)
             )
+        elif one.drive >= 0:
+            found.append(-columns_of(engine, state, one.moves).inertia)
         elif one.speed >= 0:
             found.append(np.eye(engine.nu)[one.speed])
+        elif one.spring >= 0:
+            found.append(-beyond(_stretched(engine, one.spring)))
         elif one.end:
             found.append(-beyond(_under(engine, one)))
         else:
@@ -197,5 +243,19 @@ def _under(engine: Engine, push: Channel) -> Engine:
     system = replace(
         system, gravity=(0.0, 0.0, 0.0), laws=(), forces=(), loads=(load,),
         values=constant_kernel("values", system, unit), drives=None, driven=(), moving={},
+    )  # fmt: skip
+    return Engine(packed_system(system, packed))
+
+
+def _stretched(engine: Engine, number: int) -> Engine:
+    """The tree under a unit effort of one spring alone."""
+    packed, system = engine.packed, engine.packed.system
+    constant = constant_kernel("effort", system, [1.0])
+    spring = replace(
+        system.forces[number], element=("force", "spring"), p=(0.0, 0.0, 0.0), effort=constant
+    )
+    system = replace(
+        system, gravity=(0.0, 0.0, 0.0), laws=(), forces=(spring,), loads=(), values=None,
+        drives=None, driven=(), moving={},
     )  # fmt: skip
     return Engine(packed_system(system, packed))

@@ -11,20 +11,26 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.extras import missing
 
-from .outputs import outputs_of, rows_of
+from .channels import Channel
+from .output.outputs import outputs_of, rows_of
 from .state_space import StateSpace
 
 
 def output_matrices(
-    linear: StateSpace, outputs: Sequence[str] | None, pushes: Array
+    linear: StateSpace, outputs: Sequence[str] | None, pushes: Sequence[Channel], b: Array
 ) -> tuple[tuple[str, ...], Array, Array]:
-    """(names, C (outputs, 2 n), D (outputs, pushes)) of y = C (x, x') + D v, where `pushes` (2 n,
-    k) is what v adds to d/dt (x, x')."""
-    shown, n = outputs_of(linear, outputs), len(linear)
-    places, rates, accelerations = rows_of(linear, shown)
-    c, d = np.hstack([places, rates]), np.zeros((len(shown), pushes.shape[1]))
-    if accelerations.any():
-        c, d = c + accelerations @ linear.A[n:], accelerations @ pushes[n:]
+    """(names, C (outputs, states), D (outputs, pushes)) of y = C z + D v, where `b` (states,
+    pushes) is what v adds to d/dt z."""
+    shown, speeds = outputs_of(linear, outputs), [*linear.free, *linear.drives]
+    rows = rows_of(linear, shown, pushes)
+    c, d = np.zeros((len(shown), len(linear.states))), rows.through
+    for order, wide in rows.orders.items():
+        some = wide[:, speeds]
+        if order < 2:
+            c[:, (linear.positions, linear.velocities)[order]] += some
+        else:  # of accelerations
+            rates = linear.velocities
+            c, d = c + some @ linear.A[rates], d + some @ b[rates]
     return tuple(one.name for one in shown), c, d
 
 
@@ -34,17 +40,17 @@ def to_control(linear: StateSpace, outputs: Sequence[str] | None, disturbances: 
         import control
     except ImportError as error:
         raise missing("control", "a system for python-control", error) from None
-    b, inputs = linear.B, linear.inputs
+    b, pushes = linear.B, linear.controls
     if disturbances:
-        b, inputs = np.hstack([b, linear.B_disturbances]), (*inputs, *linear.disturbances)
-    if not inputs:
+        b, pushes = np.hstack([b, linear.B_disturbances]), (*pushes, *linear.others)
+    if not pushes:
         raise SceneError(
             'the model has no inputs: name some, as in linearize(inputs=["shoulder.effort"])'
         )
-    names, c, d = output_matrices(linear, outputs, b)
+    names, c, d = output_matrices(linear, outputs, pushes, b)
     return control.ss(
         linear.A, b, c, d, states=list(map(_signal, linear.states)),
-        inputs=list(map(_signal, inputs)), outputs=list(map(_signal, names)),
+        inputs=[_signal(one.name) for one in pushes], outputs=list(map(_signal, names)),
     )  # fmt: skip
 
 

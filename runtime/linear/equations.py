@@ -14,6 +14,7 @@ from mstmm.arrays import Array
 from ..pack.layout import refuse_dense
 from ..run.system import SceneSystem
 from .channels import Channel, columns
+from .drives import columns_of, coordinate
 from .matrices import Matrices, State, matrices
 from .pencil import Pencil
 from .standing import standing, with_held_springs, without_laws
@@ -31,7 +32,8 @@ class Equations:
     x (n,) are tangent increments of the coordinates that nobody imposes: dq = N(q) x where
     qdot = N(q) u, which of most hinges and of shapes are the coordinates themselves and of balls
     rotation vectors in outboard axes.  Rows are N, N*m; v and w are efforts, forces and moments
-    beyond those of the state, and accelerations of the ground.
+    beyond those of the state, accelerations of the ground, and accelerations d'' of drives; with
+    these M x'' + C x' + K x + C_driven d' + K_driven d = V v + W w.
 
     Attributes:
         model: whose motion it is.
@@ -157,6 +159,37 @@ class Equations:
     def disturbances(self) -> tuple[str, ...]:
         """Names of w."""
         return tuple(one.name for one in self.others)
+
+    @cached_property
+    def drives(self) -> tuple[int, ...]:
+        """Places among the speeds of the drives whose motions are inputs or disturbances."""
+        moved = (speed for one in (*self.controls, *self.others) for speed, _ in one.moves)
+        return tuple(dict.fromkeys(moved))
+
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """Names of d, the coordinates of these drives beside the state."""
+        return tuple(coordinate(self.model, speed) for speed in self.drives)
+
+    @cached_property
+    def _moved(self) -> tuple[Array, Array]:
+        """K_driven and C_driven."""
+        found = [
+            columns_of(self.model.looped, self.state, ((speed, 1.0),)) for speed in self.drives
+        ]
+        both = [(one.stiffness, one.damping) for one in found]
+        wide = np.reshape(both, (len(found), 2, self.model.nu))[:, :, list(self.free)]
+        return wide[:, 0].T, wide[:, 1].T
+
+    @property
+    def C_driven(self) -> Array:
+        """(n, drives): what d' adds on the left, C_driven d'."""
+        return self._moved[1]
+
+    @property
+    def K_driven(self) -> Array:
+        """(n, drives): what d adds on the left, K_driven d."""
+        return self._moved[0]
 
     @cached_property
     def V(self) -> Array:

@@ -23,6 +23,7 @@ MATRICES = (
     ("K", "coordinate", "coordinate"), ("damping", "coordinate", "coordinate"),
     ("gyroscopic", "coordinate", "coordinate"), ("elastic", "coordinate", "coordinate"),
     ("geometric", "coordinate", "coordinate"), ("load", "coordinate", "coordinate"),
+    ("C_driven", "coordinate", "drive"), ("K_driven", "coordinate", "drive"),
     ("V", "coordinate", "input"), ("W", "coordinate", "disturbance"), ("A", "state", "state"),
     ("B", "state", "input"), ("B_disturbances", "state", "disturbance"),
 )  # fmt: skip
@@ -32,7 +33,7 @@ def names(linear: StateSpace) -> dict[str, tuple[str, ...]]:
     """Names along each dimension."""
     return {
         "coordinate": linear.coordinates, "state": linear.states, "input": linear.inputs,
-        "disturbance": linear.disturbances,
+        "disturbance": linear.disturbances, "drive": linear.driven,
     }  # fmt: skip
 
 
@@ -43,6 +44,7 @@ def dictionary(linear: StateSpace) -> dict[str, Any]:
         "t": state.t, "q": state.q.tolist(), "u": state.u.tolist(),
         "coordinates": list(linear.coordinates), "units": list(linear.units),
         "inputs": list(linear.inputs), "disturbances": list(linear.disturbances),
+        "driven": list(linear.driven),
         **{key: getattr(linear, key).tolist() for key, _, _ in MATRICES},
     }  # fmt: skip
 

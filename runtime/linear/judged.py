@@ -12,6 +12,7 @@ from mstmm.arrays import Array
 from ..engine.sizes import speed_sizes
 from ..run.system import SceneSystem
 from .matrices import State, matrices
+from .output.outputs import left_out
 
 if TYPE_CHECKING:
     from .equations import Equations
@@ -47,6 +48,8 @@ def warnings_of(linear: Equations, found: Modes) -> Iterator[str]:
             f'controller "{one.name}" is left out: its inputs ({_some(list(one.outputs))}) stand '
             "still at the values of the scene"
         )
+    for name, why in left_out(linear):
+        yield f"output {name} is not among the outputs: {why}"
     if linear.model.packed.system.timed:
         yield f"what acts goes by time: the model is that of t = {linear.state.t:g} s"
     growing = found.eigenvalues.real.max(initial=0)

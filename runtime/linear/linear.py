@@ -66,10 +66,12 @@ class Linear(StateSpace):
         O(bodies) a frequency.
 
         `inputs` are names as of `Model.linearize`: those of v where none are named, of w where
-        there are no v.  `outputs` are coordinates ("shoulder.angle"; all of them where none are
-        named), their rates ("shoulder.angle_rate"), and motions of bodies and ends in inertial axes
-        ("boom.tip.position.y", "boom.tip.vy", "boom.tip.angular_velocity.z"), beside the state and,
-        under accelerations of the ground, relative to it.
+        there are no v.  `outputs` are coordinates ("shoulder.angle"), their rates
+        ("shoulder.angle_rate"), motions of bodies and ends in inertial axes ("boom.tip.position.y",
+        "boom.tip.vy", "boom.tip.angular_velocity.z"), "strut.length" and "strut.effort" of springs,
+        and outputs of the scene, expressions too; beside the state and, under accelerations of the
+        ground, relative to it.  Where none are named they are the outputs of the scene, or all
+        coordinates.
 
         Two kinds of damping join what the scene has.  `structural` are loss factors eta: stiffness
         k of laws, springs and shapes becomes k (1 + i eta), of all of them or by the names of
@@ -102,11 +104,11 @@ class Linear(StateSpace):
         return tuple(warnings_of(self, self.modes()))
 
     def output_matrices(self, outputs: Sequence[str] | None = None) -> tuple[Array, Array]:
-        """C (outputs, 2 n) and D (outputs, inputs) of y = C (x, x') + D v; `outputs` as
-        `frequency_response` names them, all coordinates unless given."""
+        """C (outputs, states) and D (outputs, inputs) of y = C z + D v; `outputs` as
+        `frequency_response` takes them."""
         from .control import output_matrices
 
-        return output_matrices(self, outputs, self.B)[1:]
+        return output_matrices(self, outputs, self.controls, self.B)[1:]
 
     def to_control(self, outputs: Sequence[str] | None = None, disturbances: bool = False) -> Any:
         """`control.StateSpace` of python-control (extra control), its signals named, with _ for

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mstmm.arrays import Array, real
 from mstmm.errors import SceneError
 
+from ..engine.sizes import scene_length
 from . import files, shares
 
 if TYPE_CHECKING:
@@ -78,6 +79,12 @@ class Modes:
         return np.real(np.einsum("ik,ik->k", np.conj(self.shapes), moved))
 
     @cached_property
+    def _lengths(self) -> Array:
+        """(n,) what a unit of each coordinate counts beside others: m, of rad as a length."""
+        turns = [unit == "rad" for unit in self.linear.units]
+        return np.where(turns, scene_length(self.linear.model), 1.0)
+
+    @cached_property
     def participation(self) -> NDArray[Any]:
         """(k, disturbances): how much of each shape a unit of each disturbance excites, x* W over
         the modal mass; of accelerations of the ground the participation factors, with their sign
@@ -112,8 +119,11 @@ class Modes:
         return self.shapes[:, k]
 
     def moving(self, k: int) -> list[str]:
-        """Coordinates that move most in shape k, a tenth of the largest and more, largest first."""
-        size = np.abs(self._shape(k))
+        """Coordinates that move most in shape k, a tenth of the largest and more, largest first.
+
+        A radian counts as a length of the scene.
+        """
+        size = np.abs(self._shape(k)) * self._lengths
         places = np.flatnonzero(size > 0.1 * size.max(initial=0))
         order = places[np.argsort(-size[places], kind="stable")]
         return [self.linear.coordinates[j] for j in order]

@@ -26,8 +26,10 @@ from .channels import Channel, channel, columns, some_names
 from .harmonic.exact import Chosen, ExactBeams, exact_beams, refuse_inner
 from .harmonic.losses import Losses, stiffer
 from .harmonic.prescribed import Ratios, modal_damping
-from .harmonic.refused import given, refuse_in_motion, refuse_ratios
-from .outputs import Output, outputs_of, rows_of
+from .harmonic.refused import given, refuse_drives, refuse_in_motion, refuse_ratios
+from .output.outputs import outputs_of, read_by, rows_of
+from .output.seen import Seen
+from .pushed import Pushed
 
 if TYPE_CHECKING:
     from .equations import Equations
@@ -160,11 +162,12 @@ def frequency_response(
     if exact is not False:
         refuse_ratios(modal)
         beams = exact_beams(linear, exact, structural)
-        refuse_inner(beams, [*(inputs or ()), *(outputs or ())])
+        refuse_inner(beams, [*(inputs or ()), *read_by(linear, outputs)])
         linear = beams.linear
-        if outputs is None:
+        if outputs is None and not linear.model.scene.output:
             outputs = [name for name in linear.coordinates if not beams.named(name)]
     pushes = _pushes(linear, inputs)
+    refuse_drives(pushes, beams is not None or given(structural))
     shown = outputs_of(linear, None if outputs is None else some_names("outputs", outputs))
     values = _Sweep(linear, pushes, shown, structural, modal, beams).values(frequencies)
     return FrequencyResponse(
@@ -211,7 +214,7 @@ class _Sweep:
     """The response of some outputs to some pushes, s by s."""
 
     def __init__(
-        self, linear: Equations, pushes: Sequence[Channel], outputs: Sequence[Output],
+        self, linear: Equations, pushes: Sequence[Channel], outputs: Sequence[Seen],
         structural: Losses, modal: Ratios, beams: ExactBeams | None,
     ) -> None:  # fmt: skip
         engine, state, free = linear.model.looped, linear.state, list(linear.free)
@@ -223,12 +226,18 @@ class _Sweep:
             engine, state.t, state.q, state.u, state.a, stiffer=lossy,
             exact=None if beams is None else beams.bodies,
         )  # fmt: skip
-        efforts = _efforts(linear, pushes)
+        efforts = np.zeros((len(pushes), engine.nu))
+        efforts[:, free] = _efforts(linear, pushes).T
+        self.pushed = Pushed.of(linear, pushes, efforts)
+        self.columns, self.count = self.pushed.columns, len(self.pushed.columns)
         if self.modal is not None:
-            efforts = np.concatenate([efforts, self.modal.columns], axis=1)
-        self.pushes, self.columns = len(pushes), np.zeros((efforts.shape[1], engine.nu))
-        self.columns[:, free] = efforts.T
-        self.free, self.rows = free, rows_of(linear, outputs)
+            damping = np.zeros((self.modal.columns.shape[1], engine.nu))
+            damping[:, free] = self.modal.columns.T
+            self.columns = np.concatenate([self.columns, damping])
+        self.free, rows = free, rows_of(linear, outputs, pushes)
+        self.rows = {order: wide[:, free] for order, wide in rows.orders.items()}
+        self.carried = {order: self.pushed.carried(wide) for order, wide in rows.orders.items()}
+        self.through = rows.through
 
     def values(self, omega: Array) -> Complex:
         """(k, outputs, inputs) at angular frequencies (k,)."""
@@ -244,13 +253,16 @@ class _Sweep:
 
     def _at(self, s: Complex) -> tuple[Complex, Array, NDArray[np.int32]]:
         x, growth, grown = self.response.amplitudes(s, self.columns)
-        moved = x[:, : self.pushes, self.free]
+        moved = x[:, : self.count, self.free]
         if self.modal is not None:
-            moved = self.modal.damp(s, moved, x[:, self.pushes :, self.free])
-        found = np.zeros((len(s), self.rows.shape[1], self.pushes), dtype=np.complex128)
-        for order, rows in enumerate(self.rows):
-            if rows.any():
-                found += s[:, None, None] ** order * (rows @ moved.swapaxes(1, 2))
+            moved = self.modal.damp(s, moved, x[:, self.count :, self.free])
+        found = np.zeros((len(s), *self.through.shape), dtype=np.complex128)
+        found += self.through
+        for order, rows in self.rows.items():
+            answers = rows @ moved.swapaxes(1, 2)
+            found += s[:, None, None] ** order * self.pushed.summed(s, answers)
+            for j, (power, column) in self.carried[order].items():
+                found[:, :, j] += s[:, None] ** (order + power) * column
         growth[~np.isfinite(found).all(axis=(1, 2))] = np.inf
         return found, growth, grown
 

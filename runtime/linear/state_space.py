@@ -2,26 +2,55 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
 from mstmm.arrays import Array
 
+from .channels import Channel
 from .equations import Equations
 
 
 class StateSpace(Equations):
-    """d/dt (x, x') = A (x, x') + B v + B_disturbances w; see `Equations`."""
+    """d/dt z = A z + B v + B_disturbances w of z = (x, x'), and d, d' of the drives behind them
+    whose accelerations are inputs; see `Equations`."""
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Names of the state (x, x')."""
-        return (*self.coordinates, *(f"{name}'" for name in self.coordinates))
+        """Names of the state (x, x'), or (x, x', d, d')."""
+        parts = self.coordinates, self.driven
+        return tuple(f"{name}{rate}" for names in parts for rate in ("", "'") for name in names)
+
+    @property
+    def positions(self) -> list[int]:
+        """Places of x and d in the state."""
+        n, k = len(self), len(self.drives)
+        return [*range(n), *range(2 * n, 2 * n + k)]
+
+    @property
+    def velocities(self) -> list[int]:
+        """Places of x' and d' in the state."""
+        n, k = len(self), len(self.drives)
+        return [*range(n, 2 * n), *range(2 * n + k, 2 * n + 2 * k)]
 
     @cached_property
     def A(self) -> Array:
-        """(2 n, 2 n): d/dt (x, x') = A (x, x') + B v."""
+        """(2 n + 2 k, 2 n + 2 k) with k drives."""
+        if not self.drives:
+            return self._undriven
+        found = np.zeros((len(self.states), len(self.states)))
+        found[self.positions, self.velocities] = 1.0
+        n = len(self)
+        found[: 2 * n, : 2 * n] = self._undriven
+        both = np.hstack([self.K_driven, self.C_driven])
+        found[n : 2 * n, 2 * n :] = -np.linalg.solve(self.M, both)
+        return found
+
+    @property
+    def _undriven(self) -> Array:
+        """(2 n, 2 n): d/dt (x, x') where drives stand still."""
         if self.about is not None:
             found = self.model.slopes.state_matrix(self.about, self.turning is not None)
             if found is not None:
@@ -32,10 +61,19 @@ class StateSpace(Equations):
 
     @cached_property
     def B(self) -> Array:
-        """(2 n, inputs)."""
-        return np.vstack([np.zeros_like(self.V), np.linalg.solve(self.M, self.V)])
+        """(2 n + 2 k, inputs)."""
+        return self._pushing(self.controls, self.V)
 
     @cached_property
     def B_disturbances(self) -> Array:
-        """(2 n, disturbances): what w adds."""
-        return np.vstack([np.zeros_like(self.W), np.linalg.solve(self.M, self.W)])
+        """(2 n + 2 k, disturbances): what w adds."""
+        return self._pushing(self.others, self.W)
+
+    def _pushing(self, pushes: Sequence[Channel], efforts: Array) -> Array:
+        found = np.zeros((len(self.states), len(pushes)))
+        n, k = len(self), len(self.drives)
+        found[n : 2 * n] = np.linalg.solve(self.M, efforts)
+        for j, one in enumerate(pushes):
+            for speed, factor in one.moves:
+                found[2 * n + k + self.drives.index(speed), j] = factor
+        return found

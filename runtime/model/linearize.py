@@ -12,7 +12,7 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
 from ..engine.sizes import speed_sizes
-from ..linear.channels import GROUND, Channel, channel, names_of
+from ..linear.channels import GROUND, Channel, inputs_of, pushes_of
 from ..linear.linear import Linear
 from ..linear.matrices import State, matrices
 from ..run.start import initial_state
@@ -45,13 +45,15 @@ class Linearising:
         q: Array | None,
         u: Array | None,
         t: float,
-        inputs: Sequence[str],
+        inputs: Sequence[str] | None,
         disturbances: Sequence[str] | None,
     ) -> Linear:
         """See `Model.linearize`."""
-        pushes, others = self._channels("inputs", inputs), self._ground
+        pushes, others = self._inputs, self._ground
+        if inputs is not None:
+            pushes = pushes_of(self._model, "inputs", inputs)
         if disturbances is not None:
-            others = self._channels("disturbances", disturbances)
+            others = pushes_of(self._model, "disturbances", disturbances)
         q, u = self._state(q, u, t)
         model, about = self._model, self._model.slopes.at(t, q, u)
         if about is None:
@@ -60,14 +62,13 @@ class Linearising:
         turning = None if self._straight or not u.any() else about.G
         return Linear(model, State(t, q, u, about.a), pushes, others, turning, about)
 
-    def _channels(self, what: str, names: Sequence[str]) -> tuple[Channel, ...]:
-        if type(names) is tuple and not names:  # as most calls have it: nothing to be checked
-            return ()
-        return tuple(channel(self._model, name) for name in names_of(what, names))
+    @cached_property
+    def _inputs(self) -> tuple[Channel, ...]:
+        return pushes_of(self._model, "inputs", inputs_of(self._model))
 
     @cached_property
     def _ground(self) -> tuple[Channel, ...]:
-        return self._channels("disturbances", GROUND)
+        return pushes_of(self._model, "disturbances", GROUND)
 
     def _state(self, q: Array | None, u: Array | None, t: float) -> tuple[Array, Array]:
         """The state that is given with its drives, or rest."""

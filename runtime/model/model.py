@@ -182,17 +182,18 @@ class Model(Compiled):
         u: ArrayLike | None = None,
         t: float = 0.0,
         *,
-        inputs: Sequence[str] = (),
+        inputs: Sequence[str] | None = None,
         disturbances: Sequence[str] | None = None,
     ) -> Linear:
         """M x'' + C x' + K x = V v + W w near a state: at rest where nothing is given, else near
         `q` (nq,) and `u` (nu,; 0, or the scene's start q where only u is given) at time t (s).
 
-        `inputs` name v and `disturbances` w: efforts of hinges ("shoulder.effort"), forces and
-        moments at ends in inertial axes ("boom.tip.force.x", "boom.tip.mz"), accelerations of the
-        ground ("ground.acceleration.y"; all three are w where nothing is named), inputs of the
-        scene that nothing is driven by.  Coordinates that a drive imposes are left out; the others
-        move along with it.  Exact, no differences.
+        `inputs` name v and `disturbances` w: efforts of hinges and springs ("shoulder.effort"),
+        forces and moments at ends in inertial axes ("boom.tip.force.x", "boom.tip.mz"),
+        accelerations of the ground ("ground.acceleration.y"; all three are w where nothing is
+        named), inputs of the scene that nothing is driven by (all are v where nothing is named).
+        Coordinates that a drive imposes are left out; the others move along with it.  Exact, no
+        differences.
 
         Raises SceneError for a name or shape that does not fit, NumericalFailure where there is no
         equilibrium near the scene's start or the state has no accelerations.
@@ -250,7 +251,8 @@ class Model(Compiled):
         exact: Chosen = False,
     ) -> FrequencyResponse:
         """Amplitudes of outputs under harmonic inputs at omega (k,) in rad/s, near rest at `q`, or
-        at the equilibrium.  See `Linear.frequency_response`; without `inputs` the ground moves."""
+        at the equilibrium.  See `Linear.frequency_response`; without `inputs` those of the
+        scene push, else the ground moves."""
         return self.linearize(q, None, t).frequency_response(
             omega, inputs, outputs, structural=structural, modal=modal, exact=exact
         )

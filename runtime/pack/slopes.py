@@ -11,7 +11,7 @@ import math
 import re
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,20 +83,27 @@ def refuse_folded(scene: Scene, names: Sequence[str], lacking: str) -> None:
     """Named constants, and numbers that go into the shapes of flexible bodies, by quadrature and
     eigenvalues, and names that the scene does not have: SceneError, which says what they are
     `lacking` and what to do instead."""
-    flexible = {body.name for body in (*scene.beam, *scene.elastic)}
-    for name in parameters.resolved(scene, names):
+    for name in folded(scene, parameters.resolved(scene, names)):
         if name.startswith("constants."):
             raise SceneError(
                 f'parameter "{name}": named constants go into numbers and expressions before they '
                 f"reach the kernels, and have no {lacking} (with_parameters)"
             )
-        owner, _, rest = name.partition(".")
-        spread = rest.startswith(("force_per_length", "span"))
-        if owner in flexible or spread:
-            raise SceneError(
-                f'parameter "{name}": numbers of flexible bodies, and of loads along them, have no '
-                f"{lacking} (with_parameters)"
-            )
+        raise SceneError(
+            f'parameter "{name}": numbers of flexible bodies, and of loads along them, have no '
+            f"{lacking} (with_parameters)"
+        )
+
+
+def folded(scene: Scene, names: Iterable[str]) -> list[str]:
+    """Those of full names that `refuse_folded` refuses."""
+    flexible = {body.name for body in (*scene.beam, *scene.elastic)}
+    along = ("force_per_length", "span")
+    parted = ((name, *name.partition(".")[::2]) for name in names)
+    return [
+        name for name, owner, rest in parted
+        if owner in flexible or owner == "constants" or rest.startswith(along)
+    ]  # fmt: skip
 
 
 def _check(plain: Sequence[float], found: Sequence[float]) -> None:

@@ -34,6 +34,7 @@ from .flexible.names import add_body
 from .names import Quantity, Table, Values
 from .observed import quaternions
 from .outputs import component_of, one_quantity, quantity_of
+from .springs import add_spring
 
 if TYPE_CHECKING:
     from .flexible.quantities import FlexibleResults
@@ -49,7 +50,8 @@ RATES = {
 class Quantities:
     """Every quantity of a run by its name, from the states and what they show.
 
-    Names are made per owner, a hinge, a body, an end or the scene (""), when they are asked for.
+    Names are made per owner, a hinge, a body, an end, a spring or the scene (""), when they are
+    asked for.
     """
 
     def __init__(self, observed: Observed, flexible: FlexibleResults) -> None:
@@ -58,6 +60,7 @@ class Quantities:
         self.layout = observed.engine.packed.layout
         self._orientations: dict[str, Array] = {}
         self._tables: dict[str, Table] = {}
+        self._springs = {one.name: one for one in observed.references.scene.spring}
 
     # --- of bodies ------------------------------------------------------------------------------
 
@@ -145,9 +148,10 @@ class Quantities:
         return [one.name for one in self.observed.references.scene.output if one.name in there]
 
     def owners(self) -> Iterator[str]:
-        """Hinges, bodies and ends, and the scene itself."""
+        """Hinges, bodies and ends, springs, and the scene itself."""
         yield from self.layout.hinges
         yield from self.observed.references
+        yield from self._springs
         yield ""
 
     def of(self, owner: str) -> Table:
@@ -156,15 +160,18 @@ class Quantities:
             table = Table({}, [])
             if owner in self.layout.hinges and owner not in self.layout.modal:
                 self._hinge(table, self.layout.hinges[owner])
-            elif owner:
+            elif owner in self.observed.references:
                 self._body(table, owner)
-            else:
+            elif not owner:
                 self._scene(table)
+            if owner in self._springs:
+                add_spring(table, self.observed, self._springs[owner])
             self._tables[owner] = table
         return self._tables[owner]
 
     def _owns(self, owner: str) -> bool:
-        return owner in self.layout.hinges or owner in self.observed.references
+        known = self.layout.hinges, self.observed.references, self._springs
+        return any(owner in owners for owners in known)
 
     def _body(self, table: Table, reference: str) -> None:
         for kind, about in BODY.items():

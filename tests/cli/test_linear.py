@@ -49,6 +49,26 @@ def test_answers_are_told_drawn_and_written(mstmm: Command, folder: Path) -> Non
     assert data["frequency"] == pytest.approx([0.1, 7.0]) and len(data["inputs"]) == 3
 
 
+def test_inputs_and_outputs_of_the_scene_are_meant(mstmm: Command, folder: Path) -> None:
+    text = (folder / "pendulum.toml").read_text()
+    more = """[[load]]
+on = "rod.tip"
+force = ["wind", 0, 0]
+[[input]]
+name = "wind"
+unit = "N"
+[[output]]
+name = "swing"
+of = "pivot.angle/deg"
+unit = "deg"
+"""
+    (folder / "blown.toml").write_text(f"{text}\n{more}")
+    done = mstmm("frf", "blown.toml", "--points", "2")
+    assert done.code == 0, done.err
+    assert "swing" in done.out and "wind" in done.out and "deg / N" in done.out
+    assert "inputs 1" in mstmm("linearize", "blown.toml").out
+
+
 @pytest.mark.parametrize("command", ["modes", "linearize"])
 def test_pictures_of_both(mstmm: Command, folder: Path, command: str) -> None:
     pytest.importorskip("matplotlib")

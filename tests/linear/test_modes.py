@@ -316,3 +316,20 @@ def test_a_buckled_column_is_found_where_its_frequency_vanishes() -> None:
     ]
     load = 2.0 + 0.4 * squares[0] / (squares[0] - squares[1])
     assert load == pytest.approx(np.pi**2 / 4, rel=1e-3)
+
+
+def test_metres_and_radians_are_compared_by_sizes() -> None:
+    """A cart on a soft spring with a bob on 1 cm: the bob turns by eleven radians a metre, which is
+    little beside a metre of a scene that is as small as that."""
+    scene = mstmm.Scene(
+        gravity=(0, -9.81, 0),
+        body=[{"name": "cart", "mass": 1.0, "inertia": [1, 1, 1]},
+              {"name": "bob", "mass": 1e-6, "center_of_mass": [0, -0.01, 0]}],
+        hinge=[{"name": "rail", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
+                "outboard": "cart", "law": {"stiffness": 100.0}},
+               {"name": "pin", "type": "pin", "inboard": "cart", "outboard": "bob"}],
+    )  # fmt: skip
+    modes = mstmm.compile(scene, engine="looped").modes()
+    assert abs(modes.shapes[1, 0] / modes.shapes[0, 0]) == pytest.approx(11.35, rel=1e-2)
+    assert modes.moving(0) == ["rail.displacement", "pin.angle"]
+    assert modes.moving(1) == ["pin.angle"]

@@ -323,3 +323,16 @@ def test_a_model_made_by_hand_has_no_derivation() -> None:
     linear = Model(pendulum(1).scene).linearize()
     with pytest.raises(EnvironmentFailure, match=r"without the means"):
         linear.symbolic(["rod1.mass"])
+
+
+def test_what_cannot_be_kept_is_not_suggested() -> None:
+    rod = {"name": "rod1", "mass": 1.0, "center_of_mass": [0, -0.5, 0], "inertia": [1, 1, 1]}
+    pin = {"name": "pin1", "type": "pin", "inboard": "ground", "outboard": "rod1",
+           "law": {"stiffness": "stiff"}}  # fmt: skip
+    scene = mstmm.Scene(gravity=(0, -9.81, 0), body=[rod], hinge=[pin], constants={"stiff": 2.0})
+    linear = mstmm.compile(scene).linearize()
+    with pytest.raises(SceneError, match='keep "stiff": expected') as refused:
+        linear.symbolic(keep=["stiff"])
+    assert "constants" not in str(refused.value)
+    with pytest.raises(SceneError, match="named constants go into numbers"):
+        linear.symbolic(keep=["constants.stiff"])

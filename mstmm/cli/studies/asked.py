@@ -61,7 +61,7 @@ class Asked:
         use_files(self.hinge or [])
         model = _changed(self.scene, self.change or [])
         state = model.initial_state() if self.at_start else (None, None)
-        return model.linearize(*state, inputs=inputs or [])
+        return model.linearize(*state, inputs=inputs or None)
 
     def _file(self) -> Path | None:
         return _checked(self.output, _ENDINGS, "--output")

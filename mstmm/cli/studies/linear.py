@@ -27,7 +27,8 @@ def linearize(
     inputs: Annotated[
         list[str] | None,
         typer.Option("--input", "-i", metavar="NAME", help="Where it is pushed: shoulder.effort, "
-                     "boom.tip.force.x, boom.tip.mz; may be repeated."),
+                     "strut.effort, boom.tip.force.x, boom.tip.mz, an input of the scene; may be "
+                     "repeated.  The inputs of the scene unless given."),
     ] = None,
     at_start: AtStart = False,
     change: Set = None,
@@ -108,14 +109,16 @@ def frf(
     inputs: Annotated[
         list[str] | None,
         typer.Option("--input", "-i", metavar="NAME", help="Where it is pushed: shoulder.effort, "
-                     "boom.tip.force.x, ground.acceleration.y; may be repeated. The ground's "
-                     "accelerations unless given."),
+                     "boom.tip.force.x, ground.acceleration.y, road.displacement of a drive, an "
+                     "input of the scene; may be repeated.  The inputs of the scene unless given, "
+                     "the ground's accelerations where it has none."),
     ] = None,
     outputs: Annotated[
         list[str] | None,
         typer.Option("--quantity", "-q", metavar="NAME", help="What answers: shoulder.angle, "
-                     "boom.tip.position.y, boom.tip.ay; may be repeated. All coordinates unless "
-                     "given."),
+                     "boom.tip.position.y, boom.tip.ay, strut.length, an output of the scene; may "
+                     "be repeated.  The outputs of the scene unless given, all coordinates where "
+                     "it has none."),
     ] = None,
     least: Annotated[
         float, typer.Option("--from", metavar="HZ", parser=positive, help="Lowest frequency, Hz.")
@@ -157,11 +160,11 @@ def frf(
     if not most > least:
         raise MstmmError(f"--from {least:g} --to {most:g}: expected a range that rises")
     asked = Asked(scene, at_start, change, output, plot, hinge, json)
-    linear = asked.linear(inputs)
+    linear = asked.linear(None)
     omega = 2 * np.pi * np.geomspace(least, most, points)
     ratios: list[float] = modal or [0.0]
     found = linear.frequency_response(
-        omega, outputs=outputs, structural=_losses(structural or []),
+        omega, inputs or None, outputs or None, structural=_losses(structural or []),
         modal=ratios[0] if len(ratios) == 1 else ratios,
         exact=True if exact == ["all"] else exact or False,
     )  # fmt: skip

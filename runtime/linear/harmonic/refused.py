@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from mstmm.errors import SceneError
@@ -10,6 +11,7 @@ from .losses import Losses
 from .prescribed import Ratios
 
 if TYPE_CHECKING:
+    from ..channels import Channel
     from ..equations import Equations
 
 
@@ -33,4 +35,14 @@ def refuse_ratios(modal: Ratios) -> None:
         raise SceneError(
             "modal: ratios are those of natural motions by shapes, which exact beams do not have; "
             "give structural, or leave the shapes"
+        )
+
+
+def refuse_drives(pushes: Sequence[Channel], changed: bool) -> None:
+    """SceneError for motions of drives where stiffness or inertia is not that of the matrices."""
+    moved = next((one.name for one in pushes if one.moves), "")
+    if changed and moved:
+        raise SceneError(
+            f'"{moved}": motions of drives do not go with structural damping and exact beams; '
+            "leave these out, or push by an acceleration of the ground"
         )
