@@ -70,6 +70,22 @@ class Plan:
         """The sum of m^2 + 3 m over all hinges with m pending rows, which the tree makes least."""
         return sum(map(work_of, self.pending_rows))
 
+    def loop(self, cut: int) -> tuple[int, ...]:
+        """The hinges around the loop that a cut hinge closes, in the order in which they follow
+        each other, itself first."""
+        hinges = self.mechanism.hinges
+        ways: list[list[int]] = []
+        for body in (hinges[cut].outboard, hinges[cut].inboard):
+            ways.append([])
+            while body != GROUND:
+                ways[-1].append(self.tree[body])
+                body = hinges[self.tree[body]].inboard
+        outboard, inboard = ways
+        while outboard and inboard and outboard[-1] == inboard[-1]:
+            outboard.pop()
+            inboard.pop()
+        return (cut, *outboard, *reversed(inboard))
+
     @cached_property
     def blocks(self) -> tuple[tuple[int, int], ...]:
         """Pairs of groups whose block of L is not zero, (group, group) among them, each pair in

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from mstmm.errors import SceneError
 from mstmm.expression.expression import Expression
 from mstmm.ir import Port
 from mstmm.scene import Scene, split
@@ -44,6 +45,25 @@ def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) 
     return expanded
 
 
+def _refuse_loops(scene: Scene) -> None:
+    """SceneError for what closes a loop, which is read and checked but not compiled yet."""
+    skeleton = scene.skeleton
+    plan = build(skeleton).plan
+    if plan is None:
+        return
+    if plan.cut:
+        around = plan.loop(plan.cut[0])
+        names = " - ".join(skeleton.hinges.name(hinge) for hinge in around[:8])
+        what = f'loop "{names}{" ..." if len(around) > 8 else ""}": closed loops'
+    else:
+        table = "constraint" if scene.constraint else "coupling"
+        what = f'{table} "{getattr(scene, table)[0].name}": constraints and couplings'
+    raise SceneError(
+        f"scene: {what} are read and checked, but not compiled yet; leave it out, or put a stiff "
+        "[[spring]] in its place"
+    )
+
+
 def system_of(
     scene: Scene,
     known: Known | None = None,
@@ -60,6 +80,7 @@ def system_of(
 
     Raises SceneError for hinges that do not form a tree or types that nobody defines.
     """
+    _refuse_loops(scene)
     expanded, elements = expansion_of(scene, flexible), Elements(known or {})
     nodes, tree = expanded.scene, build(expanded.scene)
     releases = {name: i for i, name in enumerate(releasable(scene))}
