@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from ...expression.expression import Expression
 from ...risk import Risk
+from ..rules.inertia import negative_moment, triangle_excess
 from ..rules.messages import MAX_PROBLEMS, TABLES, Problem, near
 from ..rules.values import GROUND, Location, split
-from ..tables.inertia import negative_moment, triangle_excess
 from . import constraints, couplings, inputs, topology
 from . import flexible as flexible_bodies
 from .angles import notes
