@@ -93,6 +93,31 @@ def test_members_of_a_chain_may_carry_what_closes_a_loop() -> None:
     assert sorted(tree.order) == list(range(len(scene.bodies)))
 
 
+def boomed(*hinges: Data, **changes: Any) -> Data:
+    """A beam that the ground holds at its root and these hinges hold too."""
+    return {"gravity": [0, 0, 0], "beam": [beam("boom", **changes)],
+            "hinge": [hinge("root", outboard="boom.root"), *hinges]}  # fmt: skip
+
+
+def test_the_frame_of_a_beam_in_a_loop_is_judged_by_the_hinge_of_the_tree() -> None:
+    grip = {"type": "fixed", "outboard": "boom.tip"}
+    for cut, warned in ((False, True), (True, False)):
+        data = boomed(hinge("grip", cut=not cut, **grip), frame="tangent")
+        data["hinge"][0]["cut"] = cut
+        kept = [risk for risk in Scene(**data).risks if risk.name == "frame"]
+        assert bool(kept) == warned
+
+
+def test_a_beam_may_spin_only_if_all_that_hold_it_let_it() -> None:
+    spin = {"axis": [1, 0, 0]}
+    data = boomed(hinge("grip", outboard="boom.tip", type="ball"))
+    data["hinge"][0] |= spin
+    with pytest.raises(SceneError, match='hinge "root" lets the beam spin about its axis'):
+        Scene(**data)
+    data["hinge"][1]["type"] = "fixed"
+    assert Scene(**data).beam[0].polar_inertia_per_length is None
+
+
 def test_what_else_closes_is_counted_behind_the_hinges() -> None:
     data = four_bar(knee={"type": "universal", "axis2": [0, 1, 0]})
     data["constraint"] = [{"type": "distance", "from": "a.tip", "to": "ground", "length": 2}]

@@ -21,6 +21,7 @@ from .joints import Joints
 
 if TYPE_CHECKING:
     from ..tables.all import SceneTables
+    from ..tables.hinge import Hinge
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +180,14 @@ def build(scene: SceneTables) -> Topology:
         tables = {"body": scene.body, "hinge": scene.hinge, "chain": scene.chain}
         raise report(list(tree.problems(joints)), tables, "scene")
     return found
+
+
+def holders(scene: SceneTables) -> dict[str, Hinge]:
+    """Per name of a body the hinge of the tree that holds it; of a scene whose tree there is."""
+    skeleton = scene.skeleton
+    loops = len(skeleton.hinge) > len(skeleton.body)  # every body is held
+    cut = set(build(skeleton).cut) if loops else set()
+    return {h.outboard_body: h for number, h in enumerate(scene.hinge) if number not in cut}
 
 
 def problems(scene: SceneTables) -> Iterator[Problem]:
