@@ -8,14 +8,16 @@ basis problem, 2009).
 
 from __future__ import annotations
 
+from itertools import accumulate
+
 from .growing import Tree, at_random, breadth_first, depth_first
 from .mechanism import Mechanism
 from .paths import work
 from .swaps import swapped
 
-#: Up to so many cuts every start is improved; beyond, only the best of the starts.
-_FEW = 60
 _RANDOM_STARTS = 6
+#: Work of all the starts that are improved, but for the first: a second or so.
+_AFFORDABLE = 20_000_000
 
 
 def chosen(mechanism: Mechanism) -> Tree:
@@ -28,8 +30,8 @@ def chosen(mechanism: Mechanism) -> Tree:
         return starts[0]
     starts.append(depth_first(mechanism))
     starts += (at_random(mechanism, seed) for seed in range(_RANDOM_STARTS))
-    starts = list(dict.fromkeys(starts))
-    if len(mechanism.hinges) - mechanism.bodies > _FEW:
-        starts = [min(starts, key=lambda tree: work(mechanism, tree))]
-    return min((swapped(mechanism, tree) for tree in starts),
-               key=lambda tree: (work(mechanism, tree), tree))  # fmt: skip
+    by_work = sorted((work(mechanism, tree), tree) for tree in set(starts))
+    sums = accumulate(cost for cost, _ in by_work)
+    tried = [tree for (_, tree), total in zip(by_work, sums, strict=True) if total <= _AFFORDABLE]
+    improved = (swapped(mechanism, tree) for tree in tried or [by_work[0][1]])
+    return min(improved, key=lambda tree: (work(mechanism, tree), tree))

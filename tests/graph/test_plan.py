@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import random
 from fractions import Fraction
+from functools import partial
 
 import pytest
+from support.work import calls
 
 from mstmm.graph.degree import eliminated
 from mstmm.graph.mechanism import GROUND, Edge, Mechanism, Rows
@@ -128,3 +130,9 @@ def test_a_cut_hinge_without_rows_needs_no_closing() -> None:
 def test_a_tree_has_nothing_to_close() -> None:
     plan = planned(pins(3, [(GROUND, 0), (0, 1), (0, 2)]))
     assert (plan.rows, plan.front, plan.work, plan.blocks) == (0, 0, 0, ())
+
+
+def test_a_plan_of_ten_times_the_loops_takes_ten_times_the_work() -> None:
+    for build in (four_bars, scissors, ladder):
+        few, many = (calls(partial(planned, build(count))) for count in (30, 300))
+        assert many < 12 * few
