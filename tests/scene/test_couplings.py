@@ -33,9 +33,9 @@ def test_coordinates_go_by_number_or_by_their_own_name() -> None:
 
 
 def test_speeds_may_have_factors_that_depend_on_coordinates() -> None:
-    rows = ({"speeds": "cos(shoulder.q)*wrist.u[2] - elbow.u[0]/(2 + elbow.q[0])", "equals": "t"},
-            {"speeds": "shoulder.u - 2*elbow.u[1]"})  # fmt: skip
-    scene = Scene(**coupled(*rows))
+    rolling = {"speeds": "cos(shoulder.q)*wrist.u[2] - elbow.u[0]/(2 + elbow.q[0])", "equals": "t"}
+    others = ("shoulder.u - 2*elbow.u[1]", "wrist.q[0]*wrist.u[0]")
+    scene = Scene(**coupled(rolling, *({"speeds": row} for row in others)))
     assert scene.coupling[0].equals is not None
     assert coordinate(scene, scene.coupling[0].names[1]) == (2, "u", 2)
 
@@ -48,7 +48,7 @@ def test_speeds_may_have_factors_that_depend_on_coordinates() -> None:
         ({"expression": "2"}, "found '2', which is one number"),
         ({"expression": "shoulder.q + t"},
          "'t' is no coordinate of a hinge; what goes by time belongs to equals"),
-        ({"expression": "q"}, "'q' needs the name of a hinge here, as in shoulder.q"),
+        ({"expression": "q"}, "'q' is no coordinate; write the name of a hinge and .q or .u"),
         ({"expression": "knee.q"}, "there is no hinge 'knee'"),
         ({"expression": "shoulder.u"}, "'shoulder.u' is a speed; write speeds in place of"),
         ({"expression": "shoulder.length"},

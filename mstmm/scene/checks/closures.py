@@ -28,8 +28,9 @@ def rows_of_closures(scene: SceneTables) -> Iterator[Rows]:
     for constraint in scene.constraint:
         yield _row(scene, (constraint.from_, constraint.to))
     for coupling in scene.coupling:
-        hinges = dict.fromkeys(coordinate(scene, name)[0] for name in coupling.names)
-        joined = (scene.hinges[hinge] for hinge in hinges)
+        joined = (
+            scene.hinges.by_name[name] for name in dict.fromkeys(n.hinge for n in coupling.names)
+        )
         yield _row(scene, [end for hinge in joined for end in (hinge.inboard, hinge.outboard)])
 
 

@@ -24,18 +24,24 @@ if TYPE_CHECKING:
 
 
 def problems(scene: SceneTables) -> Iterator[Problem]:
-    """Everything for which a coupling is no row."""
+    """Everything for which a coupling is no row, as far as the types of its hinges are known."""
     seen: dict[str, int] = {}
     for i, coupling in enumerate(scene.coupling):
-        key = "speeds" if coupling.expression is None else "expression"
-        place: Location = ("coupling", i, key)
+        place: Location = ("coupling", i, coupling.key)
         named = [(place, said) for name in coupling.names
-                 if (said := _unknown(scene, name, key)) is not None]  # fmt: skip
-        yield from named or ((place, said) for said in _no_row(scene, coupling) if said is not None)
+                 if (said := _unknown(scene, name, coupling.key)) is not None]  # fmt: skip
+        yield from named
+        if not named and _are_known(scene, coupling):
+            yield from ((place, said) for said in _no_row(scene, coupling) if said is not None)
         yield from _right_side(coupling, ("coupling", i, "equals"))
         first = seen.setdefault(coupling.row.text.replace(" ", ""), i)
         if first != i:
             yield place, f"coupling number {first + 1} couples the same; leave one out"
+
+
+def _are_known(scene: SceneTables, coupling: Coupling) -> bool:
+    """Whether all types of its hinges have been defined."""
+    return all(scene.hinges.by_name[name.hinge].facts is not None for name in coupling.names)
 
 
 def _right_side(coupling: Coupling, place: Location) -> Iterator[Problem]:
@@ -57,7 +63,7 @@ def _unknown(scene: SceneTables, name: Name, key: str) -> str | None:
     if name.text == "t" or name.text in scene.channels:
         return f"{name.text!r} is no coordinate of a hinge; what goes by time belongs to equals"
     if len(name.parts) == 1:
-        return f"{name.text!r} needs the name of a hinge here, as in shoulder.{name.text}"
+        return f"{name.text!r} is no coordinate; write the name of a hinge and .q or .u"
     if name.owner in flexible(scene):
         return f"{name.text!r} is no coordinate of a hinge, and couplings are of hinges alone"
     number = scene.hinges.find(name.hinge)
@@ -65,10 +71,10 @@ def _unknown(scene: SceneTables, name: Name, key: str) -> str | None:
         return scene.hinges.missing(name.hinge, repr(name.hinge))
     if key == "expression" and name.quantity == "u":
         return f"{name.text!r} is a speed; write speeds in place of expression"
-    return _no_entry(scene.hinges[number], name)
+    return _no_entry(scene.hinges[number], name, key)
 
 
-def _no_entry(hinge: Hinge, name: Name) -> str | None:
+def _no_entry(hinge: Hinge, name: Name, key: str) -> str | None:
     """Why a hinge has no such coordinate or speed."""
     facts = hinge.facts
     if facts is None:
@@ -86,7 +92,7 @@ def _no_entry(hinge: Hinge, name: Name) -> str | None:
     else:
         entry = own.index(name.quantity)
     first = facts.quaternion
-    if name.quantity != "u" and first is not None and first <= entry < first + 4:
+    if key == "expression" and first is not None and first <= entry < first + 4:
         return (
             f"{name.text!r} is an entry of a quaternion, which is no angle; use universal or "
             "gimbal hinges, or couple speeds"

@@ -94,10 +94,14 @@ class Coupling(Table):
         return self
 
     @property
+    def key(self) -> str:
+        """The key that has its row: "expression" of coordinates or "speeds"."""
+        return "speeds" if self.expression is None else "expression"
+
+    @property
     def row(self) -> Expression:
         """The expression that is kept, of coordinates or of speeds."""
-        row = self.speeds if self.expression is None else self.expression
-        assert row is not None
+        row: Expression = getattr(self, self.key)
         return row
 
     @property
