@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from mstmm.errors import SceneError
 from mstmm.expression.expression import Expression
 from mstmm.ir import Port
 from mstmm.scene import Scene, split
@@ -23,6 +22,9 @@ from .frames import Frames
 from .laws import laws_of
 from .letting_go import releasable
 from .slots import layout_of
+from .loops.closures import closures_of
+from .loops.opened import opened
+from .loops.refusal import refuse_unknown
 from .system import ForceNumbers, LoadNumbers, Numbers, System
 from .values import MOVING, Moving, Values, drive_kernel, effort_kernel
 
@@ -33,7 +35,9 @@ def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) 
     `flexible` are the numbers of all modal bodies where they are known already.
     """
     if not (scene.beam or scene.elastic):
-        return Expanded(scene, scene, {})
+        nodes, cuts = opened(scene)
+        return Expanded(nodes, scene, {}, cuts=cuts)
+    refuse_unknown(scene)
     from ..flexible.bodies import modal_bodies
     from .flexible.rigidified import rigidified
 
@@ -43,25 +47,6 @@ def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) 
     expanded.described, expanded.rigidified = scene, rigid
     expanded.nodes |= rigid.nodes
     return expanded
-
-
-def _refuse_loops(scene: Scene) -> None:
-    """SceneError for what closes a loop, which is read and checked but not compiled yet."""
-    skeleton = scene.skeleton
-    plan = build(skeleton).plan
-    if plan is None:
-        return
-    if plan.cut:
-        around = plan.loop(plan.cut[0])
-        names = " - ".join(skeleton.hinges.name(hinge) for hinge in around[:8])
-        what = f'loop "{names}{" ..." if len(around) > 8 else ""}": closed loops'
-    else:
-        table = "constraint" if scene.constraint else "coupling"
-        what = f'{table} "{getattr(scene, table)[0].name}": constraints and couplings'
-    raise SceneError(
-        f"scene: {what} are read and checked, but not compiled yet; leave it out, or put a stiff "
-        "[[spring]] in its place"
-    )
 
 
 def system_of(
@@ -80,7 +65,6 @@ def system_of(
 
     Raises SceneError for hinges that do not form a tree or types that nobody defines.
     """
-    _refuse_loops(scene)
     expanded, elements = expansion_of(scene, flexible), Elements(known or {})
     nodes, tree = expanded.scene, build(expanded.scene)
     releases = {name: i for i, name in enumerate(releasable(scene))}
@@ -102,7 +86,7 @@ def system_of(
         values.kernel() if len(values) else None,
         drive_kernel([drive for _, _, drive in driven], layout, ports) if driven else None,
         tuple((place, k) for place, k, _ in driven), tuple(scene.channels.values()),
-        _by_time(nodes), moving or {},
+        _by_time(nodes), moving or {}, tuple(closures_of(frames, runs)),
     )  # fmt: skip
     return system, frames
 

@@ -208,6 +208,19 @@ class ForceNumbers:
     effort: KernelIR | None
 
 
+@dataclass(frozen=True, slots=True)
+class ClosureNumbers:
+    """A hinge that closes a loop: the body without mass at place `frame` is to be where an end of
+    the body at place `outboard` is, its axes turned by `turn` (9) and its origin at `end` (3) in
+    that body's.  `directions` are those of the rows: 0 to 5, the hinge's speeds first."""
+
+    frame: int
+    outboard: int
+    turn: Numbers
+    end: Numbers
+    directions: tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class System:
     """A scene in internal frames.
@@ -216,7 +229,8 @@ class System:
     of each of `driven` (place of the body, coordinate).  `inputs` are inputs and signals over time,
     whose numbers expressions read; `by_time` says whether an effort or load names the time, or an
     input that does not stand still.  `moving` are the numbers in expressions that carry
-    derivatives, by their places in the port "moving".
+    derivatives, by their places in the port "moving".  `closures` are the hinges that close loops,
+    in the order in which those that end at one body are closed.
     """
 
     nq: int
@@ -233,6 +247,7 @@ class System:
     inputs: tuple[Pieces, ...]
     by_time: bool
     moving: Mapping[int, Any]
+    closures: tuple[ClosureNumbers, ...] = ()
 
     def awake(self, place: int) -> System:
         """The same where the body at a place of the tree is none that is idle."""

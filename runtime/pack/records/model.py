@@ -14,6 +14,7 @@ from ..system import ForceNumbers, LoadNumbers, System
 from .bodies import BodyRecords
 from .laws import LawRecords
 from .links import attach_runs
+from .loops import attach_loops
 from .memory import Memory
 
 
@@ -67,14 +68,17 @@ def write(system: System, elements: Elements) -> Written:
         _force(record, force, elements, memory)
         record.own = int(own)
     model.forces, model.n_forces = forces, len(system.forces)
-    model.needs_pose = int(bool(system.forces or system.loads or system.dragged))
+    model.needs_pose = int(
+        bool(system.forces or system.loads or system.dragged or system.closures)
+    )
     inputs = memory.new("mstmm_input[]", max(1, len(system.inputs)))
     for record, one in zip(inputs, system.inputs, strict=False):
         record.n_knots, record.knots = len(one.knots), memory.reals(one.knots)
         record.numbers = memory.reals([x for piece in one.pieces for x in piece])
     model.inputs, model.n_inputs = inputs, len(system.inputs)
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
-    scratch = attach_runs(model, system, memory, lib, bodies.end)
+    behind = attach_loops(model, system, memory, lib, bodies.end)
+    scratch = attach_runs(model, system, memory, lib, behind)
     modal = bodies.modal
     return Written(
         model,
