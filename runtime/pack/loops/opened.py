@@ -41,7 +41,8 @@ def opened(scene: Scene) -> tuple[Scene, tuple[Cut, ...]]:
         hinge = tables[number]
         end = f".{hinge.outboard_end}" if hinge.outboard_end else ""
         cut = Cut(hinge.name, f"{hinge.name}/cut", hinge.outboard_body)
-        tables[number] = hinge.model_copy(update={"outboard": cut.frame + end})
+        held = {"outboard": cut.frame + end, "cut": None}
+        tables[number] = hinge.model_copy(update=held)
         ends = scene.bodies.by_name[cut.body].ends
         frame = Body(name="frame", mass=0.0)
         bodies.append(frame.model_copy(update={"name": cut.frame, "ends": ends}))
