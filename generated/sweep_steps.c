@@ -1044,6 +1044,9 @@ static int mstmm_at_closures(mstmm_state *state, int index)
         memcpy(loops + closure->inner[c], closed + MSTMM_CLOSURE_J_A + 6 * c, (size_t)(6) * sizeof(real));
         memcpy(loops + closure->outer[c], closed + MSTMM_CLOSURE_J_B + 6 * c, (size_t)(6) * sizeof(real));
         memcpy(loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN, closed + MSTMM_CLOSURE_L + c, (size_t)(1) * sizeof(real));
+        if (state->level && (state->model->rows[closure->rows[c]].softness > 0)) {
+            (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN)[0] = 0;
+        }
     }
     return 0;
 }

@@ -50,6 +50,8 @@ CLOSURES = Pass(
                 Move(to="side.inner", source="closure.J_A[6 * c]", count="6"),
                 Move(to="side.outer", source="closure.J_B[6 * c]", count="6"),
                 Move(to="line.known", source="closure.l[c]", count="1"),
+                # A rotor resists a correction, but asks for none.
+                Copy(to="line.known", when="corrected soft"),
             ),
         ),
     ),

@@ -335,6 +335,7 @@ TRAITS: dict[str, str] = {
     "cut": "the hinge closes a loop",
     "aside": "the hinge closes a loop, or the body is idle",
     "corrected": "a gap or a slip is to be corrected",
+    "soft": "the row is that of a rotor",
     "gaping": "a gap",
     "slipping": "a slip",
     "qr": "the sweep is that of least squares",

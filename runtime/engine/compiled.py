@@ -18,6 +18,7 @@ from ..pack.packed import Packed
 from .code import Fusing, NotFused
 from .engine import Engine
 from .given import GivenInput, with_inputs
+from .loops.closed import Closed
 from .slopes import Slopes
 
 
@@ -29,6 +30,7 @@ class Compiled:
         known: elements that are not prebuilt, by (kind, name).
         looped: the looped engine on the packed scene.
         fusion: what is known of the fused code of the scene.
+        closed: its closed loops, assembled; None for a tree.
     """
 
     def __init__(
@@ -43,6 +45,7 @@ class Compiled:
         self._fusing, self._product_accuracy = fusing, product_accuracy
         self.looped = Engine(pack(scene, known, product_accuracy, least_squares=least_squares))
         self.fusion: Fusing = fusing(self.packed, known or {}) if fusing else NotFused()
+        self.closed = Closed(self) if self.packed.system.closures else None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled are the scene and what was asked; compiled code is looked for again."""

@@ -57,8 +57,20 @@ void mstmm_missing(const mstmm_state *state, real *missing)
     }
 }
 
-/* q moved by a change along the speeds. */
-static int move(const mstmm_model *model, real *workspace, real t, real *q, const real *change,
+int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q, real *u,
+                      const real *memory, mstmm_failure *failure)
+{
+    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q, .u = u,
+                         .memory = memory, .observed = 1, .failure = failure};
+    if (!model->n_drives) return 0;
+    const int code = mstmm_run_given(&state);
+    if (code) return code;
+    memcpy(q, state.q, (size_t)model->nq * sizeof(real));
+    memcpy(u, state.u, (size_t)model->nu * sizeof(real));
+    return 0;
+}
+
+int mstmm_moved(const mstmm_model *model, real *workspace, real t, real *q, const real *change,
                 const real *memory, int n_quaternions, const int *quaternions,
                 mstmm_failure *failure)
 {
@@ -116,8 +128,8 @@ int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q
                                     failure);
         const real gap = code ? 0 : largest(&state);
         if (!code)
-            code = move(model, workspace, t, q, change, memory, n_quaternions, quaternions,
-                        failure);
+            code = mstmm_moved(model, workspace, t, q, change, memory, n_quaternions, quaternions,
+                               failure);
         if (code) return code;
         if (gap < CLOSE) break;
     }

@@ -223,15 +223,9 @@ int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y)
 {
     const mstmm_model *model = run->model;
     mstmm_unit_quaternions(run->n_quaternions, run->quaternions, y);
-    if (model->n_drives) {
-        mstmm_state state = state_of(model, run->workspace, t, run->memory, &run->failure);
-        state.q = y;
-        state.u = y + model->nq;
-        const int code = mstmm_run_given(&state);
-        if (code) return code;
-        memcpy(y, state.q, (size_t)model->nq * sizeof(real));
-        memcpy(y + model->nq, state.u, (size_t)model->nu * sizeof(real));
-    }
+    const int driven = mstmm_fill_driven(model, run->workspace, t, y, y + model->nq, run->memory,
+                                         &run->failure);
+    if (driven) return driven;
     if (model->looped) {
         const int code = mstmm_close_loops(model, run->workspace, t, y, y + model->nq, run->memory,
                                            run->n_quaternions, run->quaternions, &run->failure);

@@ -260,6 +260,13 @@ int mstmm_solve(const mstmm_model *model, real *workspace, int64_t n, const real
 int mstmm_correction(const mstmm_model *model, real *workspace, int level, real give, real t,
                      const real *q, const real *u, const real *memory, real *change,
                      real *missing, mstmm_failure *failure);
+/* Driven coordinates and speeds filled in, in place. */
+int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q, real *u,
+                      const real *memory, mstmm_failure *failure);
+/* q moved by a change along the speeds, in place. */
+int mstmm_moved(const mstmm_model *model, real *workspace, real t, real *q, const real *change,
+                const real *memory, int n_quaternions, const int *quaternions,
+                mstmm_failure *failure);
 /* Gaps closed and slips stopped in place; driven coordinates are filled in. */
 int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q, real *u,
                       const real *memory, int n_quaternions, const int *quaternions,

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from ..packed import Packed
 
+#: What does follow closed loops.
+INSTEAD = "accelerations and simulate with dop853, dopri5 or rk4 do"
 #: So many hinges of a loop are named.
 _NAMED = 8
 

@@ -1,0 +1,151 @@
+"""Assembly: the nearest state in which the loops are closed.
+
+Positions by steps that let the rows give way (Levenberg, Quart. Appl. Math. 2 (1944) 164-168):
+with mu times their mobility on the diagonal of L a step is the change of least inertia that closes
+the gaps as far as mu allows, and far from where a loop closes it does not run wild.  Speeds by one
+correction, as slips are linear in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+
+from ...pack.loops.variants import held
+from ...pack.pack import packed_system
+from ..engine import Engine
+from .calls import LoopCalls
+
+#: Longest step of a coordinate (rad, m), and most steps.
+_LONGEST, _STEPS = 0.5, 300
+#: Compliance of the rows: the first, and where there is no use in more or in less.
+_FIRST, _MOST, _LEAST = 1e-2, 1e8, 1e-12
+#: Gap (m, rad) that is closed, and change (rad, m) at which nothing moves any more.
+_CLOSED, _STILL = 1e-10, 1e-9
+#: So much that the own coordinates of closing hinges alone follow.
+_ALONE = 1e14
+
+
+def with_held(engine: Engine, hinges: Collection[str]) -> Engine:
+    """The engine of the same scene with all speeds of some hinges imposed."""
+    packed = engine.packed
+    places = {packed.hinge_position[name] for name in hinges}
+    return Engine(packed_system(held(packed.system, places), packed)) if places else engine
+
+
+class Assembly:
+    """Assembly of one packed scene with some hinges held; `q` (nq,) is near what is asked."""
+
+    def __init__(self, engine: Engine, q: Array, hinges: Collection[str] = ()) -> None:
+        self.held = tuple(hinges)
+        self.calls = LoopCalls(with_held(engine, hinges), q)
+        self._weights = self._weighted()
+
+    def positions(self, q: Array) -> Array:
+        """q (nq,) with loops closed.
+
+        Raises SceneError with the least gap and what was held where there is none near.
+        """
+        q, give = self._own(q), _FIRST
+        rest = self._rest(q)
+        for _ in range(_STEPS):
+            change, missing = self.calls.correction(self.calls.gap, q, self._still, give)
+            if self._largest(missing) < _CLOSED:
+                return q
+            length = float(np.abs(change).max(initial=0.0))
+            trial = self._own(self.calls.moved(q, change * min(1.0, _LONGEST / (length or 1.0))))
+            after = self._rest(trial)
+            if after < rest:
+                give = max(give / 10.0, _LEAST) if after < rest / 2.0 else give
+                q, rest = trial, after
+            elif give > _MOST or length < _STILL:
+                break
+            else:
+                give *= 10.0
+        missing = self.calls.correction(self.calls.gap, q, self._still, _MOST)[1]
+        if self._largest(missing) < _CLOSED:
+            return q
+        raise SceneError(self._open(missing))
+
+    def speeds(self, q: Array, u: Array) -> Array:
+        """u (nu,) without slips at the closed q.  SceneError where those held do not allow it."""
+        u = u + self.calls.correction(self.calls.slip, q, u)[0]
+        missing = self.calls.correction(self.calls.slip, q, u)[1]
+        largest = self._largest(missing)
+        if largest > 1e-8 * max(1.0, float(np.abs(u).max(initial=0.0))):
+            row = int(np.abs(missing).argmax())
+            raise SceneError(
+                f"scene: the speeds given for {self._names()} contradict each other by "
+                f"{abs(missing[row]):.3g} {self._unit(row)}/s where {self._hinge(row)} closes a "
+                "loop; give fewer of them, or others"
+            )
+        return u
+
+    @property
+    def _still(self) -> Array:
+        return np.zeros(self.calls.engine.nu)
+
+    def _own(self, q: Array) -> Array:
+        """q with the own coordinates of closing hinges where the bodies put them."""
+        for _ in range(12):
+            change, _ = self.calls.correction(self.calls.gap, q, self._still, _ALONE)
+            length = float(np.abs(change).max(initial=0.0))
+            if not length > _STILL:
+                break
+            q = self.calls.moved(q, change * min(1.0, _LONGEST / length))
+        return q
+
+    def _rest(self, q: Array) -> float:
+        missing = self.calls.correction(self.calls.gap, q, self._still, _ALONE)[1]
+        return float(np.sum(self._weights * missing**2))
+
+    def _largest(self, missing: Array) -> float:
+        return float(np.abs(missing).max(initial=0.0))
+
+    def _weighted(self) -> Array:
+        """The same for all gaps and for all angles: the mean mobility of their kind, so that the
+        least gap is that of the geometry."""
+        calls = self.calls
+        turning = np.zeros(calls.count, bool)
+        for _, record, rows in calls.closures():
+            directions = calls.numbers_of(record, "W", 36)
+            for direction, row in rows.items():
+                force, moment = directions[direction, :3], directions[direction, 3:]
+                turning[row] = moment @ moment > force @ force
+        weights = np.ones(calls.count)
+        for kind in (turning, ~turning):
+            if kind.any():
+                weights[kind] = 1.0 / calls.mobility[kind].mean()
+        for row in range(calls.count):
+            calls.model.rows[row].mobility = 1.0 / weights[row]
+        return weights
+
+    # --- words ------------------------------------------------------------------------------------
+
+    def _open(self, missing: Array) -> str:
+        row = int(np.abs(missing).argmax())
+        while_held = f" with {self._names()} held" if self.held else ""
+        return (
+            f"scene: the loop that {self._hinge(row)} closes stays open: the nearest pose leaves "
+            f"{abs(missing[row]):.7g} {self._unit(row)}{while_held}; correct the lengths, or start "
+            "nearer to where it closes"
+        )
+
+    def _names(self) -> str:
+        return ", ".join(f'"{name}"' for name in self.held) or "driven hinges"
+
+    def _hinge(self, row: int) -> str:
+        place = next(place for place, _, rows in self.calls.closures() if row in rows.values())
+        return f'hinge "{self.calls.engine.hinge_name(place)}"'
+
+    def _unit(self, row: int) -> str:
+        for _, record, rows in self.calls.closures():
+            for direction, number in rows.items():
+                if number == row:
+                    load = self.calls.numbers_of(record, "W", 36)[direction]
+                    return "rad" if load[3:] @ load[3:] > load[:3] @ load[:3] else "m"
+        raise AssertionError(row)

@@ -1,0 +1,146 @@
+"""Calls of the looped engine about closed loops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+from ..engine import Engine
+
+#: A pivot below this share of the mobility of its row is rounding.
+ROUNDING = 1e-8
+
+
+class LoopCalls:
+    """Gaps and slips of the loops of one packed scene, and what corrects them.
+
+    Every row is given the mobility of its ends at `q` (nq,), if they were free: the scale by which
+    a pivot is judged.
+    """
+
+    def __init__(self, engine: Engine, q: Array) -> None:
+        self.engine, self.model = engine, engine.packed.model
+        self.count = int(self.model.n_rows)
+        self.memory = engine.start_memory()
+        quaternions = np.append(engine.packed.layout.quaternions, 0).astype(np.int32)
+        self._quaternions = quaternions
+        self.mobility = np.ones(self.count)
+        self.correction(self.gap, q, np.zeros(engine.nu))
+        self.mobility = self._mobilities()
+        for row, mobility in enumerate(self.mobility.tolist()):
+            record = self.model.rows[row]
+            record.mobility, record.floor = mobility, ROUNDING * mobility
+
+    @property
+    def gap(self) -> int:
+        return int(self.engine.lib.MSTMM_GAP)
+
+    @property
+    def slip(self) -> int:
+        return int(self.engine.lib.MSTMM_SLIP)
+
+    def correction(
+        self, level: int, q: Array, u: Array, give: float = 0.0, t: float = 0.0
+    ) -> tuple[Array, Array]:
+        """(change along the speeds (nu,), what the rows lack (rows,)); see sweep.h."""
+        engine = self.engine
+        change, missing = np.zeros(engine.nu), np.zeros(max(1, self.count))
+        failure = engine.ffi.new("mstmm_failure *")
+        code = engine.lib.mstmm_correction(
+            self.model, engine.workspace(), level, give, t, engine.pointer(q), engine.pointer(u),
+            engine.pointer(self.memory), engine.pointer(change), engine.pointer(missing), failure,
+        )  # fmt: skip
+        if code:
+            raise engine.failed(failure, t, q, u)
+        return change, missing[: self.count]
+
+    def moved(self, q: Array, change: Array, t: float = 0.0) -> Array:
+        """q (nq,) moved by a change along the speeds (nu,)."""
+        engine, result = self.engine, q.copy()
+        failure = engine.ffi.new("mstmm_failure *")
+        code = engine.lib.mstmm_moved(
+            self.model, engine.workspace(), t, engine.pointer(result), engine.pointer(change),
+            engine.pointer(self.memory), len(self._quaternions) - 1,
+            engine.ffi.from_buffer("int[]", self._quaternions), failure,
+        )  # fmt: skip
+        if code:
+            raise engine.failed(failure, t, q, change)
+        return result
+
+    def driven(self, q: Array, u: Array, t: float = 0.0) -> tuple[Array, Array]:
+        """The state with driven coordinates filled in."""
+        engine, q, u = self.engine, q.copy(), u.copy()
+        failure = engine.ffi.new("mstmm_failure *")
+        code = engine.lib.mstmm_fill_driven(
+            self.model, engine.workspace(), t, engine.pointer(q), engine.pointer(u),
+            engine.pointer(self.memory), failure,
+        )  # fmt: skip
+        if code:
+            raise engine.failed(failure, t, q, u)
+        return q, u
+
+    def inverses(self) -> Array:
+        """1 / pivot of every row in the last correction, 0 for rows without a multiplier."""
+        lib, stride = self.engine.lib, int(self.engine.lib.MSTMM_ROW)
+        first = int(self.model.loops) + int(lib.MSTMM_ROW_INVERSE)
+        rows = self.engine.workspace_array()[first : first + stride * self.count]
+        return rows[::stride].copy()
+
+    def closures(self) -> list[tuple[int, Any, dict[int, int]]]:
+        """(place, record, direction -> row) of every hinge that closes a loop."""
+        found = []
+        for one in self.engine.packed.system.closures:
+            record = self.model.looped[one.frame].closure
+            rows = {k: int(record.rows[k]) for k in range(6) if record.rows[k] >= 0}
+            found.append((one.frame, record, rows))
+        return found
+
+    def numbers_of(self, record: Any, name: str, count: int) -> Array:
+        """Numbers of a closure after a correction; W, J_A and J_B have 6 rows of 6."""
+        at = int(self.model.loops) + int(record.numbers)
+        at += int(getattr(self.engine.lib, f"MSTMM_CLOSURE_{name}"))
+        found = self.engine.workspace_array()[at : at + count].copy()
+        return found.reshape(6, 6) if count == 36 else found
+
+    def _mobilities(self) -> Array:
+        """J M^-1 J^T of both ends, bodies taken as free; of what has no mass that of the others."""
+        found, masses = np.zeros(self.count), _Masses(self.engine)
+        for place, record, rows in self.closures():
+            sides = (int(self.model.bodies[place].parent), "J_A"), (int(record.outboard), "J_B")
+            for body, name in sides:
+                if body >= 0:
+                    columns, inverse = self.numbers_of(record, name, 36), masses.inverse(body)
+                    for direction, row in rows.items():
+                        column = columns[direction]
+                        found[row] += column @ inverse @ column
+        known = found[found > 0]
+        found[~(found > 0)] = known.mean() if len(known) else 1.0
+        return found
+
+
+class _Masses:
+    """Inverse mass matrices of bodies alone, about their input ends."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine, self.which = engine, engine.packed.system.which
+        self.distinct = list(engine.packed.system.distinct)
+        self.known: dict[int, Array] = {}
+
+    def inverse(self, body: int) -> Array:
+        number = int(self.which[body])
+        if number not in self.known:
+            one, engine = self.distinct[number], self.engine
+            upper = np.zeros(21)
+            call = engine.ffi.cast(
+                "int (*)(const double *, double *)",
+                engine.packed.elements[one.body].functions["inertia"],
+            )
+            call(list(one.body_p), engine.ffi.from_buffer("double[]", upper))
+            matrix = np.zeros((6, 6))
+            matrix[np.triu_indices(6)] = upper
+            whole = matrix + np.triu(matrix, 1).T
+            self.known[number] = np.linalg.pinv(whole, rcond=1e-12, hermitian=True)
+        return self.known[number]

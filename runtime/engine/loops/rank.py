@@ -1,0 +1,79 @@
+"""Which rows of closed loops say what others say already.
+
+Decided once, at a state in which the loops are closed, and in a metric of the geometry: with true
+masses a heavy coupler makes honest rows look like rounding.  The level of a row that repeats others
+but for a misfit is the square of the misfit.  A row that repeats others here but not in closed
+states nearby is no repetition but a singular pose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
+
+from ...pack.loops.variants import geometric
+from ...pack.pack import packed_system
+from ..engine import Engine
+from .calls import LoopCalls
+
+#: A pivot below this share of the mobility of its row repeats others: misfits up to 4e-3 rad.
+REPEATED = 1e-6
+#: Closed states nearby: how many, and how far (rad, m).
+_NEIGHBOURS, _AWAY = 3, 1e-2
+
+
+@dataclass(frozen=True)
+class Rank:
+    """Rows that repeat others here, and those of them that do so in closed states nearby too."""
+
+    here: frozenset[int]
+    always: frozenset[int]
+
+    @property
+    def singular(self) -> bool:
+        """Whether the pose is singular."""
+        return self.here != self.always
+
+
+def rank_at(engine: Engine, q: Array) -> Rank:
+    """Rows that repeat others at a closed state q (nq,) and around it."""
+    packed = engine.packed
+    other = Engine(packed_system(geometric(packed.system), packed))
+    calls = LoopCalls(other, q)
+    here = _repeating(calls, q)
+    always = here
+    draw = np.random.default_rng(0)
+    for _ in range(_NEIGHBOURS if here else 0):
+        near = _neighbour(calls, q, draw.uniform(-1.0, 1.0, engine.nu))
+        always = always if near is None else always & _repeating(calls, near)
+    return Rank(here, always)
+
+
+def _repeating(calls: LoopCalls, q: Array) -> frozenset[int]:
+    """Rows whose pivots are below the level, those before them taken as met."""
+    for row, mobility in enumerate(calls.mobility.tolist()):
+        calls.model.rows[row].floor = REPEATED * mobility
+    calls.correction(calls.slip, q, np.zeros(calls.engine.nu))
+    return frozenset(np.flatnonzero(calls.inverses() == 0.0).tolist())
+
+
+def _neighbour(calls: LoopCalls, q: Array, speeds: Array) -> Array | None:
+    """A closed state on the way that speeds without slips lead; None where they lead nowhere."""
+    try:
+        tangent = speeds + calls.correction(calls.slip, q, speeds)[0]
+        length = float(np.abs(tangent).max(initial=0.0))
+        if not length > 1e-9:
+            return None
+        near = calls.moved(q, tangent * (_AWAY / length))
+        for _ in range(20):
+            change, _ = calls.correction(calls.gap, near, np.zeros_like(speeds), 1e-9)
+            near = calls.moved(near, change)
+            if float(np.abs(change).max()) < 1e-12:
+                return near
+    except NumericalFailure:
+        pass
+    return None
