@@ -24,6 +24,8 @@ from .calls import LoopCalls
 REPEATED = 1e-6
 #: Closed states nearby: how many, and how far (rad, m).
 _NEIGHBOURS, _AWAY = 3, 1e-2
+#: Most steps to such a state, the compliance of its rows, and the gap (m, rad) that is none.
+_STEPS, _GIVE, _CLOSED = 60, 1e-6, 1e-9
 
 
 @dataclass(frozen=True)
@@ -62,18 +64,23 @@ def _repeating(calls: LoopCalls, q: Array) -> frozenset[int]:
 
 
 def _neighbour(calls: LoopCalls, q: Array, speeds: Array) -> Array | None:
-    """A closed state on the way that speeds without slips lead; None where they lead nowhere."""
+    """A closed state on the way that speeds without slips lead; None where they lead nowhere.
+
+    All rows are met there, those that repeat others here as well.
+    """
+    for row in range(calls.count):
+        calls.model.rows[row].floor = 0.0
     try:
         tangent = speeds + calls.correction(calls.slip, q, speeds)[0]
         length = float(np.abs(tangent).max(initial=0.0))
         if not length > 1e-9:
             return None
         near = calls.moved(q, tangent * (_AWAY / length))
-        for _ in range(20):
-            change, _ = calls.correction(calls.gap, near, np.zeros_like(speeds), 1e-9)
-            near = calls.moved(near, change)
-            if float(np.abs(change).max()) < 1e-12:
+        for _ in range(_STEPS):
+            change, missing = calls.correction(calls.gap, near, np.zeros_like(speeds), _GIVE)
+            if float(np.abs(missing).max(initial=0.0)) < _CLOSED:
                 return near
+            near = calls.moved(near, change)
     except NumericalFailure:
         pass
     return None
