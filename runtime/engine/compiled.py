@@ -44,8 +44,8 @@ class Compiled:
         self.scene, self.known = scene, known
         self._fusing, self._product_accuracy = fusing, product_accuracy
         self.looped = Engine(pack(scene, known, product_accuracy, least_squares=least_squares))
-        self.fusion: Fusing = fusing(self.packed, known or {}) if fusing else NotFused()
         self.closed = Closed(self) if self.packed.system.closures else None
+        self.fusion: Fusing = fusing(self.packed, known or {}) if fusing else NotFused()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled are the scene and what was asked; compiled code is looked for again."""

@@ -149,7 +149,7 @@ typedef struct {
     const mstmm_other *others;
     real floor;    /* largest pivot that is rounding */
     real mobility; /* of its ends, if they were free: scale of its pivot */
-    real softness; /* 1 / inertia of a rotor on an own speed; 0: the row is met; inf: repeated */
+    real softness; /* 1 / inertia of a rotor on an own speed; 0: the row is met */
     int release;   /* place in memory that is non-zero once the row is let go; -1: never */
 } mstmm_loop_row;
 

@@ -11,7 +11,10 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
+from ...pack.loops.variants import length_of, without
+from ...pack.pack import packed_system
 from ...pack.start import start_values
+from ..engine import Engine
 from .assembly import Assembly
 from .calls import LoopCalls
 from .rank import rank_at
@@ -21,9 +24,9 @@ if TYPE_CHECKING:
 
 #: Directions of a hinge that closes a loop, as its rows are called.
 _DIRECTIONS = ("x", "y", "z", "mx", "my", "mz")
-#: Gap of a row that repeats others, in parts of the length of the scene: not worth a word, and too
-#: much for a rigid mechanism.
-_SILENT, _LOCKED = 1e-6, 1e-3
+#: Gap of a row that repeats others, in parts of the length of the scene, at which a rigid mechanism
+#: locks.
+_LOCKED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ class Closed:
         calls = LoopCalls(engine, q)
         q, u = calls.driven(q, u)
         self.start = self.assembled(q, u, self._holds, self._fast)
-        self.loops = self._judged(calls)
+        self.loops = self._judged()
 
     def assembled(
         self, q: Array, u: Array, holds: Collection[str], fast: Collection[str]
@@ -79,37 +82,56 @@ class Closed:
         q = Assembly(engine, q, holds).positions(q)
         return q, Assembly(engine, q, fast).speeds(q, u)
 
-    def _judged(self, calls: LoopCalls) -> Loops:
-        q, _ = self.start
-        engine, model = self.compiled.looped, calls.model
-        rank = rank_at(engine, q)
-        calls = LoopCalls(engine, q)
-        names = self._names(calls)
-        missing = np.abs(calls.correction(calls.gap, q, np.zeros(engine.nu))[1])
-        for row in sorted(rank.always):
-            if missing[row] > _LOCKED:
+    def _judged(self) -> Loops:
+        """What closes at the start; from now on the engine is one without rows that repeat others.
+        """
+        compiled, (q, _) = self.compiled, self.start
+        rank = rank_at(compiled.looped, q)
+        calls = LoopCalls(compiled.looped, q)
+        names, system = self._names(calls), compiled.packed.system
+        self._refuse_locked(calls, rank.always, names)
+        bound = [calls.model.rows[row].softness > 0 for row in range(calls.count)]
+        met = calls.count - sum(bound) - len(rank.here)
+        if rank.always:
+            repeated = {
+                (place, direction)
+                for place, _, rows in calls.closures()
+                for direction, row in rows.items() if row in rank.always
+            }  # fmt: skip
+            kept = without(system, repeated)
+            compiled.looped = Engine(packed_system(kept, compiled.packed))
+            calls = LoopCalls(compiled.looped, q)
+        model = calls.model
+        return Loops(
+            tuple(cut.hinge for cut in compiled.packed.expanded.cuts),
+            tuple(names), met, tuple(names[row] for row in sorted(rank.here)),
+            self._free_of_tree() - met,
+            max(int(model.looped[k].n_pending) for k in range(model.n_bodies)), rank.singular,
+        )  # fmt: skip
+
+    def _refuse_locked(
+        self, calls: LoopCalls, repeating: Collection[int], names: list[tuple[str, str]]
+    ) -> None:
+        """SceneError where a row that repeats others leaves a gap that they do not close."""
+        q = self.start[0]
+        missing = np.abs(calls.correction(calls.gap, q, np.zeros(len(self.start[1])))[1])
+        much = _LOCKED * length_of(calls.engine.packed.system)
+        for row in sorted(repeating):
+            if missing[row] > much:
                 raise SceneError(
                     f'scene: direction {names[row][1]} of hinge "{names[row][0]}" repeats what '
                     f"other hinges do, but for a gap of {missing[row]:.3g}: as a rigid mechanism "
                     "it would lock; make axes parallel and points meet, or use a ball or "
                     "cylindrical hinge"
                 )
-            model.rows[row].softness = np.inf
-        rows = calls.count
-        soft = sum(1 for row in range(rows) if 0 < model.rows[row].softness < np.inf)
-        frames = {one.frame for one in engine.packed.system.closures}
-        own = sum(engine.packed.system.body(place).nu for place in frames)
-        free = len(self.compiled.free_speeds) - own
-        width = max((int(model.looped[k].n_pending) for k in range(model.n_bodies)), default=0)
-        rank_here = rows - soft - len(rank.here)
-        driven_own = sum(
-            sum(engine.packed.system.body(place).imposed) for place in frames
-        )
-        return Loops(
-            tuple(cut.hinge for cut in engine.packed.expanded.cuts),
-            tuple(names), rank_here, tuple(names[row] for row in sorted(rank.here)),
-            free + driven_own - rank_here, width, rank.singular,
-        )  # fmt: skip
+
+    def _free_of_tree(self) -> int:
+        """Speeds that nobody imposes, but for those that cut hinges share with the tree; what is
+        driven of these takes one away."""
+        system = self.compiled.packed.system
+        frames = [system.body(one.frame) for one in system.closures]
+        shared = sum(frame.nu - sum(frame.imposed) for frame in frames)
+        return len(self.compiled.free_speeds) - shared
 
     def _names(self, calls: LoopCalls) -> list[tuple[str, str]]:
         """(hinge, direction) of every row."""

@@ -56,4 +56,5 @@ def _in_order(plan: Plan) -> list[int]:
     """The hinges that are cut as they close, behind them those without rows."""
     with_rows = plan.cut_of
     order = [with_rows[one.group] for one in plan.closings if one.group < len(with_rows)]
-    return [*order, *(hinge for hinge in plan.cut if hinge not in with_rows)]
+    known = set(with_rows)
+    return [*order, *(hinge for hinge in plan.cut if hinge not in known)]

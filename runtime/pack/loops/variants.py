@@ -40,6 +40,15 @@ def _closure_held(one: ClosureNumbers, speeds: int) -> ClosureNumbers:
     return replace(one, directions=(*range(speeds), *others))
 
 
+def without(system: System, rows: Collection[tuple[int, int]]) -> System:
+    """Without some rows, each given by the place of its closure's frame and its direction."""
+    closures = tuple(
+        replace(one, directions=tuple(k for k in one.directions if (one.frame, k) not in rows))
+        for one in system.closures
+    )
+    return replace(system, closures=closures)
+
+
 def length_of(system: System) -> float:
     """Mean square distance between hinges, m; 1 where all of them meet in one point."""
     squares = [sum(x * x for x in body.connection[9:12]) for body in system.distinct]

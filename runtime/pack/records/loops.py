@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from ..loops.rows import GROUND, Ends, RowPlan, planned
 from ..system import ClosureNumbers, System
 from .memory import Memory
@@ -132,8 +130,3 @@ class _Loops:
                 rows[row].softness = 1.0 / body.rotor[direction]
         return record
 
-
-def withhold(model: Any, rows: list[int]) -> None:
-    """Rows that others repeat go without a multiplier from now on."""
-    for row in rows:
-        model.rows[row].softness = np.inf
