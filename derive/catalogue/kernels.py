@@ -13,8 +13,7 @@ from mstmm.ir import KernelIR
 from ..classical.catalogue import CLASSICAL, classical_derivation, classical_guards
 from ..elements.body_rigid import RigidBody
 from ..equations import body as body_kernels
-from ..equations import columns, frames, laws, link, loops, qr, screw, sweep, tangent
-from ..equations import tangent_hinge
+from ..equations import columns, frames, laws, link, loops, qr, screw, sweep, tangent, tangent_hinge
 from ..equations import force as force_kernels
 from ..equations import tangent_placed as placed
 from ..equations.complement import complement

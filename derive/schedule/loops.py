@@ -9,7 +9,20 @@ from __future__ import annotations
 
 from .motion import HINGE_MOTION
 from .riccati import BODY, FREE, FREE_EFFORTS
-from .steps import TIPS_TO_ROOT, Add, Call, Copy, Do, Each, EachSpeed, Move, Pass, Spread, call, only
+from .steps import (
+    TIPS_TO_ROOT,
+    Add,
+    Call,
+    Copy,
+    Do,
+    Each,
+    EachSpeed,
+    Move,
+    Pass,
+    Spread,
+    call,
+    only,
+)
 
 _MET = {"R_C": "closure.R_C", "r_e": "closure.end"}
 _ROWS = {"J_A": "closure.J_A", "J_B": "closure.J_B", "l": "closure.l"}

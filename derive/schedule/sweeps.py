@@ -5,6 +5,8 @@ from __future__ import annotations
 from .flexible import DRAG, MOMENTUM, SECTION_MOTION, STRAIN
 from .inverse import REQUIRED
 from .laws_alone import LAWS_ALONE, LAWS_SOLUTION, RATES_CHANGE
+from .links import LINK_ANGLE, LINK_CONDENSE, LINK_FORWARD, LINK_RECOVER
+from .loads import DRIVE_POWER, EFFORTS, EFFORTS_POWER, FORCES, LAWS, LOADS
 from .loops import (
     ANSWERED,
     CARRIED,
@@ -14,8 +16,6 @@ from .loops import (
     ROW_FOUND,
     UNLOADED,
 )
-from .links import LINK_ANGLE, LINK_CONDENSE, LINK_FORWARD, LINK_RECOVER
-from .loads import DRIVE_POWER, EFFORTS, EFFORTS_POWER, FORCES, LAWS, LOADS
 from .motion import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
 from .qr import QR_CONDENSE, QR_OWN
 from .riccati import CONDENSE, RECOVER
@@ -126,8 +126,8 @@ SOLUTION = Sweep(
     (Run(whole=COLUMN), Run(whole=COLUMN_CARRIED), Run(whole=COLUMN_ANSWERED)),
 )
 
-SWEEPS = (GIVEN, ACCELERATIONS, INVERSE_DYNAMICS, CORRECTION, MOTION, POSED, FACTORISATION, SOLUTION,
-          DIRECTIONAL, APPLIED_SLOPE, TANGENT, BROUGHT, TANGENT_SOLUTION,
+SWEEPS = (GIVEN, ACCELERATIONS, INVERSE_DYNAMICS, CORRECTION, MOTION, POSED, FACTORISATION,
+          SOLUTION, DIRECTIONAL, APPLIED_SLOPE, TANGENT, BROUGHT, TANGENT_SOLUTION,
           TANGENT_BEYOND, LAWS_ALONE, LAWS_SOLUTION)  # fmt: skip
 
 #: Passes that the looped engine's own C does for one subject at a time: links and what lies between

@@ -21,10 +21,10 @@ from .flexible.expansion import Expanded, expand
 from .frames import Frames
 from .laws import laws_of
 from .letting_go import releasable
-from .slots import layout_of
 from .loops.closures import closures_of
 from .loops.opened import opened
 from .loops.refusal import refuse_unknown
+from .slots import layout_of
 from .system import ForceNumbers, LoadNumbers, Numbers, System
 from .values import MOVING, Moving, Values, drive_kernel, effort_kernel
 

@@ -1,4 +1,4 @@
-"""A four-bar linkage: whichever hinge is cut, its coordinates, laws and drives stay what they are."""
+"""A four-bar linkage: whichever hinge is cut, coordinates, laws and drives stay what they are."""
 
 from __future__ import annotations
 

@@ -45,8 +45,8 @@ class Assembly:
         self.calls = LoopCalls(with_held(engine, hinges), q)
         self._weights = self._weighted()
 
-    def positions(self, q: Array) -> Array:
-        """q (nq,) with loops closed.
+    def positions(self, q: Array, much: float = 0.0) -> Array:
+        """q (nq,) with loops closed, or with gaps that no change closes of up to `much` (m, rad).
 
         Raises SceneError with the least gap and what was held where there is none near.
         """
@@ -55,7 +55,7 @@ class Assembly:
         for _ in range(_STEPS):
             change, missing = self.calls.correction(self.calls.gap, q, self._still, give)
             if self._largest(missing) < _CLOSED:
-                return q
+                return self.calls.moved(q, change)
             length = float(np.abs(change).max(initial=0.0))
             trial = self._own(self.calls.moved(q, change * min(1.0, _LONGEST / (length or 1.0))))
             after = self._rest(trial)
@@ -67,7 +67,7 @@ class Assembly:
             else:
                 give *= 10.0
         missing = self.calls.correction(self.calls.gap, q, self._still, _MOST)[1]
-        if self._largest(missing) < _CLOSED:
+        if self._largest(missing) <= max(much, _CLOSED):
             return q
         raise SceneError(self._open(missing))
 

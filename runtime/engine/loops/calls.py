@@ -84,10 +84,16 @@ class LoopCalls:
 
     def inverses(self) -> Array:
         """1 / pivot of every row in the last correction, 0 for rows without a multiplier."""
+        return self._of_rows("INVERSE")
+
+    def pivots(self) -> Array:
+        """The pivots of the rows in the last correction."""
+        return self._of_rows("PIVOT")
+
+    def _of_rows(self, name: str) -> Array:
         lib, stride = self.engine.lib, int(self.engine.lib.MSTMM_ROW)
-        first = int(self.model.loops) + int(lib.MSTMM_ROW_INVERSE)
-        rows = self.engine.workspace_array()[first : first + stride * self.count]
-        return rows[::stride].copy()
+        first = int(self.model.loops) + int(getattr(lib, f"MSTMM_ROW_{name}"))
+        return self.engine.workspace_array()[first : first + stride * self.count : stride].copy()
 
     def closures(self) -> list[tuple[int, Any, dict[int, int]]]:
         """(place, record, direction -> row) of every hinge that closes a loop."""

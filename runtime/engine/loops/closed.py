@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -27,6 +27,8 @@ _DIRECTIONS = ("x", "y", "z", "mx", "my", "mz")
 #: Gap of a row that repeats others, in parts of the length of the scene, at which a rigid mechanism
 #: locks.
 _LOCKED = 1e-3
+#: Gaps at which it may still be that rows repeat others but for a misfit, likewise.
+_NEARLY = 1e-2
 
 
 @dataclass(frozen=True)
@@ -68,8 +70,11 @@ class Closed:
         q, u = start_values(packed.scene, packed.layout)
         calls = LoopCalls(engine, q)
         q, u = calls.driven(q, u)
-        self.start = self.assembled(q, u, self._holds, self._fast)
-        self.loops = self._judged()
+        length = length_of(packed.system)
+        near = Assembly(engine, q, self._holds).positions(q, _NEARLY * length)
+        self.loops, locked = self._judged(near)
+        self.start = self.assembled(near, u, self._holds, self._fast)
+        self._refuse_locked(calls, locked, _LOCKED * length)
 
     def assembled(
         self, q: Array, u: Array, holds: Collection[str], fast: Collection[str]
@@ -82,14 +87,12 @@ class Closed:
         q = Assembly(engine, q, holds).positions(q)
         return q, Assembly(engine, q, fast).speeds(q, u)
 
-    def _judged(self) -> Loops:
-        """What closes at the start; from now on the engine is one without rows that repeat others.
-        """
-        compiled, (q, _) = self.compiled, self.start
-        rank = rank_at(compiled.looped, q)
-        calls = LoopCalls(compiled.looped, q)
+    def _judged(self, q: Array) -> tuple[Loops, dict[int, tuple[str, str]]]:
+        """What closes near q, and the rows that repeat others, without which the engine is from now
+        on."""
+        compiled = self.compiled
+        rank, calls = rank_at(compiled.looped, q), LoopCalls(compiled.looped, q)
         names, system = self._names(calls), compiled.packed.system
-        self._refuse_locked(calls, rank.always, names)
         bound = [calls.model.rows[row].softness > 0 for row in range(calls.count)]
         met = calls.count - sum(bound) - len(rank.here)
         if rank.always:
@@ -98,31 +101,29 @@ class Closed:
                 for place, _, rows in calls.closures()
                 for direction, row in rows.items() if row in rank.always
             }  # fmt: skip
-            kept = without(system, repeated)
-            compiled.looped = Engine(packed_system(kept, compiled.packed))
-            calls = LoopCalls(compiled.looped, q)
-        model = calls.model
-        return Loops(
+            compiled.looped = Engine(packed_system(without(system, repeated), compiled.packed))
+            LoopCalls(compiled.looped, q)
+        model = compiled.packed.model
+        told = Loops(
             tuple(cut.hinge for cut in compiled.packed.expanded.cuts),
             tuple(names), met, tuple(names[row] for row in sorted(rank.here)),
             self._free_of_tree() - met,
             max(int(model.looped[k].n_pending) for k in range(model.n_bodies)), rank.singular,
         )  # fmt: skip
+        return told, {row: names[row] for row in sorted(rank.always)}
 
     def _refuse_locked(
-        self, calls: LoopCalls, repeating: Collection[int], names: list[tuple[str, str]]
+        self, calls: LoopCalls, repeating: Mapping[int, tuple[str, str]], much: float
     ) -> None:
         """SceneError where a row that repeats others leaves a gap that they do not close."""
-        q = self.start[0]
-        missing = np.abs(calls.correction(calls.gap, q, np.zeros(len(self.start[1])))[1])
-        much = _LOCKED * length_of(calls.engine.packed.system)
-        for row in sorted(repeating):
+        q, u = self.start
+        missing = np.abs(calls.correction(calls.gap, q, np.zeros(len(u)))[1])
+        for row, (hinge, direction) in repeating.items():
             if missing[row] > much:
                 raise SceneError(
-                    f'scene: direction {names[row][1]} of hinge "{names[row][0]}" repeats what '
-                    f"other hinges do, but for a gap of {missing[row]:.3g}: as a rigid mechanism "
-                    "it would lock; make axes parallel and points meet, or use a ball or "
-                    "cylindrical hinge"
+                    f'scene: direction {direction} of hinge "{hinge}" repeats what other hinges '
+                    f"do, but for a gap of {missing[row]:.3g}: as a rigid mechanism it would lock; "
+                    "make axes parallel and points meet, or use a ball or cylindrical hinge"
                 )
 
     def _free_of_tree(self) -> int:

@@ -23,9 +23,13 @@ from .calls import LoopCalls
 #: A pivot below this share of the mobility of its row repeats others: misfits up to 4e-3 rad.
 REPEATED = 1e-6
 #: Closed states nearby: how many, and how far (rad, m).
-_NEIGHBOURS, _AWAY = 3, 1e-2
-#: Most steps to such a state, the compliance of its rows, and the gap (m, rad) that is none.
-_STEPS, _GIVE, _CLOSED = 60, 1e-6, 1e-9
+_NEIGHBOURS, _AWAY = 3, 3e-2
+#: A row that repeats others here does so there too where its pivot is not this many times larger,
+#: or not larger than rounding, in parts of the mobility.
+_RAISED, _ROUNDING = 1e2, 1e-12
+#: Most steps to such a state, the gap (m, rad) that is none, the compliance of rows at first, and
+#: by the gap that is left.
+_STEPS, _CLOSED, _GIVE, _SHARE = 60, 1e-9, 1e-6, 1e-2
 
 
 @dataclass(frozen=True)
@@ -44,21 +48,24 @@ class Rank:
 def rank_at(engine: Engine, q: Array) -> Rank:
     """Rows that repeat others at a closed state q (nq,) and around it."""
     packed = engine.packed
-    other = Engine(packed_system(geometric(packed.system), packed))
-    calls = LoopCalls(other, q)
-    here = _repeating(calls, q)
-    always = here
-    draw = np.random.default_rng(0)
-    for _ in range(_NEIGHBOURS if here else 0):
+    calls = LoopCalls(Engine(packed_system(geometric(packed.system), packed)), q)
+    level = REPEATED * calls.mobility
+    here = _repeating(calls, q, level)
+    if not here:
+        return Rank(here, here)
+    raised = _RAISED * np.abs(calls.pivots()) + _ROUNDING * calls.mobility
+    level[list(here)] = np.minimum(level, raised)[list(here)]
+    always, draw = here, np.random.default_rng(0)
+    for _ in range(_NEIGHBOURS):
         near = _neighbour(calls, q, draw.uniform(-1.0, 1.0, engine.nu))
-        always = always if near is None else always & _repeating(calls, near)
+        always = always if near is None else always & _repeating(calls, near, level)
     return Rank(here, always)
 
 
-def _repeating(calls: LoopCalls, q: Array) -> frozenset[int]:
-    """Rows whose pivots are below the level, those before them taken as met."""
-    for row, mobility in enumerate(calls.mobility.tolist()):
-        calls.model.rows[row].floor = REPEATED * mobility
+def _repeating(calls: LoopCalls, q: Array, level: Array) -> frozenset[int]:
+    """Rows whose pivots are below their level, those before them taken as met."""
+    for row, floor in enumerate(level.tolist()):
+        calls.model.rows[row].floor = floor
     calls.correction(calls.slip, q, np.zeros(calls.engine.nu))
     return frozenset(np.flatnonzero(calls.inverses() == 0.0).tolist())
 
@@ -76,11 +83,13 @@ def _neighbour(calls: LoopCalls, q: Array, speeds: Array) -> Array | None:
         if not length > 1e-9:
             return None
         near = calls.moved(q, tangent * (_AWAY / length))
+        give = _GIVE
         for _ in range(_STEPS):
-            change, missing = calls.correction(calls.gap, near, np.zeros_like(speeds), _GIVE)
-            if float(np.abs(missing).max(initial=0.0)) < _CLOSED:
+            change, missing = calls.correction(calls.gap, near, np.zeros_like(speeds), give)
+            rest = float(np.abs(missing).max(initial=0.0))
+            if rest < _CLOSED:
                 return near
-            near = calls.moved(near, change)
+            near, give = calls.moved(near, change), min(_GIVE, _SHARE * rest)
     except NumericalFailure:
         pass
     return None

@@ -1,4 +1,4 @@
-"""A scene with closed loops -> the tree in which every hinge that is cut ends at a frame of its own.
+"""A scene with closed loops -> the tree in which every cut hinge ends at a frame of its own.
 
 The frame C of a cut hinge is a body without mass with the ends of the body B that it stands for, so
 that a hinge keeps its kernels, coordinates, law and drive, cut or not.  That C is where B is are

@@ -58,8 +58,8 @@ def length_of(system: System) -> float:
 
 
 def geometric(system: System) -> System:
-    """With the mass 1 of every rigid body at its input end, and one radius of gyration for all: what
-    can move is not hidden behind what is heavy."""
+    """With mass 1 at the input end of every rigid body, and one radius of gyration for all: what
+    moves is not hidden behind what is heavy."""
     moment = (_GYRATION * length_of(system)) ** 2
     numbers = (1.0, 0.0, 0.0, 0.0, moment, 0.0, 0.0, moment, 0.0, moment)
     frames = {one.frame for one in system.closures}
