@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from .flexible import DRAG, MOMENTUM, SECTION_MOTION, STRAIN
 from .inverse import REQUIRED
 from .laws_alone import LAWS_ALONE, LAWS_SOLUTION, RATES_CHANGE
@@ -20,7 +22,7 @@ from .motion import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
 from .qr import QR_CONDENSE, QR_OWN
 from .riccati import CONDENSE, RECOVER
 from .solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
-from .steps import Pass, Run, Sweep, only
+from .steps import Pass, Run, Sweep
 from .tangent import (
     APPLIED_SLOPE,
     BROUGHT,
@@ -75,7 +77,7 @@ ACCELERATIONS = Sweep(
         Run(whole=CONDENSE, when="!linked !qr !looped"),
         Run(whole=QR_CONDENSE, when="qr"),
         Run(whole=RECOVER, when="!linked !looped"),
-        *only("looped", *_CLOSED),
+        *(replace(run, when="looped") for run in _CLOSED),
         Run(whole=DRIVE_POWER, when="balance"),
         Run(hook="product_compared", when="product"),
     ),

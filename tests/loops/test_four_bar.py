@@ -138,10 +138,10 @@ def test_energy_is_kept_and_the_loop_stays_closed() -> None:
 def test_driven_pins_in_the_tree_and_cut(pin: str) -> None:
     """The motion and the effort of a drive do not depend on where its pin stands."""
     start = dict(zip(PINS, angles(0.7), strict=True))[pin]
-    drive = {pin: {"drive": f"{start!r} + 0.2*sin(3*t)", "law": {}}}
+    drive: dict[str, Scene] = {pin: {"drive": f"{start!r} + 0.2*sin(3*t)", "law": {}}}
     found = []
     for cut in CUTS:
-        scene = linkage(cut, **drive)
+        scene = linkage(cut, True, **drive)
         for hinge in scene["hinge"]:
             hinge["initial"] = {"q": dict(zip(PINS, angles(0.7), strict=True))[hinge["name"]]}
             if "drive" in hinge:

@@ -35,6 +35,7 @@ def test_four_bars_pass_their_singular_pose(count: int, rtol: float, bound: floa
     cranks = result.q[-1, : count + 1]
     assert abs(cranks[0] - ANGLES[count]) < bound
     assert np.ptp(cranks) < 1e-12
+    assert result.statistics is not None
     assert result.statistics.evaluations < 1500 * (2 if rtol < 1e-6 else 1)
 
 

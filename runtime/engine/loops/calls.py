@@ -148,5 +148,6 @@ class _Masses:
             matrix = np.zeros((6, 6))
             matrix[np.triu_indices(6)] = upper
             whole = matrix + np.triu(matrix, 1).T
-            self.known[number] = np.linalg.pinv(whole, rcond=1e-12, hermitian=True)
+            inverse = np.linalg.pinv(whole, rcond=1e-12, hermitian=True)
+            self.known[number] = np.asarray(inverse, dtype=np.float64)
         return self.known[number]

@@ -15,8 +15,7 @@ _GYRATION = 1.0 / 3.0
 
 
 def held(system: System, places: Collection[int]) -> System:
-    """With all speeds of the hinges at some places imposed; bodies of chains are left as they are.
-    """
+    """With all speeds of the hinges at some places imposed, but for those of chains."""
     if not places:
         return system
     runs = tuple(_run_held(run) if run.place in places else run for run in system.bodies)

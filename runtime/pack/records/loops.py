@@ -33,9 +33,7 @@ class _Loops:
         self.row_numbers = int(lib.MSTMM_ROW)
         count = len(self.plan.rows)
         self.dump = count * self.row_numbers
-        self.entries = {
-            pair: self.dump + 6 + k for k, pair in enumerate(self.plan.pairs)
-        }
+        self.entries = {pair: self.dump + 6 + k for k, pair in enumerate(self.plan.pairs)}
         start = self.dump + 6 + len(self.entries)
         self.columns: dict[tuple[int, int], int] = {}
         for body, rows in self.plan.pending.items():
@@ -129,4 +127,3 @@ class _Loops:
             else:
                 rows[row].softness = 1.0 / body.rotor[direction]
         return record
-

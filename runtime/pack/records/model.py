@@ -68,9 +68,7 @@ def write(system: System, elements: Elements) -> Written:
         _force(record, force, elements, memory)
         record.own = int(own)
     model.forces, model.n_forces = forces, len(system.forces)
-    model.needs_pose = int(
-        bool(system.forces or system.loads or system.dragged or system.closures)
-    )
+    model.needs_pose = int(bool(system.forces or system.loads or system.dragged or system.closures))
     inputs = memory.new("mstmm_input[]", max(1, len(system.inputs)))
     for record, one in zip(inputs, system.inputs, strict=False):
         record.n_knots, record.knots = len(one.knots), memory.reals(one.knots)
