@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, Self
 
+from mstmm.errors import NumericalFailure, SceneError
 from mstmm.scene import Scene
 
 from ..flexible.modal_body import ModalBody
@@ -44,7 +45,13 @@ class Compiled:
         self.scene, self.known = scene, known
         self._fusing, self._product_accuracy = fusing, product_accuracy
         self.looped = Engine(pack(scene, known, product_accuracy, least_squares=least_squares))
-        self.closed = Closed(self) if self.packed.system.closures else None
+        self.closed: Closed | None = None
+        if self.packed.system.closures:
+            try:
+                self.closed = Closed(self.looped, len(self.free_speeds))
+            except NumericalFailure as failure:
+                raise SceneError(f"scene: {failure}") from None
+            self.looped = self.closed.engine
         self.fusion: Fusing = fusing(self.packed, known or {}) if fusing else NotFused()
 
     def __reduce__(self) -> tuple[Any, ...]:

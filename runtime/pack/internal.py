@@ -23,7 +23,7 @@ from .laws import laws_of
 from .letting_go import releasable
 from .loops.closures import closures_of
 from .loops.opened import opened
-from .loops.refusal import refuse_unknown
+from .loops.unknown import refuse_unknown
 from .slots import layout_of
 from .system import ForceNumbers, LoadNumbers, Numbers, System
 from .values import MOVING, Moving, Values, drive_kernel, effort_kernel

@@ -85,3 +85,27 @@ def test_speeds_that_contradict_each_other() -> None:
     scene["hinge"][2]["initial"]["u"] = -3.0
     with pytest.raises(mstmm.SceneError, match="contradict each other"):
         mstmm.compile(mstmm.Scene(**scene))
+
+
+def test_a_chain_that_starts_in_line() -> None:
+    """Stretched out nothing tells a chain of balls which way to bend; its end is reached anyway."""
+    link: Scene = {"mass": 1.0, "inertia": [0.01, 0.01, 0.01], "center_of_mass": [0.05, 0, 0],
+                   "ends": {"tip": [0.1, 0, 0]}}  # fmt: skip
+    scene: Scene = {
+        "gravity": [0, 0, -9.81],
+        "chain": [{"name": "links", "count": 12, "inboard": "ground", "body": [link],
+                   "hinge": [{"type": "ball"}]}],
+        "body": [{"name": "last", "mass": 1.0, "inertia": [0.1, 0.1, 0.1],
+                  "ends": {"end": [0.1, 0, 0]}}],
+        "hinge": [
+            {"name": "before", "type": "ball", "inboard": "links[11].tip", "outboard": "last"},
+            {"name": "wall", "type": "ball", "inboard": "ground", "position": [1.0, 0, 0],
+             "outboard": "last.end"},
+        ],
+    }  # fmt: skip
+    model = mstmm.compile(mstmm.Scene(**scene))
+    assert (model.loops.rank, model.loops.mobility) == (3, 36)
+    result = model.simulate(0.3, rtol=1e-8, output_times=[0.0, 0.15, 0.3])
+    assert result.success, result.message
+    assert np.abs(result.position("last.end") - [1.0, 0.0, 0.0]).max() < 1e-7
+    assert np.ptp(result.energy()) < 1e-5

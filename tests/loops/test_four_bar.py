@@ -153,3 +153,56 @@ def test_driven_pins_in_the_tree_and_cut(pin: str) -> None:
         found.append((result.q, result.u, result.effort(pin)))
     for a, b in zip(*found, strict=True):
         assert np.abs(a - b).max() < 1e-8 * max(1.0, np.abs(b).max())
+
+
+@pytest.mark.parametrize("kind", ["pin", "fixed"])
+@pytest.mark.parametrize("cut", CUTS)
+def test_a_hinge_that_lets_go(kind: str, cut: str) -> None:
+    """Held until 0.2 s the linkage stands still; then it moves as if it started there, also where
+    rows that repeated others while it was held are needed from then on."""
+    scene = linkage(cut, laws=False)
+    scene["hinge"][0]["initial"].pop("u")
+    start = dict(zip(PINS, angles(0.7), strict=True))
+    held = scene["hinge"][3]
+    held["release"] = "t >= 0.2"
+    if kind == "fixed":
+        held.pop("initial")
+        held["type"] = "fixed"
+        held["orientation"] = [0.0, 0.0, start["closing_pin"]]
+        for body in scene["body"]:
+            body["inertia"][0] = 0.01
+    else:
+        held.pop("initial")
+        held["drive"] = f"{start['closing_pin']!r}"
+    one = model(scene)
+    assert one.loops.mobility == 0
+    result = one.simulate(0.7, rtol=1e-10, atol=1e-12, output_times=[0.0, 0.2, 0.7])
+    assert result.success, result.message
+    assert np.abs(result.q[1] - result.q[0]).max() < 1e-9
+    if kind == "pin":
+        free = linkage(cut, laws=False)
+        free["hinge"][0]["initial"].pop("u")
+        wanted = model(free).simulate(0.5, rtol=1e-10, atol=1e-12, output_times=[0.0, 0.5])
+        assert np.abs(result.q[-1] - wanted.q[-1]).max() < 1e-7
+    else:
+        assert np.ptp(result.energy()) < 1e-8
+
+
+def test_a_free_hinge_closes_nothing() -> None:
+    scene = linkage(None, laws=False)
+    scene["hinge"][3] |= {"type": "free", "cut": True, "initial": {}}
+    one = model(scene)
+    assert (one.loops.rank, one.loops.rows, one.loops.mobility) == (0, (), 3)
+    result = one.simulate(0.6, output_times=[0.0, 0.6])
+    tree = linkage(None, laws=False)
+    del tree["hinge"][3]
+    wanted = model(tree).simulate(0.6, output_times=[0.0, 0.6])
+    assert np.abs(result.q[-1, :3] - wanted.q[-1]).max() < 1e-7
+
+
+def test_an_event_reads_a_cut_hinge() -> None:
+    scene = linkage("closing_pin", laws=False)
+    scene["event"] = [{"when": "closing_pin.q > 1.0", "do": "stop"}]
+    result = model(scene).simulate(3.0)
+    assert "stopped by event" in result.message
+    assert abs(result.q[-1, 3] - 1.0) < 1e-8

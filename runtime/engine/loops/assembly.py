@@ -26,6 +26,8 @@ _LONGEST, _STEPS = 0.5, 300
 _FIRST, _MOST, _LEAST = 1e-2, 1e8, 1e-12
 #: Gap (m, rad) that is closed, and change (rad, m) at which nothing moves any more.
 _CLOSED, _STILL = 1e-10, 1e-9
+#: Other starts where one leads to an open loop, and how far they are from it (rad, m).
+_TRIES, _SHAKEN = 4, 0.1
 #: So much that the own coordinates of closing hinges alone follow.
 _ALONE = 1e14
 
@@ -44,18 +46,37 @@ class Assembly:
         self.held = tuple(hinges)
         self.calls = LoopCalls(with_held(engine, hinges), q)
         self._weights = self._weighted()
+        #: 1 for speeds that nobody holds.
+        self.free = self._free_speeds()
 
     def positions(self, q: Array, much: float = 0.0) -> Array:
         """q (nq,) with loops closed, or with gaps that no change closes of up to `much` (m, rad).
 
         Raises SceneError with the least gap and what was held where there is none near.
         """
+        draw, start = np.random.default_rng(0), q
+        nearest, missing = self._nearest(start)
+        for _ in range(_TRIES):
+            if self._largest(missing) <= max(much, _CLOSED):
+                return nearest
+            # Where all is in line nothing tells which way to bend.
+            shaken = draw.uniform(-_SHAKEN, _SHAKEN, len(self._still)) * self.free
+            trial, after = self._nearest(self.calls.moved(start, shaken))
+            if self._largest(after) < self._largest(missing):
+                nearest, missing = trial, after
+        if self._largest(missing) <= max(much, _CLOSED):
+            return nearest
+        raise SceneError(self._open(missing))
+
+    def _nearest(self, q: Array) -> tuple[Array, Array]:
+        """q of the least gap that steps from q lead to, and what the rows lack there."""
         q, give = self._own(q), _FIRST
         rest = self._rest(q)
         for _ in range(_STEPS):
             change, missing = self.calls.correction(self.calls.gap, q, self._still, give)
             if self._largest(missing) < _CLOSED:
-                return self.calls.moved(q, change)
+                q = self.calls.moved(q, change)
+                break
             length = float(np.abs(change).max(initial=0.0))
             trial = self._own(self.calls.moved(q, change * min(1.0, _LONGEST / (length or 1.0))))
             after = self._rest(trial)
@@ -66,10 +87,7 @@ class Assembly:
                 break
             else:
                 give *= 10.0
-        missing = self.calls.correction(self.calls.gap, q, self._still, _MOST)[1]
-        if self._largest(missing) <= max(much, _CLOSED):
-            return q
-        raise SceneError(self._open(missing))
+        return q, self.calls.correction(self.calls.gap, q, self._still, _MOST)[1]
 
     def speeds(self, q: Array, u: Array) -> Array:
         """u (nu,) without slips at the closed q.  SceneError where those held do not allow it."""
@@ -84,6 +102,16 @@ class Assembly:
                 "loop; give fewer of them, or others"
             )
         return u
+
+    def _free_speeds(self) -> Array:
+        found, layout = np.ones(self.calls.engine.nu), self.calls.engine.packed.layout
+        for hinge in self.calls.engine.packed.scene.hinge:
+            slots = layout.hinges[hinge.name]
+            drive = hinge.drive or (None,) * slots.nu
+            for k in range(slots.nu):
+                bound = hinge.name in self.held or hinge.is_weld or drive[k] is not None
+                found[slots.u + k] = float(not bound)
+        return found
 
     @property
     def _still(self) -> Array:
@@ -111,17 +139,17 @@ class Assembly:
         least gap is that of the geometry."""
         calls = self.calls
         turning = np.zeros(calls.count, bool)
-        for _, record, rows in calls.closures():
-            directions = calls.numbers_of(record, "W", 36)
-            for direction, row in rows.items():
+        for one in calls.records.closures:
+            directions = calls.numbers_of(one, "W")
+            for direction, row in one.rows.items():
                 force, moment = directions[direction, :3], directions[direction, 3:]
                 turning[row] = moment @ moment > force @ force
-        weights = np.ones(calls.count)
+        weights, self._turning = np.ones(calls.count), turning
         for kind in (turning, ~turning):
             if kind.any():
                 weights[kind] = 1.0 / calls.mobility[kind].mean()
         for row in range(calls.count):
-            calls.model.rows[row].mobility = 1.0 / weights[row]
+            calls.records.scale(row, 1.0 / float(weights[row]))
         return weights
 
     # --- words ------------------------------------------------------------------------------------
@@ -139,13 +167,9 @@ class Assembly:
         return ", ".join(f'"{name}"' for name in self.held) or "driven hinges"
 
     def _hinge(self, row: int) -> str:
-        place = next(place for place, _, rows in self.calls.closures() if row in rows.values())
-        return f'hinge "{self.calls.engine.hinge_name(place)}"'
+        closures = self.calls.records.closures
+        frame = next(one.frame for one in closures if row in one.rows.values())
+        return f'hinge "{self.calls.engine.hinge_name(frame)}"'
 
     def _unit(self, row: int) -> str:
-        for _, record, rows in self.calls.closures():
-            for direction, number in rows.items():
-                if number == row:
-                    load = self.calls.numbers_of(record, "W", 36)[direction]
-                    return "rad" if load[3:] @ load[3:] > load[:3] @ load[:3] else "m"
-        raise AssertionError(row)
+        return "rad" if self._turning[row] else "m"

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mstmm.arrays import Array
 
+from ...pack.records.loops import WrittenClosure
 from ..engine import Engine
 
 #: A pivot below this share of the mobility of its row is rounding.
@@ -22,8 +21,10 @@ class LoopCalls:
     """
 
     def __init__(self, engine: Engine, q: Array) -> None:
-        self.engine, self.model = engine, engine.packed.model
-        self.count = int(self.model.n_rows)
+        records = engine.packed.written.loops
+        assert records is not None
+        self.engine, self.records, self.model = engine, records, engine.packed.model
+        self.count = records.count
         self.memory = engine.start_memory()
         quaternions = np.append(engine.packed.layout.quaternions, 0).astype(np.int32)
         self._quaternions = quaternions
@@ -31,8 +32,8 @@ class LoopCalls:
         self.correction(self.gap, q, np.zeros(engine.nu))
         self.mobility = self._mobilities()
         for row, mobility in enumerate(self.mobility.tolist()):
-            record = self.model.rows[row]
-            record.mobility, record.floor = mobility, ROUNDING * mobility
+            records.scale(row, mobility)
+            records.judge(row, max(records.floor(row), ROUNDING * mobility))
 
     @property
     def gap(self) -> int:
@@ -92,34 +93,23 @@ class LoopCalls:
 
     def _of_rows(self, name: str) -> Array:
         lib, stride = self.engine.lib, int(self.engine.lib.MSTMM_ROW)
-        first = int(self.model.loops) + int(getattr(lib, f"MSTMM_ROW_{name}"))
+        first = self.records.place + int(getattr(lib, f"MSTMM_ROW_{name}"))
         return self.engine.workspace_array()[first : first + stride * self.count : stride].copy()
 
-    def closures(self) -> list[tuple[int, Any, dict[int, int]]]:
-        """(place, record, direction -> row) of every hinge that closes a loop."""
-        found = []
-        for one in self.engine.packed.system.closures:
-            record = self.model.looped[one.frame].closure
-            rows = {k: int(record.rows[k]) for k in range(6) if record.rows[k] >= 0}
-            found.append((one.frame, record, rows))
-        return found
-
-    def numbers_of(self, record: Any, name: str, count: int) -> Array:
-        """Numbers of a closure after a correction; W, J_A and J_B have 6 rows of 6."""
-        at = int(self.model.loops) + int(record.numbers)
+    def numbers_of(self, one: WrittenClosure, name: str) -> Array:
+        """Numbers of a closure after a correction: W, J_A or J_B, 6 rows of 6."""
+        at = self.records.place + one.numbers
         at += int(getattr(self.engine.lib, f"MSTMM_CLOSURE_{name}"))
-        found = self.engine.workspace_array()[at : at + count].copy()
-        return found.reshape(6, 6) if count == 36 else found
+        return self.engine.workspace_array()[at : at + 36].reshape(6, 6).copy()
 
     def _mobilities(self) -> Array:
         """J M^-1 J^T of both ends, bodies taken as free; of what has no mass that of the others."""
         found, masses = np.zeros(self.count), _Masses(self.engine)
-        for place, record, rows in self.closures():
-            sides = (int(self.model.bodies[place].parent), "J_A"), (int(record.outboard), "J_B")
-            for body, name in sides:
+        for one in self.records.closures:
+            for body, name in ((one.inboard, "J_A"), (one.outboard, "J_B")):
                 if body >= 0:
-                    columns, inverse = self.numbers_of(record, name, 36), masses.inverse(body)
-                    for direction, row in rows.items():
+                    columns, inverse = self.numbers_of(one, name), masses.inverse(body)
+                    for direction, row in one.rows.items():
                         column = columns[direction]
                         found[row] += column @ inverse @ column
         known = found[found > 0]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +16,7 @@ from ...pack.start import start_values
 from ..engine import Engine
 from .assembly import Assembly
 from .calls import LoopCalls
-from .rank import rank_at
-
-if TYPE_CHECKING:
-    from ..compiled import Compiled
+from .rank import REPEATED, rank_at
 
 #: Directions of a hinge that closes a loop, as its rows are called.
 _DIRECTIONS = ("x", "y", "z", "mx", "my", "mz")
@@ -56,14 +52,16 @@ class Loops:
 
 
 class Closed:
-    """The start of a scene with its loops closed, and what is known of them."""
+    """The start of a scene with its loops closed, and what is known of them.
 
-    def __init__(self, compiled: Compiled) -> None:
-        self.compiled = compiled
-        packed, engine = compiled.packed, compiled.looped
+    `engine` is the one to go on with, in which rows that always repeat others are left out.
+    """
+
+    def __init__(self, engine: Engine, free_speeds: int) -> None:
+        packed, self.engine = engine.packed, engine
         hinges = [hinge for hinge in packed.described.hinge if not hinge.is_weld]
-        self._holds = [hinge.name for hinge in hinges if hinge.hold]
-        self._fast = [
+        holds = [hinge.name for hinge in hinges if hinge.hold]
+        fast = [
             hinge.name for hinge in hinges
             if hinge.drive is None and hinge.initial is not None and any(hinge.initial.u or ())
         ]  # fmt: skip
@@ -71,10 +69,10 @@ class Closed:
         calls = LoopCalls(engine, q)
         q, u = calls.driven(q, u)
         length = length_of(packed.system)
-        near = Assembly(engine, q, self._holds).positions(q, _NEARLY * length)
-        self.loops, locked = self._judged(near)
-        self.start = self.assembled(near, u, self._holds, self._fast)
-        self._refuse_locked(calls, locked, _LOCKED * length)
+        near = Assembly(engine, q, holds).positions(q, _NEARLY * length)
+        self.loops, repeating = self._judged(near, free_speeds)
+        self.start = self.assembled(near, u, holds, fast)
+        self._refuse_locked(calls, repeating, _LOCKED * length)
 
     def assembled(
         self, q: Array, u: Array, holds: Collection[str], fast: Collection[str]
@@ -83,32 +81,32 @@ class Closed:
 
         Raises SceneError where there is none.
         """
-        engine = self.compiled.looped
-        q = Assembly(engine, q, holds).positions(q)
-        return q, Assembly(engine, q, fast).speeds(q, u)
+        q = Assembly(self.engine, q, holds).positions(q)
+        return q, Assembly(self.engine, q, fast).speeds(q, u)
 
-    def _judged(self, q: Array) -> tuple[Loops, dict[int, tuple[str, str]]]:
-        """What closes near q, and the rows that repeat others, without which the engine is from now
-        on."""
-        compiled = self.compiled
-        rank, calls = rank_at(compiled.looped, q), LoopCalls(compiled.looped, q)
-        names, system = self._names(calls), compiled.packed.system
-        bound = [calls.model.rows[row].softness > 0 for row in range(calls.count)]
-        met = calls.count - sum(bound) - len(rank.here)
-        if rank.always:
+    def _judged(self, q: Array, free_speeds: int) -> tuple[Loops, dict[int, tuple[str, str]]]:
+        """What closes near q, and the rows that always repeat others."""
+        rank, calls = rank_at(self.engine, q), LoopCalls(self.engine, q)
+        packed, records = self.engine.packed, calls.records
+        names = self._names(calls)
+        met = [row for row in range(calls.count) if not records.yields(row)]
+        rows = len(met) - len(rank.here)
+        if packed.releases:
+            # What repeats others now may be needed once these let go: by every evaluation.
+            for row in rank.always:
+                records.judge(row, REPEATED * float(calls.mobility[row]))
+        elif rank.always:
             repeated = {
-                (place, direction)
-                for place, _, rows in calls.closures()
-                for direction, row in rows.items() if row in rank.always
+                (one.frame, direction)
+                for one in records.closures
+                for direction, row in one.rows.items() if row in rank.always
             }  # fmt: skip
-            compiled.looped = Engine(packed_system(without(system, repeated), compiled.packed))
-            LoopCalls(compiled.looped, q)
-        model = compiled.packed.model
+            self.engine = Engine(packed_system(without(packed.system, repeated), packed))
+            records = LoopCalls(self.engine, q).records
         told = Loops(
-            tuple(cut.hinge for cut in compiled.packed.expanded.cuts),
-            tuple(names), met, tuple(names[row] for row in sorted(rank.here)),
-            self._free_of_tree() - met,
-            max(int(model.looped[k].n_pending) for k in range(model.n_bodies)), rank.singular,
+            tuple(cut.hinge for cut in packed.expanded.cuts), tuple(names), rows,
+            tuple(names[row] for row in sorted(rank.here)),
+            free_speeds - self._shared() - rows, records.width, rank.singular,
         )  # fmt: skip
         return told, {row: names[row] for row in sorted(rank.always)}
 
@@ -126,22 +124,19 @@ class Closed:
                     "make axes parallel and points meet, or use a ball or cylindrical hinge"
                 )
 
-    def _free_of_tree(self) -> int:
-        """Speeds that nobody imposes, but for those that cut hinges share with the tree; what is
-        driven of these takes one away."""
-        system = self.compiled.packed.system
+    def _shared(self) -> int:
+        """Speeds of cut hinges that nobody imposes: the tree has them already."""
+        system = self.engine.packed.system
         frames = [system.body(one.frame) for one in system.closures]
-        shared = sum(frame.nu - sum(frame.imposed) for frame in frames)
-        return len(self.compiled.free_speeds) - shared
+        return sum(frame.nu - sum(frame.imposed) for frame in frames)
 
     def _names(self, calls: LoopCalls) -> list[tuple[str, str]]:
         """(hinge, direction) of every row."""
-        names = [("", "")] * calls.count
-        for place, record, rows in calls.closures():
-            hinge = calls.engine.hinge_name(place)
-            speeds = int(calls.model.bodies[place].nu)
-            directions = calls.numbers_of(record, "W", 36)
-            for direction, row in rows.items():
+        names, system = [("", "")] * calls.count, self.engine.packed.system
+        for one in calls.records.closures:
+            hinge, speeds = calls.engine.hinge_name(one.frame), system.body(one.frame).nu
+            directions = calls.numbers_of(one, "W")
+            for direction, row in one.rows.items():
                 along = int(np.abs(directions[direction]).argmax())
                 word = f"u{direction + 1}" if direction < speeds else _DIRECTIONS[along]
                 names[row] = (hinge, word)

@@ -65,7 +65,7 @@ def rank_at(engine: Engine, q: Array) -> Rank:
 def _repeating(calls: LoopCalls, q: Array, level: Array) -> frozenset[int]:
     """Rows whose pivots are below their level, those before them taken as met."""
     for row, floor in enumerate(level.tolist()):
-        calls.model.rows[row].floor = floor
+        calls.records.judge(row, floor)
     calls.correction(calls.slip, q, np.zeros(calls.engine.nu))
     return frozenset(np.flatnonzero(calls.inverses() == 0.0).tolist())
 
@@ -76,7 +76,7 @@ def _neighbour(calls: LoopCalls, q: Array, speeds: Array) -> Array | None:
     All rows are met there, those that repeat others here as well.
     """
     for row in range(calls.count):
-        calls.model.rows[row].floor = 0.0
+        calls.records.judge(row, 0.0)
     try:
         tangent = speeds + calls.correction(calls.slip, q, speeds)[0]
         length = float(np.abs(tangent).max(initial=0.0))

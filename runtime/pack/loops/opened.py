@@ -13,7 +13,7 @@ from mstmm.graph.plan import Plan
 from mstmm.scene import Body, Scene
 from mstmm.scene.checks.topology import build
 
-from .refusal import may_close, refuse_unknown
+from .unknown import may_close, refuse_unknown
 
 
 @dataclass(frozen=True, slots=True)

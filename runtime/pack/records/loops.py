@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from ..loops.rows import GROUND, Ends, RowPlan, planned
@@ -9,11 +10,52 @@ from ..system import ClosureNumbers, System
 from .memory import Memory
 
 
-def attach_loops(model: Any, system: System, memory: Memory, lib: Any, place: int) -> int:
-    """Give the model the rows of its loops and a place for them in the workspace; returns the
-    place behind them."""
+@dataclass(frozen=True)
+class WrittenClosure:
+    """A hinge that closes a loop: the place of its frame, those of its bodies, where its numbers
+    begin behind those of all loops, and the row of each direction that has one."""
+
+    frame: int
+    inboard: int
+    outboard: int
+    numbers: int
+    rows: dict[int, int]
+
+
+class LoopRecords:
+    """Closed loops in the memory of C; `place` is where their numbers begin in the workspace."""
+
+    def __init__(
+        self, place: int, plan: RowPlan, rows: Any, closures: tuple[WrittenClosure, ...]
+    ) -> None:
+        self.place, self.closures, self._rows = place, closures, rows
+        self.count = len(plan.rows)
+        self.width = max(map(len, plan.pending.values()), default=0)
+
+    def yields(self, row: int) -> bool:
+        """Whether the row is that of a rotor."""
+        return bool(self._rows[row].softness > 0)
+
+    def scale(self, row: int, mobility: float) -> None:
+        """Take this for the mobility of a row where rows give way."""
+        self._rows[row].mobility = mobility
+
+    def judge(self, row: int, floor: float) -> None:
+        """Take pivots of a row up to `floor` for rounding."""
+        self._rows[row].floor = floor
+
+    def floor(self, row: int) -> float:
+        """Up to where pivots of a row are rounding."""
+        return float(self._rows[row].floor)
+
+
+def attach_loops(
+    model: Any, system: System, memory: Memory, lib: Any, place: int
+) -> tuple[int, LoopRecords | None]:
+    """Give the model the rows of its loops and a place for them in the workspace; returns the place
+    behind them, and the records."""
     if not system.closures:
-        return place
+        return place, None
     return _Loops(model, system, memory, lib).write(place)
 
 
@@ -42,7 +84,7 @@ class _Loops:
                 start += 6
         self.summed = self.end = start
 
-    def write(self, place: int) -> int:
+    def write(self, place: int) -> tuple[int, LoopRecords]:
         model, memory = self.model, self.memory
         looped = memory.new("mstmm_looped[]", self.system.count)
         for body, rows in self.plan.pending.items():
@@ -61,11 +103,13 @@ class _Loops:
                 at = looped[row.body]
                 at.first_row = number if not at.n_rows else at.first_row
                 at.n_rows += 1
+        written = []
         for group, closure in enumerate(self.system.closures):
-            looped[closure.frame].closure = self._closure(group, closure, records)
+            looped[closure.frame].closure, told = self._closure(group, closure, records)
+            written.append(told)
         model.looped, model.rows, model.n_rows = looped, records, len(self.plan.rows)
         model.loops, model.loops_summed = place, self.summed
-        return place + self.end
+        return place + self.end, LoopRecords(place, self.plan, records, tuple(written))
 
     def _take(self, count: int) -> int:
         first = self.end
@@ -105,17 +149,20 @@ class _Loops:
             records[k].pairs = self._places([self._entry(other, x) for x in others[: k + 1]])
         return records
 
-    def _closure(self, group: int, closure: ClosureNumbers, rows: Any) -> Any:
+    def _closure(
+        self, group: int, closure: ClosureNumbers, rows: Any
+    ) -> tuple[Any, WrittenClosure]:
         record = self.memory.new("mstmm_closure *")
         record.outboard = closure.outboard
         record.turn, record.end = list(closure.turn), list(closure.end)
         record.numbers = self._take(int(self.lib.MSTMM_CLOSURE))
         record.rows = [-1] * 6
-        body = self.system.body(closure.frame)
+        body, own = self.system.body(closure.frame), dict[int, int]()
+        inboard = self.parents[closure.frame]
         for k, direction in enumerate(closure.directions):
             row = self.plan.first[group] + k
-            record.rows[direction] = row
-            sides = (self.parents[closure.frame], closure.outboard)
+            record.rows[direction] = own[direction] = row
+            sides = (inboard, closure.outboard)
             inner, outer = (
                 self.dump if side == GROUND else self._column(side, row) for side in sides
             )
@@ -126,4 +173,5 @@ class _Loops:
                 rows[row].release = body.release
             else:
                 rows[row].softness = 1.0 / body.rotor[direction]
-        return record
+        told = WrittenClosure(closure.frame, inboard, closure.outboard, record.numbers, own)
+        return record, told

@@ -14,7 +14,7 @@ from ..system import ForceNumbers, LoadNumbers, System
 from .bodies import BodyRecords
 from .laws import LawRecords
 from .links import attach_runs
-from .loops import attach_loops
+from .loops import LoopRecords, attach_loops
 from .memory import Memory
 
 
@@ -35,6 +35,7 @@ class Written:
     scratch: int
     slots: int
     reach: Reach
+    loops: LoopRecords | None
 
 
 def write(system: System, elements: Elements) -> Written:
@@ -75,7 +76,7 @@ def write(system: System, elements: Elements) -> Written:
         record.numbers = memory.reals([x for piece in one.pieces for x in piece])
     model.inputs, model.n_inputs = inputs, len(system.inputs)
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
-    behind = attach_loops(model, system, memory, lib, bodies.end)
+    behind, loops = attach_loops(model, system, memory, lib, bodies.end)
     scratch = attach_runs(model, system, memory, lib, behind)
     modal = bodies.modal
     return Written(
@@ -87,6 +88,7 @@ def write(system: System, elements: Elements) -> Written:
         scratch,
         memory.slots,
         reach,
+        loops,
     )
 
 
