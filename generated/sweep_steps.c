@@ -999,7 +999,7 @@ static int mstmm_at_closures(mstmm_state *state, int index)
         .v_C = block + MSTMM_BLOCK_V, .w_C = block + MSTMM_BLOCK_MOTION,
         .v_B = outboard + MSTMM_BLOCK_V, .w_B = outboard + MSTMM_BLOCK_MOTION,
         .slip = closed + MSTMM_CLOSURE_SLIP);
-    if ((state->level == MSTMM_GAP)) {
+    if (state->level == MSTMM_GAP) {
         mstmm_loops_rows(
             .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C,
             .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
@@ -1007,7 +1007,7 @@ static int mstmm_at_closures(mstmm_state *state, int index)
             .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
             .l = closed + MSTMM_CLOSURE_L);
     }
-    if ((state->level == MSTMM_SLIP)) {
+    if (state->level == MSTMM_SLIP) {
         mstmm_loops_rows(
             .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C,
             .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
@@ -1223,7 +1223,7 @@ static int mstmm_at_answered(mstmm_state *state, int index)
 /* Accelerations and load of a hinge that closes a loop. */
 static int mstmm_at_closures_answered(mstmm_state *state, int index)
 {
-    real c[6];
+    real along[6];
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
@@ -1237,11 +1237,11 @@ static int mstmm_at_closures_answered(mstmm_state *state, int index)
     mstmm_loops_told(
         .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
         .l = closed + MSTMM_CLOSURE_L, .delta_A = parent + MSTMM_BLOCK_DELTA,
-        .delta_B = outboard + MSTMM_BLOCK_DELTA, .c = c);
+        .delta_B = outboard + MSTMM_BLOCK_DELTA, .c = along);
     for (int j = 0; j < nu; j++)
         (state->udot + body->u)[j] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j];
     for (int k = 0; k < body->nu; k++) {
-        (state->udot + body->u + k)[0] += (c + k)[0];
+        (state->udot + body->u + k)[0] += (along + k)[0];
     }
     if ((state->observed || state->balance)) {
         memset(block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));

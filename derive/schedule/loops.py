@@ -175,9 +175,9 @@ CLOSURES_ANSWERED = Pass(
     "closures_answered", "body", "Accelerations and load of a hinge that closes a loop.",
     (
         call("loops.told", **_ROWS, delta_A="parent.delta", delta_B="outboard.delta",
-             c="local.c"),
+             c="local.along"),
         Copy(to="body.udot", source="body.s"),
-        EachSpeed(steps=(Add(to="body.udot[k]", source="local.c[k]"),)),
+        EachSpeed(steps=(Add(to="body.udot[k]", source="local.along[k]"),)),
         *only(
             "kept",
             Copy(to="body.e"),

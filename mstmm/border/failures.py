@@ -26,3 +26,5 @@ class Failed(IntEnum):
     """The modal mass matrix of a flexible body is not positive definite."""
     TANGENT = 9
     """The tangent of a step leaves a motion undetermined."""
+    LOOP = 10
+    """A loop cannot be closed near a state."""

@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 
 
 #: What a run ends with where call-backs of the scene fail; their code says how.
-_EVALUATIONS = (Status.RHS_FAILED, Status.EVENT_FAILED, Status.TANGENT_FAILED)
+_EVALUATIONS = (
+    Status.RHS_FAILED, Status.EVENT_FAILED, Status.TANGENT_FAILED, Status.ACCEPT_FAILED,
+)  # fmt: skip
 
 
 #: What a run may end with where an expression stops being a number.

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array
+from mstmm.border.failures import Failed
+from mstmm.errors import SceneError
 from mstmm.ir.tape import Tape
 
 from ..engine.calls import Probe
@@ -140,12 +142,17 @@ class SceneSystem:
         return bool(self.run.with_power)
 
     def start(self, t: float, q: ArrayLike, u: ArrayLike) -> Array:
-        """State vector at t with driven coordinates, quaternions and memory in order."""
+        """State vector at t with driven coordinates, quaternions, loops and memory in order.
+
+        Raises SceneError where a loop does not close near the state.
+        """
         y = np.concatenate(
             [np.asarray(q, float), np.asarray(u, float), np.zeros(int(self.with_power))]
         )
         y = np.ascontiguousarray(y)
         self.engine.lib.mstmm_scene_settle(self.run, t, self.engine.pointer(y))
+        if self.run.failure.reason == Failed.LOOP:
+            raise SceneError(f"scene: {self.engine.failure_text(self.run.failure, t)}")
         return y
 
     def components(self) -> StateNames:

@@ -206,3 +206,23 @@ def test_an_event_reads_a_cut_hinge() -> None:
     result = model(scene).simulate(3.0)
     assert "stopped by event" in result.message
     assert abs(result.q[-1, 3] - 1.0) < 1e-8
+
+
+def rocker_driven() -> mstmm.Model:
+    """The rocker turns on beyond its dead centres, where the loop would have to tear."""
+    start = dict(zip(PINS, angles(0.7), strict=True))["rocker_pin"]
+    scene = linkage("closing_pin", False, rocker_pin={"drive": f"{start!r} + t"})
+    scene["hinge"][2].pop("initial")
+    scene["hinge"][0]["initial"].pop("u")
+    return model(scene)
+
+
+def test_a_start_that_cannot_be_closed_is_refused() -> None:
+    with pytest.raises(mstmm.SceneError, match='"closing_pin" at t = 2 s: the loop .* is open'):
+        rocker_driven().simulate(2.1, t_start=2.0)
+
+
+def test_a_drive_beyond_the_mechanism_ends_the_run() -> None:
+    result = rocker_driven().simulate(5.0, rtol=1e-6, max_steps=20000)
+    assert not result.success
+    assert result.t[-1] < 2.0

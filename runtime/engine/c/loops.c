@@ -6,9 +6,11 @@
 #include "sweep.h"
 #include "sweep_steps.h"
 
-/* Newton's method: from this gap (m, rad) on the next step leaves rounding, and so many steps. */
+/* Newton's method: from this gap (m, rad) on the next step leaves rounding; so many steps, and the
+ * gap that is still none behind them, where a singular pose makes them slow. */
 #define CLOSE 1e-7
-#define STEPS 8
+#define STEPS 10
+#define OPEN 1e-5
 
 static real *row_numbers(const mstmm_state *state, int row)
 {
@@ -98,8 +100,9 @@ void mstmm_unit_quaternions(int count, const int *first, real *q)
     }
 }
 
-/* Largest of what the rows lack that have a multiplier, and own speeds of hinges that close. */
-static real largest(const mstmm_state *state)
+/* Largest of what the rows lack that have a multiplier, and own speeds of hinges that close; *where
+ * is the frame of its hinge. */
+static real largest(const mstmm_state *state, int *where)
 {
     const mstmm_model *model = state->model;
     real found = 0;
@@ -111,7 +114,9 @@ static real largest(const mstmm_state *state)
         for (int c = 0; c < 6; c++) {
             const int row = closure->rows[c];
             if (row >= 0 && !(row_numbers(state, row)[MSTMM_ROW_INVERSE] > 0)) continue;
-            if (!(fabs(known[c]) <= found)) found = fabs(known[c]);
+            if (fabs(known[c]) <= found) continue;
+            found = fabs(known[c]);
+            *where = i;
         }
     }
     return found;
@@ -121,18 +126,19 @@ int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q
                       const real *memory, int n_quaternions, const int *quaternions,
                       mstmm_failure *failure)
 {
-    mstmm_state state = {.model = model, .workspace = workspace};
-    real *change = mstmm_spare_udot(&state);
-    for (int k = 0; k < STEPS; k++) {
+    mstmm_state state = {.model = model, .workspace = workspace, .failure = failure};
+    real *change = mstmm_spare_udot(&state), gap = 1;
+    int where = 0;
+    for (int k = 0; k < STEPS && !(gap < CLOSE); k++) {
         int code = mstmm_correction(model, workspace, MSTMM_GAP, 0, t, q, u, memory, change, NULL,
                                     failure);
-        const real gap = code ? 0 : largest(&state);
+        gap = code ? 0 : largest(&state, &where);
         if (!code)
             code = mstmm_moved(model, workspace, t, q, change, memory, n_quaternions, quaternions,
                                failure);
         if (code) return code;
-        if (gap < CLOSE) break;
     }
+    if (!(gap < OPEN)) return mstmm_fail(&state, MSTMM_FAILED_LOOP, where, 0);
     const int code =
         mstmm_correction(model, workspace, MSTMM_SLIP, 0, t, q, u, memory, change, NULL, failure);
     if (code) return code;
