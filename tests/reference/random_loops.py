@@ -97,14 +97,14 @@ def _close(
 
 def _far_from_singular(tree: Tree, q: Array) -> bool:
     """Whether no row of the loops repeats others, or nearly."""
-    shares = scipy.linalg.svdvals(_rows(tree, q))
+    shares = scipy.linalg.svdvals(torn(tree, q))
     return bool(shares[-1] > 1e-2 * shares[0]) and tree.nu > len(shares)
 
 
-def _rows(tree: Tree, q: Array) -> Array:
+def torn(tree: Tree, q: Array) -> Array:
     """How unit speeds tear the loops, six rows a closing hinge."""
     closing = _closing(tree)
-    return np.array([_torn(tree, closing, q, column) for column in np.eye(tree.nu)]).T
+    return np.array([_gap_speeds(tree, closing, q, column) for column in np.eye(tree.nu)]).T
 
 
 def _closing(tree: Tree) -> list[Hinge]:
@@ -115,11 +115,11 @@ def consistent(tree: Tree, q: Array, u: Array) -> Array:
     """The nearest speeds at which no loop is torn apart."""
     if not _closing(tree):
         return u
-    free = scipy.linalg.null_space(_rows(tree, q), rcond=1e-10)
+    free = scipy.linalg.null_space(torn(tree, q), rcond=1e-10)
     return np.asarray(free @ (free.T @ u))
 
 
-def _torn(tree: Tree, closing: list[Hinge], q: Array, u: Array) -> Array:
+def _gap_speeds(tree: Tree, closing: list[Hinge], q: Array, u: Array) -> Array:
     """Velocities of the outboard ends against those that the closing hinges give them."""
     at, found = motion(tree, q, u), []
     for hinge in closing:
