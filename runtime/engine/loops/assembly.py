@@ -81,7 +81,8 @@ class Assembly:
             trial = self._own(self.calls.moved(q, change * min(1.0, _LONGEST / (length or 1.0))))
             after = self._rest(trial)
             if after < rest:
-                give = max(give / 10.0, _LEAST) if after < rest / 2.0 else give
+                whole = 3.0 if length < _LONGEST else 1.0
+                give = max(give / (10.0 if after < rest / 2.0 else whole), _LEAST)
                 q, rest = trial, after
             elif give > _MOST or length < _STILL:
                 break
