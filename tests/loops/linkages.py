@@ -108,9 +108,7 @@ def bricard(cut: int = 5) -> Scene:
     five rods of 1 m and 10 kg.  At the start all axes are those of the ground.  Rods behind the
     pin that is cut begin at their far ends.
     """
-    corners = np.array(
-        [[0, 0, 0], [1, 0, 0], [1, -1, 0], [1, -1, 1], [0, -1, 1], [0, 0, 1]], float
-    )
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, -1, 0], [1, -1, 1], [0, -1, 1], [0, 0, 1.0]])
     bodies: list[Scene] = []
     for k in range(5):
         along = corners[k + 1] - corners[k] if k < cut else corners[k] - corners[k + 1]

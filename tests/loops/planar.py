@@ -97,8 +97,6 @@ def motion(crank: float, speed: float, laws: Laws, times: Array) -> tuple[Array,
         return np.r_[y[3:], accelerations(y[:3], y[3:], laws)]
 
     begin = np.concatenate(start(crank, speed))
-    done = solve_ivp(
-        rates, (0.0, times[-1]), begin, "DOP853", t_eval=times, rtol=1e-13, atol=1e-13
-    )
+    done = solve_ivp(rates, (0.0, times[-1]), begin, "DOP853", t_eval=times, rtol=1e-13, atol=1e-13)
     assert done.success, done.message
     return done.y[:3].T, done.y[3:].T

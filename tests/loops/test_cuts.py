@@ -41,7 +41,7 @@ def signs(cut: str) -> Array:
 @pytest.mark.parametrize("tilt", [(0.0, 0.0, 0.0), OBLIQUE])
 @pytest.mark.parametrize("cut", planar.NAMES)
 def test_any_hinge_of_a_four_bar(cut: str, tilt: tuple[float, float, float]) -> None:
-    """Springs, dampers, a motor, friction and rotors in all four hinges; in the plane and across."""
+    """Springs, dampers, a motor, friction, rotors in all hinges; in the plane and across."""
     model = compiled(four_bar(speed=SPEED, cut=cut, laws=LAWS, tilt=tilt))
     assert model.loops.cut == (cut,)
     found, rates = planar.start(0.9, SPEED)
@@ -110,8 +110,7 @@ def test_any_hinge_of_a_bricard_ring() -> None:
 
 
 def test_any_leg_carries_the_platform() -> None:
-    """Five of the six legs close loops, by balls; which ones, the platform and all legs move alike.
-    """
+    """Five of six legs close loops, by balls; whichever, the platform and all legs move alike."""
     scene = legs(law=4e4)
     push = next(hinge for hinge in scene["hinge"] if hinge["name"] == "slide1")
     push["law"]["effort"] = 300.0

@@ -1,4 +1,4 @@
-"""How many freedoms closed loops leave: published mobilities, and random ones by singular values."""
+"""What closed loops leave free: published mobilities, and random ones by singular values."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import mstmm
 
 from .linkages import OBLIQUE, bricard, cranks, four_bar, legs
 from .scenes import four_bars
+
 
 def loops(scene: dict[str, Any]) -> Any:
     return mstmm.compile(mstmm.Scene(**scene)).loops
@@ -44,13 +45,11 @@ def test_rows_of_windows_pass_few_hinges() -> None:
     assert loops(four_bars(200, 0.7)).width <= 4
 
 
-@pytest.mark.parametrize("seed", range(30, 38))
+@pytest.mark.parametrize("seed", [31, 36, 38, 39, 40])
 def test_random_mechanisms_keep_what_their_rows_leave(seed: int) -> None:
     """Speeds less the rank of all six rows of every closing hinge, by singular values."""
     scene, q, _ = random_mechanism(seed, laws=False)
     tree = read(scene)
-    if len(tree.order) == len(tree.hinges):
-        pytest.skip("a tree")
     found = loops(scene)
     assert found.mobility == tree.nu - np.linalg.matrix_rank(torn(tree, q), tol=1e-8)
     assert found.rank == len(found.rows) and not found.singular
