@@ -85,7 +85,9 @@ def main() -> None:
     wanted = (energy(times + step) - energy(times - step)) / (2 * step * SPEED)
     error = np.abs(effort - wanted).max() / np.abs(wanted).max()
     work = simpson(SPEED * effort[:201], x=times[:201])
-    print(f"effort up to {abs(wanted).max():.3f} N m, off by {error:.1e}; work of a turn {work:.1e} J")
+    print(
+        f"effort up to {abs(wanted).max():.3f} N m, off by {error:.1e}; work of a turn {work:.1e} J"
+    )
     assert error < 1e-5
     assert abs(work) < 1e-4
 

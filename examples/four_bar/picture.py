@@ -42,7 +42,9 @@ def draw(path: Path) -> None:
     left.set_aspect("equal")
     left.margins(0.08)
     left.legend(frameon=False, loc="lower right")
-    right.plot(np.linspace(0, 360, 361), result.quantity("crank_pin.effort").values, color="#1d3557")
+    right.plot(
+        np.linspace(0, 360, 361), result.quantity("crank_pin.effort").values, color="#1d3557"
+    )
     right.axhline(0.0, color="black", lw=0.6)
     right.set(
         xlabel="angle of the crank, degrees", ylabel="effort of the drive, N m",
