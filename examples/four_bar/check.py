@@ -2,9 +2,10 @@
 
 Statements: (1) the tip of the coupler is where two circles about the crank's tip and the rocker's
 foot put it, within 1e-9 m over three turns, and the loop is closed to 1e-12 m.  (2) While the crank
-goes through the half turn away from the rocker, the tip stays on a line of 0.4 m within 1 mm.  (3) The effort of the drive is the rate of the energy of three rods, written below in the
-crank's angle, over its speed, and its work over a whole turn is zero.  (4) Of the five rows of the
-pin that closes the loop two say anything, and one motion is left, which the drive takes.
+goes through the half turn away from the rocker, the tip stays on a line of 0.4 m within 1 mm.
+(3) The effort of the drive is the rate of the energy of three rods, written below in the crank's
+angle, over its speed, and its work over a whole turn is zero.  (4) Of the five rows of the pin that
+closes the loop two say anything, and one motion is left, which the drive takes.
 """
 
 from __future__ import annotations
