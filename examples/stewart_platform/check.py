@@ -1,8 +1,8 @@
 """Stewart's platform driven by its legs.
 
 Statements: (1) from rough angles the five loops close, by balls that are cut, with fifteen rows
-that all count; the six drives leave no motion.  (2) The platform goes up and down as asked, and level,
-within 1e-9 m and rad.  (3) All legs push alike, and with the rate of the energy of platform,
+that all count; the six drives leave no motion.  (2) The platform goes up and down as asked, and
+level, within 1e-9 m and rad.  (3) All legs push alike, and with the rate of the energy of platform,
 cylinders and pistons, written below in the height, over six times the rate of the legs.  (4) Legs
 driven to six other lengths carry the platform to where its ends are these lengths from the feet.
 """
