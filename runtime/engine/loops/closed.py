@@ -93,13 +93,13 @@ class Closed:
         rows = len(met) - len(rank.here)
         if packed.releases:
             # What repeats others now may be needed once these let go: by every evaluation.
-            for row in rank.always:
+            for row in rank.going:
                 records.judge(row, REPEATED * float(calls.mobility[row]))
-        elif rank.always:
+        elif rank.going:
             repeated = {
                 (one.frame, direction)
                 for one in records.closures
-                for direction, row in one.rows.items() if row in rank.always
+                for direction, row in one.rows.items() if row in rank.going
             }  # fmt: skip
             self.engine = Engine(packed_system(without(packed.system, repeated), packed))
             records = LoopCalls(self.engine, q).records
@@ -108,7 +108,7 @@ class Closed:
             tuple(names[row] for row in sorted(rank.here)),
             free_speeds - self._shared() - rows, records.width, rank.singular,
         )  # fmt: skip
-        return told, {row: names[row] for row in sorted(rank.always)}
+        return told, {row: names[row] for row in sorted(rank.going)}
 
     def _refuse_locked(
         self, calls: LoopCalls, repeating: Mapping[int, tuple[str, str]], much: float

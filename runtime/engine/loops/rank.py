@@ -9,6 +9,7 @@ states nearby is no repetition but a singular pose.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -34,10 +35,13 @@ _STEPS, _CLOSED, _GIVE, _SHARE = 60, 1e-9, 1e-6, 1e-2
 
 @dataclass(frozen=True)
 class Rank:
-    """Rows that repeat others here, and those of them that do so in closed states nearby too."""
+    """Rows that repeat others here, those of them that do so in closed states nearby too, and those
+    of these that go: the others take the place of another row of their hinge where that one says
+    nothing, at a pose farther away."""
 
     here: frozenset[int]
     always: frozenset[int]
+    going: frozenset[int]
 
     @property
     def singular(self) -> bool:
@@ -52,14 +56,36 @@ def rank_at(engine: Engine, q: Array) -> Rank:
     level = REPEATED * calls.mobility
     here = _repeating(calls, q, level)
     if not here:
-        return Rank(here, here)
+        return Rank(here, here, here)
     raised = _RAISED * np.abs(calls.pivots()) + _ROUNDING * calls.mobility
     level[list(here)] = np.minimum(level, raised)[list(here)]
     always, draw = here, np.random.default_rng(0)
     for _ in range(_NEIGHBOURS):
         near = _neighbour(calls, q, draw.uniform(-1.0, 1.0, engine.nu))
         always = always if near is None else always & _repeating(calls, near, level)
-    return Rank(here, always)
+    gaps = calls.correction(calls.gap, q, np.zeros(engine.nu))[1]
+    if np.abs(gaps).max() > _CLOSED:
+        return Rank(here, always, always)
+    return Rank(here, always, always - _stand_ins(calls, q, always))
+
+
+def _stand_ins(calls: LoopCalls, q: Array, left_out: frozenset[int]) -> frozenset[int]:
+    """Rows that say something once another row of their hinge is left out in their place: they stay
+    where all gaps close, and at each pose the first that say something count.
+
+    Tried for all hinges at a time: what each leaves out first for what it keeps first, and so on.
+    """
+    hinges = [set(one.rows.values()) for one in calls.records.closures]
+    sides = [(sorted(rows & left_out), sorted(rows - left_out)) for rows in hinges]
+    found: set[int] = set()
+    for out, kept in product(range(6), range(6)):
+        pairs = [(o[out], k[kept]) for o, k in sides if out < len(o) and kept < len(k)]
+        if pairs:
+            level = REPEATED * calls.mobility
+            level[list(left_out | {k for _, k in pairs})] = np.inf
+            level[[o for o, _ in pairs]] = REPEATED * calls.mobility[[o for o, _ in pairs]]
+            found |= {o for o, _ in pairs} - _repeating(calls, q, level)
+    return frozenset(found)
 
 
 def _repeating(calls: LoopCalls, q: Array, level: Array) -> frozenset[int]:
