@@ -50,6 +50,7 @@ def main() -> None:
         q = {name: float(result.q[-1, model.layout.hinges[name].q]) for name in ANGLES}
         apart = max(abs(q[name] - wanted) for name, wanted in ANGLES.items())
         steps = result.statistics
+        assert steps is not None
         print(f"rtol {rtol:.0e}: off by {apart:.1e} rad in {steps.evaluations} evaluations")
         assert apart < bound
     for name, wanted in SPEEDS.items():

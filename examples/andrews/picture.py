@@ -50,13 +50,21 @@ def draw(path: Path) -> None:
     model = mstmm.compile(mstmm.load_scene(HERE / "scene.toml"))
     result = model.simulate(0.03, rtol=1e-8, output_times=np.linspace(0.0, 0.03, 301))
     figure = plt.figure(figsize=(10, 5.6))
-    left, right = figure.subfigures(1, 2, width_ratios=(1.25, 1))
-    left.subplots_adjust(left=0.02, right=0.99, bottom=0.02, top=0.95, wspace=0.04, hspace=0.1)
-    right.subplots_adjust(left=0.16, right=0.97, bottom=0.1, top=0.88)
+    grid = figure.add_gridspec(
+        2,
+        5,
+        width_ratios=(1, 1, 1, 0.2, 2.4),
+        left=0.02,
+        right=0.98,
+        bottom=0.1,
+        top=0.88,
+        wspace=0.12,
+    )
     places = {name: result.position(name) for corners in BODIES.values() for name in corners}
-    for axes, row in zip(left.subplots(2, 3).flat, ROWS, strict=True):
+    for number, row in enumerate(ROWS):
+        axes = figure.add_subplot(grid[number // 3, number % 3])
         draw_pose(axes, {name: place[row] for name, place in places.items()}, result.t[row])
-    axes = right.subplots()
+    axes = figure.add_subplot(grid[:, 4])
     for name in ("beta", "Theta", "gamma", "delta", "Phi", "eps"):
         angle = result.q[:, model.layout.hinges[name].q_slice][:, 0]
         wrapped = np.mod(angle + np.pi, 2 * np.pi) - np.pi

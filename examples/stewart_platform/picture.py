@@ -25,7 +25,8 @@ def draw(path: Path) -> None:
     model = mstmm.compile(mstmm.load_scene(HERE / "scene.toml"))
     result = model.simulate(PERIOD, rtol=1e-8, output_times=np.linspace(0.0, PERIOD, 201))
     figure = plt.figure(figsize=(10, 4.8))
-    left = figure.add_axes((-0.02, 0.0, 0.54, 1.0), projection="3d")
+    left = figure.add_subplot(121, projection="3d")
+    left.set_position((-0.02, 0.0, 0.54, 1.0))
     for row, shade in ((150, 0.35), (50, 1.0)):
         feet = np.array([result.position(f"cylinder{k}")[row] for k in range(6)])
         heads = np.array([result.position(f"piston{k}.tip")[row] for k in range(6)])
@@ -38,7 +39,7 @@ def draw(path: Path) -> None:
     ground = np.vstack([feet, feet[:1]])
     left.plot(*ground.T, "-", color="black", lw=1)
     left.set(xlabel="x, m", ylabel="y, m", zlabel="z, m", zlim=(0, 1.2))
-    left.set_box_aspect((1, 1, 0.8))
+    left.set_box_aspect((1.0, 1.0, 0.8))
     left.view_init(elev=18, azim=-65)
     right = figure.add_axes((0.6, 0.13, 0.38, 0.75))
     for k in range(6):
