@@ -31,7 +31,7 @@ cd "$scratch/checkout"
 "$VENV/bin/python" setup.py -q build_ext --inplace
 # libstdc++ as well: extensions of other packages throw C++ exceptions
 LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libstdc++.so.6)" "$VENV/bin/python" -m pytest -q -p no:cacheprovider \
-    tests/bridge/test_kernels.py tests/classical tests/integrate tests/breaks tests/run tests/result tests/model \
+    tests/bridge/test_kernels.py tests/classical tests/integrate tests/breaks tests/run tests/result tests/model tests/loops \
     tests/linear/test_response.py tests/linear/test_modes.py tests/linear/test_damping.py tests/linear/test_exact.py tests/engine/test_jacobian.py tests/engine/test_tangent.py tests/engine/test_culprit.py tests/flexible/test_engines.py
 
 echo "--- changed scenes, sanitized"

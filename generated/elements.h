@@ -631,6 +631,7 @@ int mstmm_sweep_generic0_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
+int mstmm_sweep_generic0_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic0_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -712,6 +713,11 @@ int mstmm_sweep_generic1_tangent_answer_known(const real *restrict Rc, const rea
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic1_complement(const real *restrict H, real *restrict W);
+int mstmm_sweep_generic1_divide(const real *restrict F, const real *restrict y, real *restrict z);
+int mstmm_sweep_generic1_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
+int mstmm_sweep_generic1_answered(const real *restrict y, const real *restrict z, real *restrict l);
+int mstmm_sweep_generic1_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
 int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -793,6 +799,11 @@ int mstmm_sweep_generic2_tangent_answer_known(const real *restrict Rc, const rea
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic2_complement(const real *restrict H, real *restrict W);
+int mstmm_sweep_generic2_divide(const real *restrict F, const real *restrict y, real *restrict z);
+int mstmm_sweep_generic2_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
+int mstmm_sweep_generic2_answered(const real *restrict y, const real *restrict z, real *restrict l);
+int mstmm_sweep_generic2_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
 int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -874,6 +885,11 @@ int mstmm_sweep_generic3_tangent_answer_known(const real *restrict Rc, const rea
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic3_complement(const real *restrict H, real *restrict W);
+int mstmm_sweep_generic3_divide(const real *restrict F, const real *restrict y, real *restrict z);
+int mstmm_sweep_generic3_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
+int mstmm_sweep_generic3_answered(const real *restrict y, const real *restrict z, real *restrict l);
+int mstmm_sweep_generic3_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
 int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -955,6 +971,11 @@ int mstmm_sweep_generic4_tangent_answer_known(const real *restrict Rc, const rea
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic4_complement(const real *restrict H, real *restrict W);
+int mstmm_sweep_generic4_divide(const real *restrict F, const real *restrict y, real *restrict z);
+int mstmm_sweep_generic4_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
+int mstmm_sweep_generic4_answered(const real *restrict y, const real *restrict z, real *restrict l);
+int mstmm_sweep_generic4_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
 int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -1036,6 +1057,11 @@ int mstmm_sweep_generic5_tangent_answer_known(const real *restrict Rc, const rea
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic5_complement(const real *restrict H, real *restrict W);
+int mstmm_sweep_generic5_divide(const real *restrict F, const real *restrict y, real *restrict z);
+int mstmm_sweep_generic5_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
+int mstmm_sweep_generic5_answered(const real *restrict y, const real *restrict z, real *restrict l);
+int mstmm_sweep_generic5_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
 int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -1117,6 +1143,11 @@ int mstmm_sweep_generic6_tangent_answer_known(const real *restrict Rc, const rea
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic6_complement(const real *restrict H, real *restrict W);
+int mstmm_sweep_generic6_divide(const real *restrict F, const real *restrict y, real *restrict z);
+int mstmm_sweep_generic6_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
+int mstmm_sweep_generic6_answered(const real *restrict y, const real *restrict z, real *restrict l);
+int mstmm_sweep_generic6_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
 int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -1217,6 +1248,36 @@ int mstmm_sweep_link_screw_condense(const real *restrict link, const real *restr
 int mstmm_sweep_link_screw_recover(const real *restrict link, const real *restrict turn,
     const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
+
+extern const mstmm_element mstmm_sweep_loops;
+int mstmm_sweep_loops_gap(const real *restrict A_C, const real *restrict x_C,
+    const real *restrict A_B, const real *restrict x_B, const real *restrict R_e,
+    const real *restrict r_e, const real *restrict Rc, const real *restrict r, real *restrict R_C,
+    real *restrict r_A, real *restrict d, real *restrict gap);
+int mstmm_sweep_loops_slip(const real *restrict R_C, const real *restrict r_e,
+    const real *restrict d, const real *restrict v_C, const real *restrict w_C,
+    const real *restrict v_B, const real *restrict w_B, real *restrict slip);
+int mstmm_sweep_loops_drift(const real *restrict R_C, const real *restrict r_e,
+    const real *restrict d, const real *restrict slip, const real *restrict motion_C,
+    const real *restrict motion_B, real *restrict drift);
+int mstmm_sweep_loops_rows(const real *restrict W, const real *restrict R_C,
+    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
+    const real *restrict relative, real *restrict J_A, real *restrict J_B, real *restrict l);
+int mstmm_sweep_loops_told(const real *restrict J_A, const real *restrict J_B,
+    const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
+    real *restrict c);
+int mstmm_sweep_loops_act(const real *restrict J, const real *restrict tau, real *restrict e);
+int mstmm_sweep_loops_close(const real *restrict K, const real *restrict l, const real *restrict L,
+    const real *restrict floor_, real *restrict inverse, real *restrict S, real *restrict e);
+int mstmm_sweep_loops_shed(const real *restrict inverse, const real *restrict K,
+    const real *restrict l, const real *restrict L_p, real *restrict K_p, real *restrict l_p);
+int mstmm_sweep_loops_shed_pair(const real *restrict inverse, const real *restrict L_p,
+    const real *restrict L_q, real *restrict L_pq);
+int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restrict K,
+    const real *restrict l, const real *restrict delta, real *restrict x);
+int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *restrict L_p,
+    const real *restrict x_p, real *restrict x);
+int mstmm_sweep_loops_loaded(const real *restrict K, const real *restrict x, real *restrict e);
 
 extern const mstmm_element mstmm_sweep_modal;
 int mstmm_sweep_modal_residual(int n, const real *restrict p, const real *restrict C,

@@ -12,6 +12,7 @@
 #define MSTMM_FAILED_MODES 8
 #define MSTMM_FAILED_TANGENT 9
 #define MSTMM_FAILED_CONTROLLER 10
+#define MSTMM_FAILED_LOOP 11
 /* What a kernel returns behind its last result if a determinant is negative (mstmm.ir.statements). */
 #define MSTMM_NEGATIVE 2
 

@@ -1544,6 +1544,188 @@ static inline int mstmm_qr_restored_by(struct mstmm_qr_restored to)
 }
 #define mstmm_qr_restored(...) mstmm_qr_restored_by((struct mstmm_qr_restored){__VA_ARGS__})
 
+struct mstmm_loops_gap {
+    const real *A_C;
+    const real *x_C;
+    const real *A_B;
+    const real *x_B;
+    const real *R_e;
+    const real *r_e;
+    const real *Rc;
+    const real *r;
+    real *R_C;
+    real *r_A;
+    real *d;
+    real *gap;
+};
+static inline int mstmm_loops_gap_by(struct mstmm_loops_gap to)
+{
+    return mstmm_sweep_loops_gap(
+        to.A_C, to.x_C, to.A_B, to.x_B, to.R_e, to.r_e, to.Rc, to.r, to.R_C, to.r_A, to.d, to.gap);
+}
+#define mstmm_loops_gap(...) mstmm_loops_gap_by((struct mstmm_loops_gap){__VA_ARGS__})
+
+struct mstmm_loops_slip {
+    const real *R_C;
+    const real *r_e;
+    const real *d;
+    const real *v_C;
+    const real *w_C;
+    const real *v_B;
+    const real *w_B;
+    real *slip;
+};
+static inline int mstmm_loops_slip_by(struct mstmm_loops_slip to)
+{
+    return mstmm_sweep_loops_slip(
+        to.R_C, to.r_e, to.d, to.v_C, to.w_C, to.v_B, to.w_B, to.slip);
+}
+#define mstmm_loops_slip(...) mstmm_loops_slip_by((struct mstmm_loops_slip){__VA_ARGS__})
+
+struct mstmm_loops_drift {
+    const real *R_C;
+    const real *r_e;
+    const real *d;
+    const real *slip;
+    const real *motion_C;
+    const real *motion_B;
+    real *drift;
+};
+static inline int mstmm_loops_drift_by(struct mstmm_loops_drift to)
+{
+    return mstmm_sweep_loops_drift(
+        to.R_C, to.r_e, to.d, to.slip, to.motion_C, to.motion_B, to.drift);
+}
+#define mstmm_loops_drift(...) mstmm_loops_drift_by((struct mstmm_loops_drift){__VA_ARGS__})
+
+struct mstmm_loops_rows {
+    const real *W;
+    const real *R_C;
+    const real *r_e;
+    const real *Rc;
+    const real *r_A;
+    const real *relative;
+    real *J_A;
+    real *J_B;
+    real *l;
+};
+static inline int mstmm_loops_rows_by(struct mstmm_loops_rows to)
+{
+    return mstmm_sweep_loops_rows(
+        to.W, to.R_C, to.r_e, to.Rc, to.r_A, to.relative, to.J_A, to.J_B, to.l);
+}
+#define mstmm_loops_rows(...) mstmm_loops_rows_by((struct mstmm_loops_rows){__VA_ARGS__})
+
+struct mstmm_loops_told {
+    const real *J_A;
+    const real *J_B;
+    const real *l;
+    const real *delta_A;
+    const real *delta_B;
+    real *c;
+};
+static inline int mstmm_loops_told_by(struct mstmm_loops_told to)
+{
+    return mstmm_sweep_loops_told(
+        to.J_A, to.J_B, to.l, to.delta_A, to.delta_B, to.c);
+}
+#define mstmm_loops_told(...) mstmm_loops_told_by((struct mstmm_loops_told){__VA_ARGS__})
+
+struct mstmm_loops_act {
+    const real *J;
+    const real *tau;
+    real *e;
+};
+static inline int mstmm_loops_act_by(struct mstmm_loops_act to)
+{
+    return mstmm_sweep_loops_act(
+        to.J, to.tau, to.e);
+}
+#define mstmm_loops_act(...) mstmm_loops_act_by((struct mstmm_loops_act){__VA_ARGS__})
+
+struct mstmm_loops_close {
+    const real *K;
+    const real *l;
+    const real *L;
+    const real *floor_;
+    real *inverse;
+    real *S;
+    real *e;
+};
+static inline int mstmm_loops_close_by(struct mstmm_loops_close to)
+{
+    return mstmm_sweep_loops_close(
+        to.K, to.l, to.L, to.floor_, to.inverse, to.S, to.e);
+}
+#define mstmm_loops_close(...) mstmm_loops_close_by((struct mstmm_loops_close){__VA_ARGS__})
+
+struct mstmm_loops_shed {
+    const real *inverse;
+    const real *K;
+    const real *l;
+    const real *L_p;
+    real *K_p;
+    real *l_p;
+};
+static inline int mstmm_loops_shed_by(struct mstmm_loops_shed to)
+{
+    return mstmm_sweep_loops_shed(
+        to.inverse, to.K, to.l, to.L_p, to.K_p, to.l_p);
+}
+#define mstmm_loops_shed(...) mstmm_loops_shed_by((struct mstmm_loops_shed){__VA_ARGS__})
+
+struct mstmm_loops_shed_pair {
+    const real *inverse;
+    const real *L_p;
+    const real *L_q;
+    real *L_pq;
+};
+static inline int mstmm_loops_shed_pair_by(struct mstmm_loops_shed_pair to)
+{
+    return mstmm_sweep_loops_shed_pair(
+        to.inverse, to.L_p, to.L_q, to.L_pq);
+}
+#define mstmm_loops_shed_pair(...) mstmm_loops_shed_pair_by((struct mstmm_loops_shed_pair){__VA_ARGS__})
+
+struct mstmm_loops_multiplier {
+    const real *inverse;
+    const real *K;
+    const real *l;
+    const real *delta;
+    real *x;
+};
+static inline int mstmm_loops_multiplier_by(struct mstmm_loops_multiplier to)
+{
+    return mstmm_sweep_loops_multiplier(
+        to.inverse, to.K, to.l, to.delta, to.x);
+}
+#define mstmm_loops_multiplier(...) mstmm_loops_multiplier_by((struct mstmm_loops_multiplier){__VA_ARGS__})
+
+struct mstmm_loops_multiplier_less {
+    const real *inverse;
+    const real *L_p;
+    const real *x_p;
+    real *x;
+};
+static inline int mstmm_loops_multiplier_less_by(struct mstmm_loops_multiplier_less to)
+{
+    return mstmm_sweep_loops_multiplier_less(
+        to.inverse, to.L_p, to.x_p, to.x);
+}
+#define mstmm_loops_multiplier_less(...) mstmm_loops_multiplier_less_by((struct mstmm_loops_multiplier_less){__VA_ARGS__})
+
+struct mstmm_loops_loaded {
+    const real *K;
+    const real *x;
+    real *e;
+};
+static inline int mstmm_loops_loaded_by(struct mstmm_loops_loaded to)
+{
+    return mstmm_sweep_loops_loaded(
+        to.K, to.x, to.e);
+}
+#define mstmm_loops_loaded(...) mstmm_loops_loaded_by((struct mstmm_loops_loaded){__VA_ARGS__})
+
 struct mstmm_classical_body_transfer {
     const real *M;
     const real *r_IO;
@@ -2412,6 +2594,80 @@ static inline int mstmm_generic_qr_eliminate_by(int speeds, struct mstmm_generic
         to.H, to.J, to.floor_, to.U, to.d, to.e, to.tau, to.G, to.g, to.V, to.d_V, to.e_Q);
 }
 #define mstmm_generic_qr_eliminate(speeds, ...) mstmm_generic_qr_eliminate_by(speeds, (struct mstmm_generic_qr_eliminate){__VA_ARGS__})
+
+struct mstmm_generic_complement {
+    const real *H;
+    real *W;
+};
+typedef int mstmm_generic_complement_kernel(
+    const real *restrict, real *restrict);
+extern mstmm_generic_complement_kernel *const mstmm_generic_complement_table[];
+static inline int mstmm_generic_complement_by(int speeds, struct mstmm_generic_complement to)
+{
+    return mstmm_generic_complement_table[speeds](
+        to.H, to.W);
+}
+#define mstmm_generic_complement(speeds, ...) mstmm_generic_complement_by(speeds, (struct mstmm_generic_complement){__VA_ARGS__})
+
+struct mstmm_generic_divide {
+    const real *F;
+    const real *y;
+    real *z;
+};
+typedef int mstmm_generic_divide_kernel(
+    const real *restrict, const real *restrict, real *restrict);
+extern mstmm_generic_divide_kernel *const mstmm_generic_divide_table[];
+static inline int mstmm_generic_divide_by(int speeds, struct mstmm_generic_divide to)
+{
+    return mstmm_generic_divide_table[speeds](
+        to.F, to.y, to.z);
+}
+#define mstmm_generic_divide(speeds, ...) mstmm_generic_divide_by(speeds, (struct mstmm_generic_divide){__VA_ARGS__})
+
+struct mstmm_generic_couple {
+    const real *y;
+    const real *z;
+    real *L_ij;
+};
+typedef int mstmm_generic_couple_kernel(
+    const real *restrict, const real *restrict, real *restrict);
+extern mstmm_generic_couple_kernel *const mstmm_generic_couple_table[];
+static inline int mstmm_generic_couple_by(int speeds, struct mstmm_generic_couple to)
+{
+    return mstmm_generic_couple_table[speeds](
+        to.y, to.z, to.L_ij);
+}
+#define mstmm_generic_couple(speeds, ...) mstmm_generic_couple_by(speeds, (struct mstmm_generic_couple){__VA_ARGS__})
+
+struct mstmm_generic_answered {
+    const real *y;
+    const real *z;
+    real *l;
+};
+typedef int mstmm_generic_answered_kernel(
+    const real *restrict, const real *restrict, real *restrict);
+extern mstmm_generic_answered_kernel *const mstmm_generic_answered_table[];
+static inline int mstmm_generic_answered_by(int speeds, struct mstmm_generic_answered to)
+{
+    return mstmm_generic_answered_table[speeds](
+        to.y, to.z, to.l);
+}
+#define mstmm_generic_answered(speeds, ...) mstmm_generic_answered_by(speeds, (struct mstmm_generic_answered){__VA_ARGS__})
+
+struct mstmm_generic_pull {
+    const real *y;
+    const real *x;
+    real *y_0;
+};
+typedef int mstmm_generic_pull_kernel(
+    const real *restrict, const real *restrict, real *restrict);
+extern mstmm_generic_pull_kernel *const mstmm_generic_pull_table[];
+static inline int mstmm_generic_pull_by(int speeds, struct mstmm_generic_pull to)
+{
+    return mstmm_generic_pull_table[speeds](
+        to.y, to.x, to.y_0);
+}
+#define mstmm_generic_pull(speeds, ...) mstmm_generic_pull_by(speeds, (struct mstmm_generic_pull){__VA_ARGS__})
 
 struct mstmm_generic_forward_slope {
     const real *Rt;

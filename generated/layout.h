@@ -41,6 +41,23 @@
 #define MSTMM_SECTION_H_PER_MODE 6
 #define MSTMM_SECTION_PUSH_PER_MODE 12
 #define MSTMM_SECTION_H6_PER_MODE 18
+/* A hinge that closes a loop; a row. */
+#define MSTMM_CLOSURE_W 0
+#define MSTMM_CLOSURE_J_A 36
+#define MSTMM_CLOSURE_J_B 72
+#define MSTMM_CLOSURE_L 108
+#define MSTMM_CLOSURE_R_C 114
+#define MSTMM_CLOSURE_D 123
+#define MSTMM_CLOSURE_LEVER 126
+#define MSTMM_CLOSURE_GAP 129
+#define MSTMM_CLOSURE_SLIP 135
+#define MSTMM_CLOSURE 141
+#define MSTMM_ROW_K 0
+#define MSTMM_ROW_KNOWN 6
+#define MSTMM_ROW_PIVOT 7
+#define MSTMM_ROW_INVERSE 8
+#define MSTMM_ROW_X 9
+#define MSTMM_ROW 10
 /* cdef end */
 
 /* Arrays of a flexible body of n modes, and of one of its sections. */

@@ -65,10 +65,11 @@ const mstmm_element *const mstmm_elements[] = {
     &mstmm_sweep_link_pin,
     &mstmm_sweep_link_prismatic,
     &mstmm_sweep_link_screw,
+    &mstmm_sweep_loops,
     &mstmm_sweep_modal,
     &mstmm_sweep_qr,
     &mstmm_sweep_tangent,
     NULL,
 };
 
-const int mstmm_element_count = 64;
+const int mstmm_element_count = 65;

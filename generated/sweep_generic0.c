@@ -48,6 +48,7 @@ int mstmm_sweep_generic0_tangent_column(const real *restrict theta, const real *
     const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
     const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
     real *restrict G, real *restrict row);
+int mstmm_sweep_generic0_complement(const real *restrict H, real *restrict W);
 int mstmm_sweep_generic0_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -2119,6 +2120,67 @@ static const mstmm_port mstmm_sweep_generic0_tangent_column_outputs[] = {
     {"row", 0, "", 0, 0},
 };
 
+/* what a hinge with 0 speeds lets go and holds
+ * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
+ * in  H[6][0] motion subspace
+ * out W[6][6] rows: H^+, then what the hinge holds
+ */
+int mstmm_sweep_generic0_complement(const real *restrict H, real *restrict W)
+{
+    (void)H;
+    W[0] = 1.0;
+    W[1] = 0.0;
+    W[2] = 0.0;
+    W[3] = 0.0;
+    W[4] = 0.0;
+    W[5] = 0.0;
+    W[6] = 0.0;
+    W[7] = 1.0;
+    W[8] = 0.0;
+    W[9] = 0.0;
+    W[10] = 0.0;
+    W[11] = 0.0;
+    W[12] = 0.0;
+    W[13] = 0.0;
+    W[14] = 1.0;
+    W[15] = 0.0;
+    W[16] = 0.0;
+    W[17] = 0.0;
+    W[18] = 0.0;
+    W[19] = 0.0;
+    W[20] = 0.0;
+    W[21] = 1.0;
+    W[22] = 0.0;
+    W[23] = 0.0;
+    W[24] = 0.0;
+    W[25] = 0.0;
+    W[26] = 0.0;
+    W[27] = 0.0;
+    W[28] = 1.0;
+    W[29] = 0.0;
+    W[30] = 0.0;
+    W[31] = 0.0;
+    W[32] = 0.0;
+    W[33] = 0.0;
+    W[34] = 0.0;
+    W[35] = 1.0;
+    return 0;
+}
+
+static int mstmm_sweep_generic0_complement_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic0_complement(in[0], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic0_complement_inputs[] = {
+    {"H", 0, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic0_complement_outputs[] = {
+    {"W", 36, "", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -2776,6 +2838,18 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "complement",
+        .function = (void (*)(void))mstmm_sweep_generic0_complement,
+        .call = mstmm_sweep_generic0_complement_call,
+        .n_inputs = 1,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic0_complement_inputs,
+        .outputs = mstmm_sweep_generic0_complement_outputs,
+        .ir_hash = "c2466a0c618c33706d663d68823384d3b508ecf8e8aab7af9707278c08f79e63",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic0_forward_slope,
         .call = mstmm_sweep_generic0_forward_slope_call,
@@ -2805,7 +2879,7 @@ const mstmm_element mstmm_sweep_generic0 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic0",
-    .hash = "30274f30883bd614134b23779c9f66c6fee14edc0fce2ed1ba180cbf440886ca",
+    .hash = "535eaedc3731fa7fa636bf46d3ad593cd0b07f910ca045b92436c0cfb5453402",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2815,6 +2889,6 @@ const mstmm_element mstmm_sweep_generic0 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 13,
+    .n_kernels = 14,
     .kernels = mstmm_sweep_generic0_kernels,
 };

@@ -81,6 +81,11 @@ int mstmm_sweep_generic1_tangent_answer_known(const real *restrict Rc, const rea
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic1_complement(const real *restrict H, real *restrict W);
+int mstmm_sweep_generic1_divide(const real *restrict F, const real *restrict y, real *restrict z);
+int mstmm_sweep_generic1_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
+int mstmm_sweep_generic1_answered(const real *restrict y, const real *restrict z, real *restrict l);
+int mstmm_sweep_generic1_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
 int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -4425,6 +4430,263 @@ static const mstmm_port mstmm_sweep_generic1_tangent_answer_known_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
+/* what a hinge with 1 speeds lets go and holds
+ * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
+ * in  H[6] motion subspace
+ * out W[6][6] rows: H^+, then what the hinge holds
+ */
+int mstmm_sweep_generic1_complement(const real *restrict H, real *restrict W)
+{
+    const real t0 = H[5] * H[5];
+    const real t1 = H[4] * H[4];
+    const real t2 = H[3] * H[3];
+    const real t3 = H[2] * H[2];
+    const real t4 = H[0] * H[0];
+    const real t5 = H[1] * H[1];
+    const real t6 = t4 + t5;
+    const real t7 = t3 + t6;
+    const real t8 = t2 + t7;
+    const real t9 = t1 + t8;
+    const real t10 = t0 + t9;
+    const real t11 = 0.0 < t10;
+    if (!(t11 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+    const real t12 = 1.0 / t10;
+    const real t13 = H[0] * t12;
+    W[0] = t13;
+    const real t14 = H[1] * t12;
+    W[1] = t14;
+    const real t15 = H[2] * t12;
+    W[2] = t15;
+    const real t16 = H[3] * t12;
+    W[3] = t16;
+    const real t17 = H[4] * t12;
+    W[4] = t17;
+    const real t18 = H[5] * t12;
+    W[5] = t18;
+    const real t19 = H[0] < 0.0;
+    const real t20 = sqrt(t10);
+    const real t21 = -t20;
+    const real t22 = t19 != 0 ? t21 : t20;
+    const real t23 = H[0] + t22;
+    const real t24 = fabs(H[0]);
+    const real t25 = t20 + t24;
+    const real t26 = t20 * t25;
+    const real t27 = 0.0 < t26;
+    const real t28 = 1.0 / t26;
+    const real t29 = t27 != 0 ? t28 : 0.0;
+    const real t30 = t23 * t29;
+    const real t31 = H[1] * t30;
+    const real t32 = -t31;
+    W[6] = t32;
+    const real t33 = t5 * t29;
+    const real t34 = 1.0 - t33;
+    W[7] = t34;
+    const real t35 = H[1] * t29;
+    const real t36 = H[2] * t35;
+    const real t37 = -t36;
+    W[8] = t37;
+    const real t38 = H[3] * t35;
+    const real t39 = -t38;
+    W[9] = t39;
+    const real t40 = H[4] * t35;
+    const real t41 = -t40;
+    W[10] = t41;
+    const real t42 = H[5] * t35;
+    const real t43 = -t42;
+    W[11] = t43;
+    const real t44 = H[2] * t30;
+    const real t45 = -t44;
+    W[12] = t45;
+    W[13] = t37;
+    const real t46 = t3 * t29;
+    const real t47 = 1.0 - t46;
+    W[14] = t47;
+    const real t48 = H[2] * t29;
+    const real t49 = H[3] * t48;
+    const real t50 = -t49;
+    W[15] = t50;
+    const real t51 = H[4] * t48;
+    const real t52 = -t51;
+    W[16] = t52;
+    const real t53 = H[5] * t48;
+    const real t54 = -t53;
+    W[17] = t54;
+    const real t55 = H[3] * t30;
+    const real t56 = -t55;
+    W[18] = t56;
+    W[19] = t39;
+    W[20] = t50;
+    const real t57 = t2 * t29;
+    const real t58 = 1.0 - t57;
+    W[21] = t58;
+    const real t59 = H[3] * t29;
+    const real t60 = H[4] * t59;
+    const real t61 = -t60;
+    W[22] = t61;
+    const real t62 = H[5] * t59;
+    const real t63 = -t62;
+    W[23] = t63;
+    const real t64 = H[4] * t30;
+    const real t65 = -t64;
+    W[24] = t65;
+    W[25] = t41;
+    W[26] = t52;
+    W[27] = t61;
+    const real t66 = t1 * t29;
+    const real t67 = 1.0 - t66;
+    W[28] = t67;
+    const real t68 = H[4] * t29;
+    const real t69 = H[5] * t68;
+    const real t70 = -t69;
+    W[29] = t70;
+    const real t71 = H[5] * t30;
+    const real t72 = -t71;
+    W[30] = t72;
+    W[31] = t43;
+    W[32] = t54;
+    W[33] = t63;
+    W[34] = t70;
+    const real t73 = t0 * t29;
+    const real t74 = 1.0 - t73;
+    W[35] = t74;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_complement_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_complement(in[0], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_complement_inputs[] = {
+    {"H", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_complement_outputs[] = {
+    {"W", 36, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic1_complement_guards[] = {
+    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* a column's rows divided by D, across a hinge with 1 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  F[1] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  y[1] -H^T K - C
+ * out z[1] D^-1 y
+ */
+int mstmm_sweep_generic1_divide(const real *restrict F, const real *restrict y, real *restrict z)
+{
+    const real t0 = F[0] * y[0];
+    z[0] = t0;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_divide_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_divide(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_divide_inputs[] = {
+    {"F", 1, "", 0, 0},
+    {"y", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_divide_outputs[] = {
+    {"z", 1, "", 0, 0},
+};
+
+/* two columns coupled by a hinge with 1 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[1] of one row
+ * in  z[1] of the other
+ * out L_ij[1] entry of L of both, added to what is there
+ */
+int mstmm_sweep_generic1_couple(const real *restrict y, const real *restrict z, real *restrict L_ij)
+{
+    const real t0 = y[0] * z[0];
+    L_ij[0] += t0;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_couple_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_couple(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_couple_inputs[] = {
+    {"y", 1, "", 0, 0},
+    {"z", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_couple_outputs[] = {
+    {"L_ij", 1, "", 1, 0},
+};
+
+/* what a hinge with 1 speeds tells a row
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[1] tau - H^T e
+ * in  z[1] of the row
+ * out l[1] known part of the row, added to what is there
+ */
+int mstmm_sweep_generic1_answered(const real *restrict y, const real *restrict z, real *restrict l)
+{
+    const real t0 = y[0] * z[0];
+    const real t1 = -t0;
+    l[0] += t1;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_answered_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_answered(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_answered_inputs[] = {
+    {"y", 1, "", 0, 0},
+    {"z", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_answered_outputs[] = {
+    {"l", 1, "", 1, 0},
+};
+
+/* a multiplier felt by a hinge with 1 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[1] of the row
+ * in  x[1] (N, N*m) multiplier
+ * out y_0[1] tau - H^T e, added to what is there
+ */
+int mstmm_sweep_generic1_pull(const real *restrict y, const real *restrict x, real *restrict y_0)
+{
+    const real t0 = y[0] * x[0];
+    y_0[0] += t0;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_pull_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_pull(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_pull_inputs[] = {
+    {"y", 1, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_pull_outputs[] = {
+    {"y_0", 1, "", 1, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -5229,6 +5491,66 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "complement",
+        .function = (void (*)(void))mstmm_sweep_generic1_complement,
+        .call = mstmm_sweep_generic1_complement_call,
+        .n_inputs = 1,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_complement_inputs,
+        .outputs = mstmm_sweep_generic1_complement_outputs,
+        .ir_hash = "61bb4bce2c1ddf6de93723c4866798d2c0e25822a2bee0b2c8a8a00861049c85",
+        .n_guards = 1,
+        .guards = mstmm_sweep_generic1_complement_guards,
+    },
+    {
+        .name = "divide",
+        .function = (void (*)(void))mstmm_sweep_generic1_divide,
+        .call = mstmm_sweep_generic1_divide_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_divide_inputs,
+        .outputs = mstmm_sweep_generic1_divide_outputs,
+        .ir_hash = "d8d33510ef94d72840b486a4a776e5bf9c5df4f31bb22521b582981d5f68bf4f",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "couple",
+        .function = (void (*)(void))mstmm_sweep_generic1_couple,
+        .call = mstmm_sweep_generic1_couple_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_couple_inputs,
+        .outputs = mstmm_sweep_generic1_couple_outputs,
+        .ir_hash = "6fbc32d0b4e7742186c8f84ab15144647e4bd720f7c869ec0a502a1fb5a7bb1b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "answered",
+        .function = (void (*)(void))mstmm_sweep_generic1_answered,
+        .call = mstmm_sweep_generic1_answered_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_answered_inputs,
+        .outputs = mstmm_sweep_generic1_answered_outputs,
+        .ir_hash = "c563961e7225e7408dfa25614f69fe201a02eeabb5b2c3030f048f53d9d60b1d",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "pull",
+        .function = (void (*)(void))mstmm_sweep_generic1_pull,
+        .call = mstmm_sweep_generic1_pull_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_pull_inputs,
+        .outputs = mstmm_sweep_generic1_pull_outputs,
+        .ir_hash = "bfb012c3fd8a221c623bad7749f477c7aa9dade41c364103be3e2b529d6bf41b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic1_forward_slope,
         .call = mstmm_sweep_generic1_forward_slope_call,
@@ -5258,7 +5580,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "f9ba62ce1421853b3aa75f56145790671a04320580e10225a11e2324c0c89f72",
+    .hash = "0dd1fe2223e8f8a6ca58255e25dffb4c31bdaecb712618b78b51b5a2b3f5c467",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -5268,6 +5590,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 22,
+    .n_kernels = 27,
     .kernels = mstmm_sweep_generic1_kernels,
 };

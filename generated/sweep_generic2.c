@@ -81,6 +81,11 @@ int mstmm_sweep_generic2_tangent_answer_known(const real *restrict Rc, const rea
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic2_complement(const real *restrict H, real *restrict W);
+int mstmm_sweep_generic2_divide(const real *restrict F, const real *restrict y, real *restrict z);
+int mstmm_sweep_generic2_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
+int mstmm_sweep_generic2_answered(const real *restrict y, const real *restrict z, real *restrict l);
+int mstmm_sweep_generic2_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
 int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -5689,6 +5694,453 @@ static const mstmm_port mstmm_sweep_generic2_tangent_answer_known_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
+/* what a hinge with 2 speeds lets go and holds
+ * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
+ * in  H[6][2] motion subspace
+ * out W[6][6] rows: H^+, then what the hinge holds
+ */
+int mstmm_sweep_generic2_complement(const real *restrict H, real *restrict W)
+{
+    const real t0 = H[10] * H[10];
+    const real t1 = H[8] * H[8];
+    const real t2 = H[6] * H[6];
+    const real t3 = H[4] * H[4];
+    const real t4 = H[0] * H[0];
+    const real t5 = H[2] * H[2];
+    const real t6 = t4 + t5;
+    const real t7 = t3 + t6;
+    const real t8 = t2 + t7;
+    const real t9 = t1 + t8;
+    const real t10 = t0 + t9;
+    const real t11 = 0.0 < t10;
+    if (!(t11 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+    const real t12 = H[1] * H[1];
+    const real t13 = H[3] * H[3];
+    const real t14 = t12 + t13;
+    const real t15 = H[5] * H[5];
+    const real t16 = t14 + t15;
+    const real t17 = H[7] * H[7];
+    const real t18 = t16 + t17;
+    const real t19 = H[9] * H[9];
+    const real t20 = t18 + t19;
+    const real t21 = H[11] * H[11];
+    const real t22 = t20 + t21;
+    const real t23 = t22 * ((real)1 / (real)10000000000000);
+    const real t24 = H[10] * H[11];
+    const real t25 = H[8] * H[9];
+    const real t26 = H[6] * H[7];
+    const real t27 = H[4] * H[5];
+    const real t28 = H[2] * H[3];
+    const real t29 = H[0] * H[1];
+    const real t30 = t28 + t29;
+    const real t31 = t27 + t30;
+    const real t32 = t26 + t31;
+    const real t33 = t25 + t32;
+    const real t34 = t24 + t33;
+    const real t35 = 1.0 / t10;
+    const real t36 = t34 * t35;
+    const real t37 = t34 * t36;
+    const real t38 = t22 - t37;
+    const real t39 = t23 < t38;
+    if (!(t39 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+    const real t40 = H[0] * t35;
+    const real t41 = 1.0 / t38;
+    const real t42 = H[0] * t36;
+    const real t43 = H[1] - t42;
+    const real t44 = t41 * t43;
+    const real t45 = t36 * t44;
+    const real t46 = t40 - t45;
+    W[0] = t46;
+    const real t47 = H[2] * t35;
+    const real t48 = H[2] * t36;
+    const real t49 = H[3] - t48;
+    const real t50 = t41 * t49;
+    const real t51 = t36 * t50;
+    const real t52 = t47 - t51;
+    W[1] = t52;
+    const real t53 = H[4] * t35;
+    const real t54 = H[4] * t36;
+    const real t55 = H[5] - t54;
+    const real t56 = t41 * t55;
+    const real t57 = t36 * t56;
+    const real t58 = t53 - t57;
+    W[2] = t58;
+    const real t59 = H[6] * t35;
+    const real t60 = H[6] * t36;
+    const real t61 = H[7] - t60;
+    const real t62 = t41 * t61;
+    const real t63 = t36 * t62;
+    const real t64 = t59 - t63;
+    W[3] = t64;
+    const real t65 = H[8] * t35;
+    const real t66 = H[8] * t36;
+    const real t67 = H[9] - t66;
+    const real t68 = t41 * t67;
+    const real t69 = t36 * t68;
+    const real t70 = t65 - t69;
+    W[4] = t70;
+    const real t71 = H[10] * t35;
+    const real t72 = H[10] * t36;
+    const real t73 = H[11] - t72;
+    const real t74 = t41 * t73;
+    const real t75 = t36 * t74;
+    const real t76 = t71 - t75;
+    W[5] = t76;
+    W[6] = t44;
+    W[7] = t50;
+    W[8] = t56;
+    W[9] = t62;
+    W[10] = t68;
+    W[11] = t74;
+    const real t77 = H[0] < 0.0;
+    const real t78 = sqrt(t10);
+    const real t79 = -t78;
+    const real t80 = t77 != 0 ? t79 : t78;
+    const real t81 = H[0] + t80;
+    const real t82 = fabs(H[0]);
+    const real t83 = t78 + t82;
+    const real t84 = t78 * t83;
+    const real t85 = 0.0 < t84;
+    const real t86 = 1.0 / t84;
+    const real t87 = t85 != 0 ? t86 : 0.0;
+    const real t88 = H[1] * t81;
+    const real t89 = t88 + t28;
+    const real t90 = t27 + t89;
+    const real t91 = t26 + t90;
+    const real t92 = t25 + t91;
+    const real t93 = t24 + t92;
+    const real t94 = t87 * t93;
+    const real t95 = H[4] * t94;
+    const real t96 = H[5] - t95;
+    const real t97 = t96 * t96;
+    const real t98 = H[10] * t94;
+    const real t99 = H[11] - t98;
+    const real t100 = t99 * t99;
+    const real t101 = H[8] * t94;
+    const real t102 = H[9] - t101;
+    const real t103 = t102 * t102;
+    const real t104 = H[6] * t94;
+    const real t105 = H[7] - t104;
+    const real t106 = t105 * t105;
+    const real t107 = H[2] * t94;
+    const real t108 = H[3] - t107;
+    const real t109 = t108 * t108;
+    const real t110 = t109 + t97;
+    const real t111 = t106 + t110;
+    const real t112 = t103 + t111;
+    const real t113 = t100 + t112;
+    const real t114 = sqrt(t113);
+    const real t115 = fabs(t108);
+    const real t116 = t114 + t115;
+    const real t117 = t114 * t116;
+    const real t118 = 0.0 < t117;
+    const real t119 = 1.0 / t117;
+    const real t120 = t118 != 0 ? t119 : 0.0;
+    const real t121 = t97 * t120;
+    const real t122 = 1.0 - t121;
+    const real t123 = H[4] * t122;
+    const real t124 = t108 < 0.0;
+    const real t125 = -t114;
+    const real t126 = t124 != 0 ? t125 : t114;
+    const real t127 = t108 + t126;
+    const real t128 = t127 * t120;
+    const real t129 = t96 * t128;
+    const real t130 = H[2] * t129;
+    const real t131 = t123 - t130;
+    const real t132 = t96 * t120;
+    const real t133 = t105 * t132;
+    const real t134 = H[6] * t133;
+    const real t135 = t131 - t134;
+    const real t136 = t102 * t132;
+    const real t137 = H[8] * t136;
+    const real t138 = t135 - t137;
+    const real t139 = t99 * t132;
+    const real t140 = H[10] * t139;
+    const real t141 = t138 - t140;
+    const real t142 = t87 * t141;
+    const real t143 = t81 * t142;
+    const real t144 = -t143;
+    W[12] = t144;
+    const real t145 = H[2] * t142;
+    const real t146 = t129 + t145;
+    const real t147 = -t146;
+    W[13] = t147;
+    const real t148 = H[4] * t142;
+    const real t149 = t122 - t148;
+    W[14] = t149;
+    const real t150 = H[6] * t142;
+    const real t151 = t133 + t150;
+    const real t152 = -t151;
+    W[15] = t152;
+    const real t153 = H[8] * t142;
+    const real t154 = t136 + t153;
+    const real t155 = -t154;
+    W[16] = t155;
+    const real t156 = H[10] * t142;
+    const real t157 = t139 + t156;
+    const real t158 = -t157;
+    W[17] = t158;
+    const real t159 = t106 * t120;
+    const real t160 = 1.0 - t159;
+    const real t161 = H[6] * t160;
+    const real t162 = t105 * t128;
+    const real t163 = H[2] * t162;
+    const real t164 = H[4] * t133;
+    const real t165 = t163 + t164;
+    const real t166 = t161 - t165;
+    const real t167 = t105 * t120;
+    const real t168 = t102 * t167;
+    const real t169 = H[8] * t168;
+    const real t170 = t166 - t169;
+    const real t171 = t99 * t167;
+    const real t172 = H[10] * t171;
+    const real t173 = t170 - t172;
+    const real t174 = t87 * t173;
+    const real t175 = t81 * t174;
+    const real t176 = -t175;
+    W[18] = t176;
+    const real t177 = H[2] * t174;
+    const real t178 = t162 + t177;
+    const real t179 = -t178;
+    W[19] = t179;
+    const real t180 = H[4] * t174;
+    const real t181 = t133 + t180;
+    const real t182 = -t181;
+    W[20] = t182;
+    const real t183 = H[6] * t174;
+    const real t184 = t160 - t183;
+    W[21] = t184;
+    const real t185 = H[8] * t174;
+    const real t186 = t168 + t185;
+    const real t187 = -t186;
+    W[22] = t187;
+    const real t188 = H[10] * t174;
+    const real t189 = t171 + t188;
+    const real t190 = -t189;
+    W[23] = t190;
+    const real t191 = t103 * t120;
+    const real t192 = 1.0 - t191;
+    const real t193 = H[8] * t192;
+    const real t194 = H[6] * t168;
+    const real t195 = t102 * t128;
+    const real t196 = H[2] * t195;
+    const real t197 = H[4] * t136;
+    const real t198 = t196 + t197;
+    const real t199 = t194 + t198;
+    const real t200 = t193 - t199;
+    const real t201 = t102 * t120;
+    const real t202 = t99 * t201;
+    const real t203 = H[10] * t202;
+    const real t204 = t200 - t203;
+    const real t205 = t87 * t204;
+    const real t206 = t81 * t205;
+    const real t207 = -t206;
+    W[24] = t207;
+    const real t208 = H[2] * t205;
+    const real t209 = t195 + t208;
+    const real t210 = -t209;
+    W[25] = t210;
+    const real t211 = H[4] * t205;
+    const real t212 = t136 + t211;
+    const real t213 = -t212;
+    W[26] = t213;
+    const real t214 = H[6] * t205;
+    const real t215 = t168 + t214;
+    const real t216 = -t215;
+    W[27] = t216;
+    const real t217 = H[8] * t205;
+    const real t218 = t192 - t217;
+    W[28] = t218;
+    const real t219 = H[10] * t205;
+    const real t220 = t202 + t219;
+    const real t221 = -t220;
+    W[29] = t221;
+    const real t222 = t100 * t120;
+    const real t223 = 1.0 - t222;
+    const real t224 = H[10] * t223;
+    const real t225 = H[8] * t202;
+    const real t226 = H[6] * t171;
+    const real t227 = t99 * t128;
+    const real t228 = H[2] * t227;
+    const real t229 = H[4] * t139;
+    const real t230 = t228 + t229;
+    const real t231 = t226 + t230;
+    const real t232 = t225 + t231;
+    const real t233 = t224 - t232;
+    const real t234 = t87 * t233;
+    const real t235 = t81 * t234;
+    const real t236 = -t235;
+    W[30] = t236;
+    const real t237 = H[2] * t234;
+    const real t238 = t227 + t237;
+    const real t239 = -t238;
+    W[31] = t239;
+    const real t240 = H[4] * t234;
+    const real t241 = t139 + t240;
+    const real t242 = -t241;
+    W[32] = t242;
+    const real t243 = H[6] * t234;
+    const real t244 = t171 + t243;
+    const real t245 = -t244;
+    W[33] = t245;
+    const real t246 = H[8] * t234;
+    const real t247 = t202 + t246;
+    const real t248 = -t247;
+    W[34] = t248;
+    const real t249 = H[10] * t234;
+    const real t250 = t223 - t249;
+    W[35] = t250;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_complement_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_complement(in[0], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_complement_inputs[] = {
+    {"H", 12, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_complement_outputs[] = {
+    {"W", 36, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic2_complement_guards[] = {
+    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* a column's rows divided by D, across a hinge with 2 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  F[2][2] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  y[2] -H^T K - C
+ * out z[2] D^-1 y
+ */
+int mstmm_sweep_generic2_divide(const real *restrict F, const real *restrict y, real *restrict z)
+{
+    const real t0 = F[0] * y[0];
+    const real t1 = F[2] * y[0];
+    const real t2 = y[1] - t1;
+    const real t3 = F[3] * t2;
+    const real t4 = F[2] * t3;
+    const real t5 = t0 - t4;
+    z[0] = t5;
+    z[1] = t3;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_divide_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_divide(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_divide_inputs[] = {
+    {"F", 4, "", 0, 0},
+    {"y", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_divide_outputs[] = {
+    {"z", 2, "", 0, 0},
+};
+
+/* two columns coupled by a hinge with 2 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[2] of one row
+ * in  z[2] of the other
+ * out L_ij[1] entry of L of both, added to what is there
+ */
+int mstmm_sweep_generic2_couple(const real *restrict y, const real *restrict z, real *restrict L_ij)
+{
+    const real t0 = y[0] * z[0];
+    const real t1 = y[1] * z[1];
+    const real t2 = t0 + t1;
+    L_ij[0] += t2;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_couple_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_couple(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_couple_inputs[] = {
+    {"y", 2, "", 0, 0},
+    {"z", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_couple_outputs[] = {
+    {"L_ij", 1, "", 1, 0},
+};
+
+/* what a hinge with 2 speeds tells a row
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[2] tau - H^T e
+ * in  z[2] of the row
+ * out l[1] known part of the row, added to what is there
+ */
+int mstmm_sweep_generic2_answered(const real *restrict y, const real *restrict z, real *restrict l)
+{
+    const real t0 = y[0] * z[0];
+    const real t1 = y[1] * z[1];
+    const real t2 = t0 + t1;
+    const real t3 = -t2;
+    l[0] += t3;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_answered_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_answered(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_answered_inputs[] = {
+    {"y", 2, "", 0, 0},
+    {"z", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_answered_outputs[] = {
+    {"l", 1, "", 1, 0},
+};
+
+/* a multiplier felt by a hinge with 2 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[2] of the row
+ * in  x[1] (N, N*m) multiplier
+ * out y_0[2] tau - H^T e, added to what is there
+ */
+int mstmm_sweep_generic2_pull(const real *restrict y, const real *restrict x, real *restrict y_0)
+{
+    const real t0 = y[0] * x[0];
+    y_0[0] += t0;
+    const real t1 = y[1] * x[0];
+    y_0[1] += t1;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_pull_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_pull(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_pull_inputs[] = {
+    {"y", 2, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_pull_outputs[] = {
+    {"y_0", 2, "", 1, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -6541,6 +6993,66 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "complement",
+        .function = (void (*)(void))mstmm_sweep_generic2_complement,
+        .call = mstmm_sweep_generic2_complement_call,
+        .n_inputs = 1,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic2_complement_inputs,
+        .outputs = mstmm_sweep_generic2_complement_outputs,
+        .ir_hash = "d86e8b0d89642c1ab62286d817106b871b6ff9455c6d2856fb656ac66d99ff7b",
+        .n_guards = 2,
+        .guards = mstmm_sweep_generic2_complement_guards,
+    },
+    {
+        .name = "divide",
+        .function = (void (*)(void))mstmm_sweep_generic2_divide,
+        .call = mstmm_sweep_generic2_divide_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic2_divide_inputs,
+        .outputs = mstmm_sweep_generic2_divide_outputs,
+        .ir_hash = "dbe108d2a0f52db0f7f8ac1e22236eef41fe8abfd89c7d3dbb7c2907c4135069",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "couple",
+        .function = (void (*)(void))mstmm_sweep_generic2_couple,
+        .call = mstmm_sweep_generic2_couple_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic2_couple_inputs,
+        .outputs = mstmm_sweep_generic2_couple_outputs,
+        .ir_hash = "57a9d83c984525c9c3fa66ed18f6ca2f89011d6ebd3594fc77e8cac02a9d2ed7",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "answered",
+        .function = (void (*)(void))mstmm_sweep_generic2_answered,
+        .call = mstmm_sweep_generic2_answered_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic2_answered_inputs,
+        .outputs = mstmm_sweep_generic2_answered_outputs,
+        .ir_hash = "3b723c3278b5a23f5f8a6ad706098b834d314dd4355988edfecbc682dee7fd73",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "pull",
+        .function = (void (*)(void))mstmm_sweep_generic2_pull,
+        .call = mstmm_sweep_generic2_pull_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic2_pull_inputs,
+        .outputs = mstmm_sweep_generic2_pull_outputs,
+        .ir_hash = "a9ad64910a6bfe6e3af77634a06cae3f3d528fb5652ba6ac4255df30a946b116",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic2_forward_slope,
         .call = mstmm_sweep_generic2_forward_slope_call,
@@ -6570,7 +7082,7 @@ const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "838dea7e883d6179e329f9e31e1bd5f7c6ec4bd79e0dee39d9ec2ba85bd7e1e2",
+    .hash = "2086d75ab62a859064c8d7db1b7b30dffdbd674abc90329e141c658caa93d206",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -6580,6 +7092,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 22,
+    .n_kernels = 27,
     .kernels = mstmm_sweep_generic2_kernels,
 };

@@ -81,6 +81,11 @@ int mstmm_sweep_generic3_tangent_answer_known(const real *restrict Rc, const rea
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic3_complement(const real *restrict H, real *restrict W);
+int mstmm_sweep_generic3_divide(const real *restrict F, const real *restrict y, real *restrict z);
+int mstmm_sweep_generic3_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
+int mstmm_sweep_generic3_answered(const real *restrict y, const real *restrict z, real *restrict l);
+int mstmm_sweep_generic3_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
 int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -7168,6 +7173,640 @@ static const mstmm_port mstmm_sweep_generic3_tangent_answer_known_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
+/* what a hinge with 3 speeds lets go and holds
+ * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
+ * in  H[6][3] motion subspace
+ * out W[6][6] rows: H^+, then what the hinge holds
+ */
+int mstmm_sweep_generic3_complement(const real *restrict H, real *restrict W)
+{
+    const real t0 = H[15] * H[15];
+    const real t1 = H[12] * H[12];
+    const real t2 = H[9] * H[9];
+    const real t3 = H[6] * H[6];
+    const real t4 = H[0] * H[0];
+    const real t5 = H[3] * H[3];
+    const real t6 = t4 + t5;
+    const real t7 = t3 + t6;
+    const real t8 = t2 + t7;
+    const real t9 = t1 + t8;
+    const real t10 = t0 + t9;
+    const real t11 = 0.0 < t10;
+    if (!(t11 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t12 = H[1] * H[1];
+    const real t13 = H[4] * H[4];
+    const real t14 = t12 + t13;
+    const real t15 = H[7] * H[7];
+    const real t16 = t14 + t15;
+    const real t17 = H[10] * H[10];
+    const real t18 = t16 + t17;
+    const real t19 = H[13] * H[13];
+    const real t20 = t18 + t19;
+    const real t21 = H[16] * H[16];
+    const real t22 = t20 + t21;
+    const real t23 = t22 * ((real)1 / (real)10000000000000);
+    const real t24 = H[15] * H[16];
+    const real t25 = H[12] * H[13];
+    const real t26 = H[9] * H[10];
+    const real t27 = H[6] * H[7];
+    const real t28 = H[3] * H[4];
+    const real t29 = H[0] * H[1];
+    const real t30 = t28 + t29;
+    const real t31 = t27 + t30;
+    const real t32 = t26 + t31;
+    const real t33 = t25 + t32;
+    const real t34 = t24 + t33;
+    const real t35 = 1.0 / t10;
+    const real t36 = t34 * t35;
+    const real t37 = t34 * t36;
+    const real t38 = t22 - t37;
+    const real t39 = t23 < t38;
+    if (!(t39 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t40 = H[2] * H[2];
+    const real t41 = H[5] * H[5];
+    const real t42 = t40 + t41;
+    const real t43 = H[8] * H[8];
+    const real t44 = t42 + t43;
+    const real t45 = H[11] * H[11];
+    const real t46 = t44 + t45;
+    const real t47 = H[14] * H[14];
+    const real t48 = t46 + t47;
+    const real t49 = H[17] * H[17];
+    const real t50 = t48 + t49;
+    const real t51 = t50 * ((real)1 / (real)10000000000000);
+    const real t52 = H[15] * H[17];
+    const real t53 = H[12] * H[14];
+    const real t54 = H[9] * H[11];
+    const real t55 = H[6] * H[8];
+    const real t56 = H[3] * H[5];
+    const real t57 = H[0] * H[2];
+    const real t58 = t56 + t57;
+    const real t59 = t55 + t58;
+    const real t60 = t54 + t59;
+    const real t61 = t53 + t60;
+    const real t62 = t52 + t61;
+    const real t63 = t62 * t35;
+    const real t64 = t62 * t63;
+    const real t65 = t50 - t64;
+    const real t66 = H[1] * H[2];
+    const real t67 = H[4] * H[5];
+    const real t68 = t66 + t67;
+    const real t69 = H[7] * H[8];
+    const real t70 = t68 + t69;
+    const real t71 = H[10] * H[11];
+    const real t72 = t70 + t71;
+    const real t73 = H[13] * H[14];
+    const real t74 = t72 + t73;
+    const real t75 = H[16] * H[17];
+    const real t76 = t74 + t75;
+    const real t77 = t62 * t36;
+    const real t78 = t76 - t77;
+    const real t79 = 1.0 / t38;
+    const real t80 = t79 * t78;
+    const real t81 = t78 * t80;
+    const real t82 = t65 - t81;
+    const real t83 = t51 < t82;
+    if (!(t83 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+    const real t84 = H[0] * t35;
+    const real t85 = H[0] * t36;
+    const real t86 = H[1] - t85;
+    const real t87 = t79 * t86;
+    const real t88 = 1.0 / t82;
+    const real t89 = H[0] * t63;
+    const real t90 = H[2] - t89;
+    const real t91 = t80 * t86;
+    const real t92 = t90 - t91;
+    const real t93 = t88 * t92;
+    const real t94 = t80 * t93;
+    const real t95 = t87 - t94;
+    const real t96 = t36 * t95;
+    const real t97 = t84 - t96;
+    const real t98 = t63 * t93;
+    const real t99 = t97 - t98;
+    W[0] = t99;
+    const real t100 = H[3] * t35;
+    const real t101 = H[3] * t36;
+    const real t102 = H[4] - t101;
+    const real t103 = t79 * t102;
+    const real t104 = H[3] * t63;
+    const real t105 = H[5] - t104;
+    const real t106 = t80 * t102;
+    const real t107 = t105 - t106;
+    const real t108 = t88 * t107;
+    const real t109 = t80 * t108;
+    const real t110 = t103 - t109;
+    const real t111 = t36 * t110;
+    const real t112 = t100 - t111;
+    const real t113 = t63 * t108;
+    const real t114 = t112 - t113;
+    W[1] = t114;
+    const real t115 = H[6] * t35;
+    const real t116 = H[6] * t36;
+    const real t117 = H[7] - t116;
+    const real t118 = t79 * t117;
+    const real t119 = H[6] * t63;
+    const real t120 = H[8] - t119;
+    const real t121 = t80 * t117;
+    const real t122 = t120 - t121;
+    const real t123 = t88 * t122;
+    const real t124 = t80 * t123;
+    const real t125 = t118 - t124;
+    const real t126 = t36 * t125;
+    const real t127 = t115 - t126;
+    const real t128 = t63 * t123;
+    const real t129 = t127 - t128;
+    W[2] = t129;
+    const real t130 = H[9] * t35;
+    const real t131 = H[9] * t36;
+    const real t132 = H[10] - t131;
+    const real t133 = t79 * t132;
+    const real t134 = H[9] * t63;
+    const real t135 = H[11] - t134;
+    const real t136 = t80 * t132;
+    const real t137 = t135 - t136;
+    const real t138 = t88 * t137;
+    const real t139 = t80 * t138;
+    const real t140 = t133 - t139;
+    const real t141 = t36 * t140;
+    const real t142 = t130 - t141;
+    const real t143 = t63 * t138;
+    const real t144 = t142 - t143;
+    W[3] = t144;
+    const real t145 = H[12] * t35;
+    const real t146 = H[12] * t36;
+    const real t147 = H[13] - t146;
+    const real t148 = t79 * t147;
+    const real t149 = H[12] * t63;
+    const real t150 = H[14] - t149;
+    const real t151 = t80 * t147;
+    const real t152 = t150 - t151;
+    const real t153 = t88 * t152;
+    const real t154 = t80 * t153;
+    const real t155 = t148 - t154;
+    const real t156 = t36 * t155;
+    const real t157 = t145 - t156;
+    const real t158 = t63 * t153;
+    const real t159 = t157 - t158;
+    W[4] = t159;
+    const real t160 = H[15] * t35;
+    const real t161 = H[15] * t36;
+    const real t162 = H[16] - t161;
+    const real t163 = t79 * t162;
+    const real t164 = H[15] * t63;
+    const real t165 = H[17] - t164;
+    const real t166 = t80 * t162;
+    const real t167 = t165 - t166;
+    const real t168 = t88 * t167;
+    const real t169 = t80 * t168;
+    const real t170 = t163 - t169;
+    const real t171 = t36 * t170;
+    const real t172 = t160 - t171;
+    const real t173 = t63 * t168;
+    const real t174 = t172 - t173;
+    W[5] = t174;
+    W[6] = t95;
+    W[7] = t110;
+    W[8] = t125;
+    W[9] = t140;
+    W[10] = t155;
+    W[11] = t170;
+    W[12] = t93;
+    W[13] = t108;
+    W[14] = t123;
+    W[15] = t138;
+    W[16] = t153;
+    W[17] = t168;
+    const real t175 = H[0] < 0.0;
+    const real t176 = sqrt(t10);
+    const real t177 = -t176;
+    const real t178 = t175 != 0 ? t177 : t176;
+    const real t179 = H[0] + t178;
+    const real t180 = fabs(H[0]);
+    const real t181 = t176 + t180;
+    const real t182 = t176 * t181;
+    const real t183 = 0.0 < t182;
+    const real t184 = 1.0 / t182;
+    const real t185 = t183 != 0 ? t184 : 0.0;
+    const real t186 = H[2] * t179;
+    const real t187 = t186 + t56;
+    const real t188 = t55 + t187;
+    const real t189 = t54 + t188;
+    const real t190 = t53 + t189;
+    const real t191 = t52 + t190;
+    const real t192 = t185 * t191;
+    const real t193 = H[9] * t192;
+    const real t194 = H[11] - t193;
+    const real t195 = H[1] * t179;
+    const real t196 = t195 + t28;
+    const real t197 = t27 + t196;
+    const real t198 = t26 + t197;
+    const real t199 = t25 + t198;
+    const real t200 = t24 + t199;
+    const real t201 = t185 * t200;
+    const real t202 = H[9] * t201;
+    const real t203 = H[10] - t202;
+    const real t204 = H[15] * t201;
+    const real t205 = H[16] - t204;
+    const real t206 = t205 * t205;
+    const real t207 = H[12] * t201;
+    const real t208 = H[13] - t207;
+    const real t209 = t208 * t208;
+    const real t210 = t203 * t203;
+    const real t211 = H[3] * t201;
+    const real t212 = H[4] - t211;
+    const real t213 = t212 * t212;
+    const real t214 = H[6] * t201;
+    const real t215 = H[7] - t214;
+    const real t216 = t215 * t215;
+    const real t217 = t213 + t216;
+    const real t218 = t210 + t217;
+    const real t219 = t209 + t218;
+    const real t220 = t206 + t219;
+    const real t221 = sqrt(t220);
+    const real t222 = fabs(t212);
+    const real t223 = t221 + t222;
+    const real t224 = t221 * t223;
+    const real t225 = 0.0 < t224;
+    const real t226 = 1.0 / t224;
+    const real t227 = t225 != 0 ? t226 : 0.0;
+    const real t228 = H[15] * t192;
+    const real t229 = H[17] - t228;
+    const real t230 = t205 * t229;
+    const real t231 = H[12] * t192;
+    const real t232 = H[14] - t231;
+    const real t233 = t208 * t232;
+    const real t234 = t203 * t194;
+    const real t235 = H[3] * t192;
+    const real t236 = H[5] - t235;
+    const real t237 = t212 < 0.0;
+    const real t238 = -t221;
+    const real t239 = t237 != 0 ? t238 : t221;
+    const real t240 = t212 + t239;
+    const real t241 = t236 * t240;
+    const real t242 = H[6] * t192;
+    const real t243 = H[8] - t242;
+    const real t244 = t215 * t243;
+    const real t245 = t241 + t244;
+    const real t246 = t234 + t245;
+    const real t247 = t233 + t246;
+    const real t248 = t230 + t247;
+    const real t249 = t227 * t248;
+    const real t250 = t203 * t249;
+    const real t251 = t194 - t250;
+    const real t252 = t251 * t251;
+    const real t253 = t205 * t249;
+    const real t254 = t229 - t253;
+    const real t255 = t254 * t254;
+    const real t256 = t208 * t249;
+    const real t257 = t232 - t256;
+    const real t258 = t257 * t257;
+    const real t259 = t215 * t249;
+    const real t260 = t243 - t259;
+    const real t261 = t260 * t260;
+    const real t262 = t261 + t252;
+    const real t263 = t258 + t262;
+    const real t264 = t255 + t263;
+    const real t265 = sqrt(t264);
+    const real t266 = fabs(t260);
+    const real t267 = t265 + t266;
+    const real t268 = t265 * t267;
+    const real t269 = 0.0 < t268;
+    const real t270 = 1.0 / t268;
+    const real t271 = t269 != 0 ? t270 : 0.0;
+    const real t272 = t252 * t271;
+    const real t273 = 1.0 - t272;
+    const real t274 = t203 * t273;
+    const real t275 = t260 < 0.0;
+    const real t276 = -t265;
+    const real t277 = t275 != 0 ? t276 : t265;
+    const real t278 = t260 + t277;
+    const real t279 = t278 * t271;
+    const real t280 = t251 * t279;
+    const real t281 = t215 * t280;
+    const real t282 = t274 - t281;
+    const real t283 = t251 * t271;
+    const real t284 = t257 * t283;
+    const real t285 = t208 * t284;
+    const real t286 = t282 - t285;
+    const real t287 = t254 * t283;
+    const real t288 = t205 * t287;
+    const real t289 = t286 - t288;
+    const real t290 = t227 * t289;
+    const real t291 = t203 * t290;
+    const real t292 = t273 - t291;
+    const real t293 = H[9] * t292;
+    const real t294 = t240 * t290;
+    const real t295 = H[3] * t294;
+    const real t296 = t215 * t290;
+    const real t297 = t280 + t296;
+    const real t298 = H[6] * t297;
+    const real t299 = t295 + t298;
+    const real t300 = t293 - t299;
+    const real t301 = t208 * t290;
+    const real t302 = t284 + t301;
+    const real t303 = H[12] * t302;
+    const real t304 = t300 - t303;
+    const real t305 = t205 * t290;
+    const real t306 = t287 + t305;
+    const real t307 = H[15] * t306;
+    const real t308 = t304 - t307;
+    const real t309 = t185 * t308;
+    const real t310 = t179 * t309;
+    const real t311 = -t310;
+    W[18] = t311;
+    const real t312 = H[3] * t309;
+    const real t313 = t294 + t312;
+    const real t314 = -t313;
+    W[19] = t314;
+    const real t315 = H[6] * t309;
+    const real t316 = t297 + t315;
+    const real t317 = -t316;
+    W[20] = t317;
+    const real t318 = H[9] * t309;
+    const real t319 = t292 - t318;
+    W[21] = t319;
+    const real t320 = H[12] * t309;
+    const real t321 = t302 + t320;
+    const real t322 = -t321;
+    W[22] = t322;
+    const real t323 = H[15] * t309;
+    const real t324 = t306 + t323;
+    const real t325 = -t324;
+    W[23] = t325;
+    const real t326 = t258 * t271;
+    const real t327 = 1.0 - t326;
+    const real t328 = t208 * t327;
+    const real t329 = t257 * t279;
+    const real t330 = t215 * t329;
+    const real t331 = t203 * t284;
+    const real t332 = t330 + t331;
+    const real t333 = t328 - t332;
+    const real t334 = t257 * t271;
+    const real t335 = t254 * t334;
+    const real t336 = t205 * t335;
+    const real t337 = t333 - t336;
+    const real t338 = t227 * t337;
+    const real t339 = t208 * t338;
+    const real t340 = t327 - t339;
+    const real t341 = H[12] * t340;
+    const real t342 = t203 * t338;
+    const real t343 = t284 + t342;
+    const real t344 = H[9] * t343;
+    const real t345 = t240 * t338;
+    const real t346 = H[3] * t345;
+    const real t347 = t215 * t338;
+    const real t348 = t329 + t347;
+    const real t349 = H[6] * t348;
+    const real t350 = t346 + t349;
+    const real t351 = t344 + t350;
+    const real t352 = t341 - t351;
+    const real t353 = t205 * t338;
+    const real t354 = t335 + t353;
+    const real t355 = H[15] * t354;
+    const real t356 = t352 - t355;
+    const real t357 = t185 * t356;
+    const real t358 = t179 * t357;
+    const real t359 = -t358;
+    W[24] = t359;
+    const real t360 = H[3] * t357;
+    const real t361 = t345 + t360;
+    const real t362 = -t361;
+    W[25] = t362;
+    const real t363 = H[6] * t357;
+    const real t364 = t348 + t363;
+    const real t365 = -t364;
+    W[26] = t365;
+    const real t366 = H[9] * t357;
+    const real t367 = t343 + t366;
+    const real t368 = -t367;
+    W[27] = t368;
+    const real t369 = H[12] * t357;
+    const real t370 = t340 - t369;
+    W[28] = t370;
+    const real t371 = H[15] * t357;
+    const real t372 = t354 + t371;
+    const real t373 = -t372;
+    W[29] = t373;
+    const real t374 = t255 * t271;
+    const real t375 = 1.0 - t374;
+    const real t376 = t205 * t375;
+    const real t377 = t208 * t335;
+    const real t378 = t254 * t279;
+    const real t379 = t215 * t378;
+    const real t380 = t203 * t287;
+    const real t381 = t379 + t380;
+    const real t382 = t377 + t381;
+    const real t383 = t376 - t382;
+    const real t384 = t227 * t383;
+    const real t385 = t205 * t384;
+    const real t386 = t375 - t385;
+    const real t387 = H[15] * t386;
+    const real t388 = t208 * t384;
+    const real t389 = t335 + t388;
+    const real t390 = H[12] * t389;
+    const real t391 = t203 * t384;
+    const real t392 = t287 + t391;
+    const real t393 = H[9] * t392;
+    const real t394 = t240 * t384;
+    const real t395 = H[3] * t394;
+    const real t396 = t215 * t384;
+    const real t397 = t378 + t396;
+    const real t398 = H[6] * t397;
+    const real t399 = t395 + t398;
+    const real t400 = t393 + t399;
+    const real t401 = t390 + t400;
+    const real t402 = t387 - t401;
+    const real t403 = t185 * t402;
+    const real t404 = t179 * t403;
+    const real t405 = -t404;
+    W[30] = t405;
+    const real t406 = H[3] * t403;
+    const real t407 = t394 + t406;
+    const real t408 = -t407;
+    W[31] = t408;
+    const real t409 = H[6] * t403;
+    const real t410 = t397 + t409;
+    const real t411 = -t410;
+    W[32] = t411;
+    const real t412 = H[9] * t403;
+    const real t413 = t392 + t412;
+    const real t414 = -t413;
+    W[33] = t414;
+    const real t415 = H[12] * t403;
+    const real t416 = t389 + t415;
+    const real t417 = -t416;
+    W[34] = t417;
+    const real t418 = H[15] * t403;
+    const real t419 = t386 - t418;
+    W[35] = t419;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_complement_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_complement(in[0], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_complement_inputs[] = {
+    {"H", 18, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_complement_outputs[] = {
+    {"W", 36, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic3_complement_guards[] = {
+    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* a column's rows divided by D, across a hinge with 3 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  F[3][3] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  y[3] -H^T K - C
+ * out z[3] D^-1 y
+ */
+int mstmm_sweep_generic3_divide(const real *restrict F, const real *restrict y, real *restrict z)
+{
+    const real t0 = F[0] * y[0];
+    const real t1 = F[3] * y[0];
+    const real t2 = y[1] - t1;
+    const real t3 = F[4] * t2;
+    const real t4 = F[6] * y[0];
+    const real t5 = y[2] - t4;
+    const real t6 = F[7] * t2;
+    const real t7 = t5 - t6;
+    const real t8 = F[8] * t7;
+    const real t9 = F[7] * t8;
+    const real t10 = t3 - t9;
+    const real t11 = F[3] * t10;
+    const real t12 = t0 - t11;
+    const real t13 = F[6] * t8;
+    const real t14 = t12 - t13;
+    z[0] = t14;
+    z[1] = t10;
+    z[2] = t8;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_divide_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_divide(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_divide_inputs[] = {
+    {"F", 9, "", 0, 0},
+    {"y", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_divide_outputs[] = {
+    {"z", 3, "", 0, 0},
+};
+
+/* two columns coupled by a hinge with 3 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[3] of one row
+ * in  z[3] of the other
+ * out L_ij[1] entry of L of both, added to what is there
+ */
+int mstmm_sweep_generic3_couple(const real *restrict y, const real *restrict z, real *restrict L_ij)
+{
+    const real t0 = y[0] * z[0];
+    const real t1 = y[1] * z[1];
+    const real t2 = t0 + t1;
+    const real t3 = y[2] * z[2];
+    const real t4 = t2 + t3;
+    L_ij[0] += t4;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_couple_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_couple(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_couple_inputs[] = {
+    {"y", 3, "", 0, 0},
+    {"z", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_couple_outputs[] = {
+    {"L_ij", 1, "", 1, 0},
+};
+
+/* what a hinge with 3 speeds tells a row
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[3] tau - H^T e
+ * in  z[3] of the row
+ * out l[1] known part of the row, added to what is there
+ */
+int mstmm_sweep_generic3_answered(const real *restrict y, const real *restrict z, real *restrict l)
+{
+    const real t0 = y[0] * z[0];
+    const real t1 = y[1] * z[1];
+    const real t2 = t0 + t1;
+    const real t3 = y[2] * z[2];
+    const real t4 = t2 + t3;
+    const real t5 = -t4;
+    l[0] += t5;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_answered_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_answered(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_answered_inputs[] = {
+    {"y", 3, "", 0, 0},
+    {"z", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_answered_outputs[] = {
+    {"l", 1, "", 1, 0},
+};
+
+/* a multiplier felt by a hinge with 3 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[3] of the row
+ * in  x[1] (N, N*m) multiplier
+ * out y_0[3] tau - H^T e, added to what is there
+ */
+int mstmm_sweep_generic3_pull(const real *restrict y, const real *restrict x, real *restrict y_0)
+{
+    const real t0 = y[0] * x[0];
+    y_0[0] += t0;
+    const real t1 = y[1] * x[0];
+    y_0[1] += t1;
+    const real t2 = y[2] * x[0];
+    y_0[2] += t2;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_pull_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_pull(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_pull_inputs[] = {
+    {"y", 3, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_pull_outputs[] = {
+    {"y_0", 3, "", 1, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -8068,6 +8707,66 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "complement",
+        .function = (void (*)(void))mstmm_sweep_generic3_complement,
+        .call = mstmm_sweep_generic3_complement_call,
+        .n_inputs = 1,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic3_complement_inputs,
+        .outputs = mstmm_sweep_generic3_complement_outputs,
+        .ir_hash = "b6f1d188f1aa26501743a0ecf7e3e2adeb6c64d17b49de2eca98a071a09f48a9",
+        .n_guards = 3,
+        .guards = mstmm_sweep_generic3_complement_guards,
+    },
+    {
+        .name = "divide",
+        .function = (void (*)(void))mstmm_sweep_generic3_divide,
+        .call = mstmm_sweep_generic3_divide_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic3_divide_inputs,
+        .outputs = mstmm_sweep_generic3_divide_outputs,
+        .ir_hash = "e0bf7e77d2a110871d1bec70367c6090b997aa7b34a69d9d4fe2e7bc506a2f6a",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "couple",
+        .function = (void (*)(void))mstmm_sweep_generic3_couple,
+        .call = mstmm_sweep_generic3_couple_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic3_couple_inputs,
+        .outputs = mstmm_sweep_generic3_couple_outputs,
+        .ir_hash = "495ba4d7290e7ae6dca044df866ae514a93566b6facc48b448315f25db512fb9",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "answered",
+        .function = (void (*)(void))mstmm_sweep_generic3_answered,
+        .call = mstmm_sweep_generic3_answered_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic3_answered_inputs,
+        .outputs = mstmm_sweep_generic3_answered_outputs,
+        .ir_hash = "79de1c0abeb4998671e6aa6dd136b089367afc631d1c1ab831870d4820a82fa6",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "pull",
+        .function = (void (*)(void))mstmm_sweep_generic3_pull,
+        .call = mstmm_sweep_generic3_pull_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic3_pull_inputs,
+        .outputs = mstmm_sweep_generic3_pull_outputs,
+        .ir_hash = "0a2e11103bb6e482c6546f1223d6f80c175283a0838b7d12864248427a961772",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic3_forward_slope,
         .call = mstmm_sweep_generic3_forward_slope_call,
@@ -8097,7 +8796,7 @@ const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "36df0733ec79d45fc4d0228aacf03d8ff94865200023fad933ae24f3300ab586",
+    .hash = "9c925278203afb3e538cb3f2cf96e101f1305b0b0bb337217133b01493df4b94",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -8107,6 +8806,6 @@ const mstmm_element mstmm_sweep_generic3 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 22,
+    .n_kernels = 27,
     .kernels = mstmm_sweep_generic3_kernels,
 };

@@ -81,6 +81,11 @@ int mstmm_sweep_generic4_tangent_answer_known(const real *restrict Rc, const rea
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic4_complement(const real *restrict H, real *restrict W);
+int mstmm_sweep_generic4_divide(const real *restrict F, const real *restrict y, real *restrict z);
+int mstmm_sweep_generic4_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
+int mstmm_sweep_generic4_answered(const real *restrict y, const real *restrict z, real *restrict l);
+int mstmm_sweep_generic4_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
 int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -8841,6 +8846,844 @@ static const mstmm_port mstmm_sweep_generic4_tangent_answer_known_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
+/* what a hinge with 4 speeds lets go and holds
+ * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
+ * in  H[6][4] motion subspace
+ * out W[6][6] rows: H^+, then what the hinge holds
+ */
+int mstmm_sweep_generic4_complement(const real *restrict H, real *restrict W)
+{
+    const real t0 = H[20] * H[20];
+    const real t1 = H[16] * H[16];
+    const real t2 = H[12] * H[12];
+    const real t3 = H[8] * H[8];
+    const real t4 = H[0] * H[0];
+    const real t5 = H[4] * H[4];
+    const real t6 = t4 + t5;
+    const real t7 = t3 + t6;
+    const real t8 = t2 + t7;
+    const real t9 = t1 + t8;
+    const real t10 = t0 + t9;
+    const real t11 = 0.0 < t10;
+    if (!(t11 != 0)) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
+    const real t12 = H[1] * H[1];
+    const real t13 = H[5] * H[5];
+    const real t14 = t12 + t13;
+    const real t15 = H[9] * H[9];
+    const real t16 = t14 + t15;
+    const real t17 = H[13] * H[13];
+    const real t18 = t16 + t17;
+    const real t19 = H[17] * H[17];
+    const real t20 = t18 + t19;
+    const real t21 = H[21] * H[21];
+    const real t22 = t20 + t21;
+    const real t23 = t22 * ((real)1 / (real)10000000000000);
+    const real t24 = H[20] * H[21];
+    const real t25 = H[16] * H[17];
+    const real t26 = H[12] * H[13];
+    const real t27 = H[8] * H[9];
+    const real t28 = H[4] * H[5];
+    const real t29 = H[0] * H[1];
+    const real t30 = t28 + t29;
+    const real t31 = t27 + t30;
+    const real t32 = t26 + t31;
+    const real t33 = t25 + t32;
+    const real t34 = t24 + t33;
+    const real t35 = 1.0 / t10;
+    const real t36 = t34 * t35;
+    const real t37 = t34 * t36;
+    const real t38 = t22 - t37;
+    const real t39 = t23 < t38;
+    if (!(t39 != 0)) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
+    const real t40 = H[2] * H[2];
+    const real t41 = H[6] * H[6];
+    const real t42 = t40 + t41;
+    const real t43 = H[10] * H[10];
+    const real t44 = t42 + t43;
+    const real t45 = H[14] * H[14];
+    const real t46 = t44 + t45;
+    const real t47 = H[18] * H[18];
+    const real t48 = t46 + t47;
+    const real t49 = H[22] * H[22];
+    const real t50 = t48 + t49;
+    const real t51 = t50 * ((real)1 / (real)10000000000000);
+    const real t52 = H[20] * H[22];
+    const real t53 = H[16] * H[18];
+    const real t54 = H[12] * H[14];
+    const real t55 = H[8] * H[10];
+    const real t56 = H[4] * H[6];
+    const real t57 = H[0] * H[2];
+    const real t58 = t56 + t57;
+    const real t59 = t55 + t58;
+    const real t60 = t54 + t59;
+    const real t61 = t53 + t60;
+    const real t62 = t52 + t61;
+    const real t63 = t62 * t35;
+    const real t64 = t62 * t63;
+    const real t65 = t50 - t64;
+    const real t66 = H[1] * H[2];
+    const real t67 = H[5] * H[6];
+    const real t68 = t66 + t67;
+    const real t69 = H[9] * H[10];
+    const real t70 = t68 + t69;
+    const real t71 = H[13] * H[14];
+    const real t72 = t70 + t71;
+    const real t73 = H[17] * H[18];
+    const real t74 = t72 + t73;
+    const real t75 = H[21] * H[22];
+    const real t76 = t74 + t75;
+    const real t77 = t62 * t36;
+    const real t78 = t76 - t77;
+    const real t79 = 1.0 / t38;
+    const real t80 = t79 * t78;
+    const real t81 = t78 * t80;
+    const real t82 = t65 - t81;
+    const real t83 = t51 < t82;
+    if (!(t83 != 0)) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
+    const real t84 = H[3] * H[3];
+    const real t85 = H[7] * H[7];
+    const real t86 = t84 + t85;
+    const real t87 = H[11] * H[11];
+    const real t88 = t86 + t87;
+    const real t89 = H[15] * H[15];
+    const real t90 = t88 + t89;
+    const real t91 = H[19] * H[19];
+    const real t92 = t90 + t91;
+    const real t93 = H[23] * H[23];
+    const real t94 = t92 + t93;
+    const real t95 = t94 * ((real)1 / (real)10000000000000);
+    const real t96 = H[20] * H[23];
+    const real t97 = H[16] * H[19];
+    const real t98 = H[12] * H[15];
+    const real t99 = H[8] * H[11];
+    const real t100 = H[4] * H[7];
+    const real t101 = H[0] * H[3];
+    const real t102 = t100 + t101;
+    const real t103 = t99 + t102;
+    const real t104 = t98 + t103;
+    const real t105 = t97 + t104;
+    const real t106 = t96 + t105;
+    const real t107 = t106 * t35;
+    const real t108 = t106 * t107;
+    const real t109 = t94 - t108;
+    const real t110 = H[1] * H[3];
+    const real t111 = H[5] * H[7];
+    const real t112 = t110 + t111;
+    const real t113 = H[9] * H[11];
+    const real t114 = t112 + t113;
+    const real t115 = H[13] * H[15];
+    const real t116 = t114 + t115;
+    const real t117 = H[17] * H[19];
+    const real t118 = t116 + t117;
+    const real t119 = H[21] * H[23];
+    const real t120 = t118 + t119;
+    const real t121 = t106 * t36;
+    const real t122 = t120 - t121;
+    const real t123 = t79 * t122;
+    const real t124 = t122 * t123;
+    const real t125 = t109 - t124;
+    const real t126 = H[2] * H[3];
+    const real t127 = H[6] * H[7];
+    const real t128 = t126 + t127;
+    const real t129 = H[10] * H[11];
+    const real t130 = t128 + t129;
+    const real t131 = H[14] * H[15];
+    const real t132 = t130 + t131;
+    const real t133 = H[18] * H[19];
+    const real t134 = t132 + t133;
+    const real t135 = H[22] * H[23];
+    const real t136 = t134 + t135;
+    const real t137 = t106 * t63;
+    const real t138 = t136 - t137;
+    const real t139 = t80 * t122;
+    const real t140 = t138 - t139;
+    const real t141 = 1.0 / t82;
+    const real t142 = t141 * t140;
+    const real t143 = t140 * t142;
+    const real t144 = t125 - t143;
+    const real t145 = t95 < t144;
+    if (!(t145 != 0)) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
+    const real t146 = H[0] * t35;
+    const real t147 = H[0] * t36;
+    const real t148 = H[1] - t147;
+    const real t149 = t79 * t148;
+    const real t150 = H[0] * t63;
+    const real t151 = H[2] - t150;
+    const real t152 = t80 * t148;
+    const real t153 = t151 - t152;
+    const real t154 = t141 * t153;
+    const real t155 = 1.0 / t144;
+    const real t156 = H[0] * t107;
+    const real t157 = H[3] - t156;
+    const real t158 = t123 * t148;
+    const real t159 = t157 - t158;
+    const real t160 = t142 * t153;
+    const real t161 = t159 - t160;
+    const real t162 = t155 * t161;
+    const real t163 = t142 * t162;
+    const real t164 = t154 - t163;
+    const real t165 = t80 * t164;
+    const real t166 = t149 - t165;
+    const real t167 = t123 * t162;
+    const real t168 = t166 - t167;
+    const real t169 = t36 * t168;
+    const real t170 = t146 - t169;
+    const real t171 = t63 * t164;
+    const real t172 = t170 - t171;
+    const real t173 = t107 * t162;
+    const real t174 = t172 - t173;
+    W[0] = t174;
+    const real t175 = H[4] * t35;
+    const real t176 = H[4] * t36;
+    const real t177 = H[5] - t176;
+    const real t178 = t79 * t177;
+    const real t179 = H[4] * t63;
+    const real t180 = H[6] - t179;
+    const real t181 = t80 * t177;
+    const real t182 = t180 - t181;
+    const real t183 = t141 * t182;
+    const real t184 = H[4] * t107;
+    const real t185 = H[7] - t184;
+    const real t186 = t123 * t177;
+    const real t187 = t185 - t186;
+    const real t188 = t142 * t182;
+    const real t189 = t187 - t188;
+    const real t190 = t155 * t189;
+    const real t191 = t142 * t190;
+    const real t192 = t183 - t191;
+    const real t193 = t80 * t192;
+    const real t194 = t178 - t193;
+    const real t195 = t123 * t190;
+    const real t196 = t194 - t195;
+    const real t197 = t36 * t196;
+    const real t198 = t175 - t197;
+    const real t199 = t63 * t192;
+    const real t200 = t198 - t199;
+    const real t201 = t107 * t190;
+    const real t202 = t200 - t201;
+    W[1] = t202;
+    const real t203 = H[8] * t35;
+    const real t204 = H[8] * t36;
+    const real t205 = H[9] - t204;
+    const real t206 = t79 * t205;
+    const real t207 = H[8] * t63;
+    const real t208 = H[10] - t207;
+    const real t209 = t80 * t205;
+    const real t210 = t208 - t209;
+    const real t211 = t141 * t210;
+    const real t212 = H[8] * t107;
+    const real t213 = H[11] - t212;
+    const real t214 = t123 * t205;
+    const real t215 = t213 - t214;
+    const real t216 = t142 * t210;
+    const real t217 = t215 - t216;
+    const real t218 = t155 * t217;
+    const real t219 = t142 * t218;
+    const real t220 = t211 - t219;
+    const real t221 = t80 * t220;
+    const real t222 = t206 - t221;
+    const real t223 = t123 * t218;
+    const real t224 = t222 - t223;
+    const real t225 = t36 * t224;
+    const real t226 = t203 - t225;
+    const real t227 = t63 * t220;
+    const real t228 = t226 - t227;
+    const real t229 = t107 * t218;
+    const real t230 = t228 - t229;
+    W[2] = t230;
+    const real t231 = H[12] * t35;
+    const real t232 = H[12] * t36;
+    const real t233 = H[13] - t232;
+    const real t234 = t79 * t233;
+    const real t235 = H[12] * t63;
+    const real t236 = H[14] - t235;
+    const real t237 = t80 * t233;
+    const real t238 = t236 - t237;
+    const real t239 = t141 * t238;
+    const real t240 = H[12] * t107;
+    const real t241 = H[15] - t240;
+    const real t242 = t123 * t233;
+    const real t243 = t241 - t242;
+    const real t244 = t142 * t238;
+    const real t245 = t243 - t244;
+    const real t246 = t155 * t245;
+    const real t247 = t142 * t246;
+    const real t248 = t239 - t247;
+    const real t249 = t80 * t248;
+    const real t250 = t234 - t249;
+    const real t251 = t123 * t246;
+    const real t252 = t250 - t251;
+    const real t253 = t36 * t252;
+    const real t254 = t231 - t253;
+    const real t255 = t63 * t248;
+    const real t256 = t254 - t255;
+    const real t257 = t107 * t246;
+    const real t258 = t256 - t257;
+    W[3] = t258;
+    const real t259 = H[16] * t35;
+    const real t260 = H[16] * t36;
+    const real t261 = H[17] - t260;
+    const real t262 = t79 * t261;
+    const real t263 = H[16] * t63;
+    const real t264 = H[18] - t263;
+    const real t265 = t80 * t261;
+    const real t266 = t264 - t265;
+    const real t267 = t141 * t266;
+    const real t268 = H[16] * t107;
+    const real t269 = H[19] - t268;
+    const real t270 = t123 * t261;
+    const real t271 = t269 - t270;
+    const real t272 = t142 * t266;
+    const real t273 = t271 - t272;
+    const real t274 = t155 * t273;
+    const real t275 = t142 * t274;
+    const real t276 = t267 - t275;
+    const real t277 = t80 * t276;
+    const real t278 = t262 - t277;
+    const real t279 = t123 * t274;
+    const real t280 = t278 - t279;
+    const real t281 = t36 * t280;
+    const real t282 = t259 - t281;
+    const real t283 = t63 * t276;
+    const real t284 = t282 - t283;
+    const real t285 = t107 * t274;
+    const real t286 = t284 - t285;
+    W[4] = t286;
+    const real t287 = H[20] * t35;
+    const real t288 = H[20] * t36;
+    const real t289 = H[21] - t288;
+    const real t290 = t79 * t289;
+    const real t291 = H[20] * t63;
+    const real t292 = H[22] - t291;
+    const real t293 = t80 * t289;
+    const real t294 = t292 - t293;
+    const real t295 = t141 * t294;
+    const real t296 = H[20] * t107;
+    const real t297 = H[23] - t296;
+    const real t298 = t123 * t289;
+    const real t299 = t297 - t298;
+    const real t300 = t142 * t294;
+    const real t301 = t299 - t300;
+    const real t302 = t155 * t301;
+    const real t303 = t142 * t302;
+    const real t304 = t295 - t303;
+    const real t305 = t80 * t304;
+    const real t306 = t290 - t305;
+    const real t307 = t123 * t302;
+    const real t308 = t306 - t307;
+    const real t309 = t36 * t308;
+    const real t310 = t287 - t309;
+    const real t311 = t63 * t304;
+    const real t312 = t310 - t311;
+    const real t313 = t107 * t302;
+    const real t314 = t312 - t313;
+    W[5] = t314;
+    W[6] = t168;
+    W[7] = t196;
+    W[8] = t224;
+    W[9] = t252;
+    W[10] = t280;
+    W[11] = t308;
+    W[12] = t164;
+    W[13] = t192;
+    W[14] = t220;
+    W[15] = t248;
+    W[16] = t276;
+    W[17] = t304;
+    W[18] = t162;
+    W[19] = t190;
+    W[20] = t218;
+    W[21] = t246;
+    W[22] = t274;
+    W[23] = t302;
+    const real t315 = H[0] < 0.0;
+    const real t316 = sqrt(t10);
+    const real t317 = -t316;
+    const real t318 = t315 != 0 ? t317 : t316;
+    const real t319 = H[0] + t318;
+    const real t320 = fabs(H[0]);
+    const real t321 = t316 + t320;
+    const real t322 = t316 * t321;
+    const real t323 = 0.0 < t322;
+    const real t324 = 1.0 / t322;
+    const real t325 = t323 != 0 ? t324 : 0.0;
+    const real t326 = H[3] * t319;
+    const real t327 = t326 + t100;
+    const real t328 = t99 + t327;
+    const real t329 = t98 + t328;
+    const real t330 = t97 + t329;
+    const real t331 = t96 + t330;
+    const real t332 = t325 * t331;
+    const real t333 = H[16] * t332;
+    const real t334 = H[19] - t333;
+    const real t335 = H[1] * t319;
+    const real t336 = t335 + t28;
+    const real t337 = t27 + t336;
+    const real t338 = t26 + t337;
+    const real t339 = t25 + t338;
+    const real t340 = t24 + t339;
+    const real t341 = t325 * t340;
+    const real t342 = H[16] * t341;
+    const real t343 = H[17] - t342;
+    const real t344 = H[20] * t341;
+    const real t345 = H[21] - t344;
+    const real t346 = t345 * t345;
+    const real t347 = t343 * t343;
+    const real t348 = H[12] * t341;
+    const real t349 = H[13] - t348;
+    const real t350 = t349 * t349;
+    const real t351 = H[4] * t341;
+    const real t352 = H[5] - t351;
+    const real t353 = t352 * t352;
+    const real t354 = H[8] * t341;
+    const real t355 = H[9] - t354;
+    const real t356 = t355 * t355;
+    const real t357 = t353 + t356;
+    const real t358 = t350 + t357;
+    const real t359 = t347 + t358;
+    const real t360 = t346 + t359;
+    const real t361 = sqrt(t360);
+    const real t362 = fabs(t352);
+    const real t363 = t361 + t362;
+    const real t364 = t361 * t363;
+    const real t365 = 0.0 < t364;
+    const real t366 = 1.0 / t364;
+    const real t367 = t365 != 0 ? t366 : 0.0;
+    const real t368 = H[20] * t332;
+    const real t369 = H[23] - t368;
+    const real t370 = t345 * t369;
+    const real t371 = t343 * t334;
+    const real t372 = H[12] * t332;
+    const real t373 = H[15] - t372;
+    const real t374 = t349 * t373;
+    const real t375 = H[4] * t332;
+    const real t376 = H[7] - t375;
+    const real t377 = t352 < 0.0;
+    const real t378 = -t361;
+    const real t379 = t377 != 0 ? t378 : t361;
+    const real t380 = t352 + t379;
+    const real t381 = t376 * t380;
+    const real t382 = H[8] * t332;
+    const real t383 = H[11] - t382;
+    const real t384 = t355 * t383;
+    const real t385 = t381 + t384;
+    const real t386 = t374 + t385;
+    const real t387 = t371 + t386;
+    const real t388 = t370 + t387;
+    const real t389 = t367 * t388;
+    const real t390 = t343 * t389;
+    const real t391 = t334 - t390;
+    const real t392 = H[2] * t319;
+    const real t393 = t392 + t56;
+    const real t394 = t55 + t393;
+    const real t395 = t54 + t394;
+    const real t396 = t53 + t395;
+    const real t397 = t52 + t396;
+    const real t398 = t325 * t397;
+    const real t399 = H[16] * t398;
+    const real t400 = H[18] - t399;
+    const real t401 = H[20] * t398;
+    const real t402 = H[22] - t401;
+    const real t403 = t345 * t402;
+    const real t404 = t343 * t400;
+    const real t405 = H[12] * t398;
+    const real t406 = H[14] - t405;
+    const real t407 = t349 * t406;
+    const real t408 = H[4] * t398;
+    const real t409 = H[6] - t408;
+    const real t410 = t409 * t380;
+    const real t411 = H[8] * t398;
+    const real t412 = H[10] - t411;
+    const real t413 = t355 * t412;
+    const real t414 = t410 + t413;
+    const real t415 = t407 + t414;
+    const real t416 = t404 + t415;
+    const real t417 = t403 + t416;
+    const real t418 = t367 * t417;
+    const real t419 = t343 * t418;
+    const real t420 = t400 - t419;
+    const real t421 = t345 * t418;
+    const real t422 = t402 - t421;
+    const real t423 = t422 * t422;
+    const real t424 = t420 * t420;
+    const real t425 = t355 * t418;
+    const real t426 = t412 - t425;
+    const real t427 = t426 * t426;
+    const real t428 = t349 * t418;
+    const real t429 = t406 - t428;
+    const real t430 = t429 * t429;
+    const real t431 = t427 + t430;
+    const real t432 = t424 + t431;
+    const real t433 = t423 + t432;
+    const real t434 = sqrt(t433);
+    const real t435 = fabs(t426);
+    const real t436 = t434 + t435;
+    const real t437 = t434 * t436;
+    const real t438 = 0.0 < t437;
+    const real t439 = 1.0 / t437;
+    const real t440 = t438 != 0 ? t439 : 0.0;
+    const real t441 = t345 * t389;
+    const real t442 = t369 - t441;
+    const real t443 = t422 * t442;
+    const real t444 = t420 * t391;
+    const real t445 = t355 * t389;
+    const real t446 = t383 - t445;
+    const real t447 = t426 < 0.0;
+    const real t448 = -t434;
+    const real t449 = t447 != 0 ? t448 : t434;
+    const real t450 = t426 + t449;
+    const real t451 = t446 * t450;
+    const real t452 = t349 * t389;
+    const real t453 = t373 - t452;
+    const real t454 = t429 * t453;
+    const real t455 = t451 + t454;
+    const real t456 = t444 + t455;
+    const real t457 = t443 + t456;
+    const real t458 = t440 * t457;
+    const real t459 = t420 * t458;
+    const real t460 = t391 - t459;
+    const real t461 = t460 * t460;
+    const real t462 = t422 * t458;
+    const real t463 = t442 - t462;
+    const real t464 = t463 * t463;
+    const real t465 = t429 * t458;
+    const real t466 = t453 - t465;
+    const real t467 = t466 * t466;
+    const real t468 = t467 + t461;
+    const real t469 = t464 + t468;
+    const real t470 = sqrt(t469);
+    const real t471 = fabs(t466);
+    const real t472 = t470 + t471;
+    const real t473 = t470 * t472;
+    const real t474 = 0.0 < t473;
+    const real t475 = 1.0 / t473;
+    const real t476 = t474 != 0 ? t475 : 0.0;
+    const real t477 = t461 * t476;
+    const real t478 = 1.0 - t477;
+    const real t479 = t420 * t478;
+    const real t480 = t466 < 0.0;
+    const real t481 = -t470;
+    const real t482 = t480 != 0 ? t481 : t470;
+    const real t483 = t466 + t482;
+    const real t484 = t483 * t476;
+    const real t485 = t460 * t484;
+    const real t486 = t429 * t485;
+    const real t487 = t479 - t486;
+    const real t488 = t460 * t476;
+    const real t489 = t463 * t488;
+    const real t490 = t422 * t489;
+    const real t491 = t487 - t490;
+    const real t492 = t440 * t491;
+    const real t493 = t420 * t492;
+    const real t494 = t478 - t493;
+    const real t495 = t343 * t494;
+    const real t496 = t450 * t492;
+    const real t497 = t355 * t496;
+    const real t498 = t429 * t492;
+    const real t499 = t485 + t498;
+    const real t500 = t349 * t499;
+    const real t501 = t497 + t500;
+    const real t502 = t495 - t501;
+    const real t503 = t422 * t492;
+    const real t504 = t489 + t503;
+    const real t505 = t345 * t504;
+    const real t506 = t502 - t505;
+    const real t507 = t367 * t506;
+    const real t508 = t343 * t507;
+    const real t509 = t494 - t508;
+    const real t510 = H[16] * t509;
+    const real t511 = t349 * t507;
+    const real t512 = t499 + t511;
+    const real t513 = H[12] * t512;
+    const real t514 = t380 * t507;
+    const real t515 = H[4] * t514;
+    const real t516 = t355 * t507;
+    const real t517 = t496 + t516;
+    const real t518 = H[8] * t517;
+    const real t519 = t515 + t518;
+    const real t520 = t513 + t519;
+    const real t521 = t510 - t520;
+    const real t522 = t345 * t507;
+    const real t523 = t504 + t522;
+    const real t524 = H[20] * t523;
+    const real t525 = t521 - t524;
+    const real t526 = t325 * t525;
+    const real t527 = t319 * t526;
+    const real t528 = -t527;
+    W[24] = t528;
+    const real t529 = H[4] * t526;
+    const real t530 = t514 + t529;
+    const real t531 = -t530;
+    W[25] = t531;
+    const real t532 = H[8] * t526;
+    const real t533 = t517 + t532;
+    const real t534 = -t533;
+    W[26] = t534;
+    const real t535 = H[12] * t526;
+    const real t536 = t512 + t535;
+    const real t537 = -t536;
+    W[27] = t537;
+    const real t538 = H[16] * t526;
+    const real t539 = t509 - t538;
+    W[28] = t539;
+    const real t540 = H[20] * t526;
+    const real t541 = t523 + t540;
+    const real t542 = -t541;
+    W[29] = t542;
+    const real t543 = t464 * t476;
+    const real t544 = 1.0 - t543;
+    const real t545 = t422 * t544;
+    const real t546 = t463 * t484;
+    const real t547 = t429 * t546;
+    const real t548 = t420 * t489;
+    const real t549 = t547 + t548;
+    const real t550 = t545 - t549;
+    const real t551 = t440 * t550;
+    const real t552 = t422 * t551;
+    const real t553 = t544 - t552;
+    const real t554 = t345 * t553;
+    const real t555 = t420 * t551;
+    const real t556 = t489 + t555;
+    const real t557 = t343 * t556;
+    const real t558 = t450 * t551;
+    const real t559 = t355 * t558;
+    const real t560 = t429 * t551;
+    const real t561 = t546 + t560;
+    const real t562 = t349 * t561;
+    const real t563 = t559 + t562;
+    const real t564 = t557 + t563;
+    const real t565 = t554 - t564;
+    const real t566 = t367 * t565;
+    const real t567 = t345 * t566;
+    const real t568 = t553 - t567;
+    const real t569 = H[20] * t568;
+    const real t570 = t343 * t566;
+    const real t571 = t556 + t570;
+    const real t572 = H[16] * t571;
+    const real t573 = t349 * t566;
+    const real t574 = t561 + t573;
+    const real t575 = H[12] * t574;
+    const real t576 = t380 * t566;
+    const real t577 = H[4] * t576;
+    const real t578 = t355 * t566;
+    const real t579 = t558 + t578;
+    const real t580 = H[8] * t579;
+    const real t581 = t577 + t580;
+    const real t582 = t575 + t581;
+    const real t583 = t572 + t582;
+    const real t584 = t569 - t583;
+    const real t585 = t325 * t584;
+    const real t586 = t319 * t585;
+    const real t587 = -t586;
+    W[30] = t587;
+    const real t588 = H[4] * t585;
+    const real t589 = t576 + t588;
+    const real t590 = -t589;
+    W[31] = t590;
+    const real t591 = H[8] * t585;
+    const real t592 = t579 + t591;
+    const real t593 = -t592;
+    W[32] = t593;
+    const real t594 = H[12] * t585;
+    const real t595 = t574 + t594;
+    const real t596 = -t595;
+    W[33] = t596;
+    const real t597 = H[16] * t585;
+    const real t598 = t571 + t597;
+    const real t599 = -t598;
+    W[34] = t599;
+    const real t600 = H[20] * t585;
+    const real t601 = t568 - t600;
+    W[35] = t601;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_complement_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_complement(in[0], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_complement_inputs[] = {
+    {"H", 24, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_complement_outputs[] = {
+    {"W", 36, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic4_complement_guards[] = {
+    {1, "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* a column's rows divided by D, across a hinge with 4 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  F[4][4] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  y[4] -H^T K - C
+ * out z[4] D^-1 y
+ */
+int mstmm_sweep_generic4_divide(const real *restrict F, const real *restrict y, real *restrict z)
+{
+    const real t0 = F[0] * y[0];
+    const real t1 = F[4] * y[0];
+    const real t2 = y[1] - t1;
+    const real t3 = F[5] * t2;
+    const real t4 = F[8] * y[0];
+    const real t5 = y[2] - t4;
+    const real t6 = F[9] * t2;
+    const real t7 = t5 - t6;
+    const real t8 = F[10] * t7;
+    const real t9 = F[12] * y[0];
+    const real t10 = y[3] - t9;
+    const real t11 = F[13] * t2;
+    const real t12 = t10 - t11;
+    const real t13 = F[14] * t7;
+    const real t14 = t12 - t13;
+    const real t15 = F[15] * t14;
+    const real t16 = F[14] * t15;
+    const real t17 = t8 - t16;
+    const real t18 = F[9] * t17;
+    const real t19 = t3 - t18;
+    const real t20 = F[13] * t15;
+    const real t21 = t19 - t20;
+    const real t22 = F[4] * t21;
+    const real t23 = t0 - t22;
+    const real t24 = F[8] * t17;
+    const real t25 = t23 - t24;
+    const real t26 = F[12] * t15;
+    const real t27 = t25 - t26;
+    z[0] = t27;
+    z[1] = t21;
+    z[2] = t17;
+    z[3] = t15;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_divide_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_divide(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_divide_inputs[] = {
+    {"F", 16, "", 0, 0},
+    {"y", 4, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_divide_outputs[] = {
+    {"z", 4, "", 0, 0},
+};
+
+/* two columns coupled by a hinge with 4 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[4] of one row
+ * in  z[4] of the other
+ * out L_ij[1] entry of L of both, added to what is there
+ */
+int mstmm_sweep_generic4_couple(const real *restrict y, const real *restrict z, real *restrict L_ij)
+{
+    const real t0 = y[0] * z[0];
+    const real t1 = y[1] * z[1];
+    const real t2 = t0 + t1;
+    const real t3 = y[2] * z[2];
+    const real t4 = t2 + t3;
+    const real t5 = y[3] * z[3];
+    const real t6 = t4 + t5;
+    L_ij[0] += t6;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_couple_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_couple(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_couple_inputs[] = {
+    {"y", 4, "", 0, 0},
+    {"z", 4, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_couple_outputs[] = {
+    {"L_ij", 1, "", 1, 0},
+};
+
+/* what a hinge with 4 speeds tells a row
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[4] tau - H^T e
+ * in  z[4] of the row
+ * out l[1] known part of the row, added to what is there
+ */
+int mstmm_sweep_generic4_answered(const real *restrict y, const real *restrict z, real *restrict l)
+{
+    const real t0 = y[0] * z[0];
+    const real t1 = y[1] * z[1];
+    const real t2 = t0 + t1;
+    const real t3 = y[2] * z[2];
+    const real t4 = t2 + t3;
+    const real t5 = y[3] * z[3];
+    const real t6 = t4 + t5;
+    const real t7 = -t6;
+    l[0] += t7;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_answered_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_answered(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_answered_inputs[] = {
+    {"y", 4, "", 0, 0},
+    {"z", 4, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_answered_outputs[] = {
+    {"l", 1, "", 1, 0},
+};
+
+/* a multiplier felt by a hinge with 4 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[4] of the row
+ * in  x[1] (N, N*m) multiplier
+ * out y_0[4] tau - H^T e, added to what is there
+ */
+int mstmm_sweep_generic4_pull(const real *restrict y, const real *restrict x, real *restrict y_0)
+{
+    const real t0 = y[0] * x[0];
+    y_0[0] += t0;
+    const real t1 = y[1] * x[0];
+    y_0[1] += t1;
+    const real t2 = y[2] * x[0];
+    y_0[2] += t2;
+    const real t3 = y[3] * x[0];
+    y_0[3] += t3;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_pull_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_pull(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_pull_inputs[] = {
+    {"y", 4, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_pull_outputs[] = {
+    {"y_0", 4, "", 1, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -9789,6 +10632,66 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "complement",
+        .function = (void (*)(void))mstmm_sweep_generic4_complement,
+        .call = mstmm_sweep_generic4_complement_call,
+        .n_inputs = 1,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic4_complement_inputs,
+        .outputs = mstmm_sweep_generic4_complement_outputs,
+        .ir_hash = "5a18b335b419e35806cdb8b92fd2fc28b8045b5d4e8a652409474bfe020dd26e",
+        .n_guards = 4,
+        .guards = mstmm_sweep_generic4_complement_guards,
+    },
+    {
+        .name = "divide",
+        .function = (void (*)(void))mstmm_sweep_generic4_divide,
+        .call = mstmm_sweep_generic4_divide_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic4_divide_inputs,
+        .outputs = mstmm_sweep_generic4_divide_outputs,
+        .ir_hash = "d412bc57141346b00ef731b566f58b4ed764b35781ac07dc44e2d809144e3db6",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "couple",
+        .function = (void (*)(void))mstmm_sweep_generic4_couple,
+        .call = mstmm_sweep_generic4_couple_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic4_couple_inputs,
+        .outputs = mstmm_sweep_generic4_couple_outputs,
+        .ir_hash = "61c61110bf81c1ae2d76025b43b6ffced2a1b7aebc7d262da84f2f8cccc1299a",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "answered",
+        .function = (void (*)(void))mstmm_sweep_generic4_answered,
+        .call = mstmm_sweep_generic4_answered_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic4_answered_inputs,
+        .outputs = mstmm_sweep_generic4_answered_outputs,
+        .ir_hash = "1e17842b694a6edcb8fe8f752f2534686fc1cdb33c1fd4a707e5ae6b89df2b89",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "pull",
+        .function = (void (*)(void))mstmm_sweep_generic4_pull,
+        .call = mstmm_sweep_generic4_pull_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic4_pull_inputs,
+        .outputs = mstmm_sweep_generic4_pull_outputs,
+        .ir_hash = "0bb7ecf350680996c51db62927859d5658d29fbe333b1f0bdabdf0142e099e33",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic4_forward_slope,
         .call = mstmm_sweep_generic4_forward_slope_call,
@@ -9818,7 +10721,7 @@ const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "b879869b6b3012281d9a753961ace4709910068c6bd6ec4f993520aaac368f2e",
+    .hash = "eb9f5b545f2a0769c5274853d754cbc5aa9007490863415f10a02e7a3dc2bc40",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -9828,6 +10731,6 @@ const mstmm_element mstmm_sweep_generic4 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 22,
+    .n_kernels = 27,
     .kernels = mstmm_sweep_generic4_kernels,
 };

@@ -81,6 +81,11 @@ int mstmm_sweep_generic5_tangent_answer_known(const real *restrict Rc, const rea
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic5_complement(const real *restrict H, real *restrict W);
+int mstmm_sweep_generic5_divide(const real *restrict F, const real *restrict y, real *restrict z);
+int mstmm_sweep_generic5_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
+int mstmm_sweep_generic5_answered(const real *restrict y, const real *restrict z, real *restrict l);
+int mstmm_sweep_generic5_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
 int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -10742,6 +10747,1075 @@ static const mstmm_port mstmm_sweep_generic5_tangent_answer_known_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
+/* what a hinge with 5 speeds lets go and holds
+ * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
+ * in  H[6][5] motion subspace
+ * out W[6][6] rows: H^+, then what the hinge holds
+ */
+int mstmm_sweep_generic5_complement(const real *restrict H, real *restrict W)
+{
+    const real t0 = H[25] * H[25];
+    const real t1 = H[20] * H[20];
+    const real t2 = H[15] * H[15];
+    const real t3 = H[10] * H[10];
+    const real t4 = H[0] * H[0];
+    const real t5 = H[5] * H[5];
+    const real t6 = t4 + t5;
+    const real t7 = t3 + t6;
+    const real t8 = t2 + t7;
+    const real t9 = t1 + t8;
+    const real t10 = t0 + t9;
+    const real t11 = 0.0 < t10;
+    if (!(t11 != 0)) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t12 = H[1] * H[1];
+    const real t13 = H[6] * H[6];
+    const real t14 = t12 + t13;
+    const real t15 = H[11] * H[11];
+    const real t16 = t14 + t15;
+    const real t17 = H[16] * H[16];
+    const real t18 = t16 + t17;
+    const real t19 = H[21] * H[21];
+    const real t20 = t18 + t19;
+    const real t21 = H[26] * H[26];
+    const real t22 = t20 + t21;
+    const real t23 = t22 * ((real)1 / (real)10000000000000);
+    const real t24 = H[25] * H[26];
+    const real t25 = H[20] * H[21];
+    const real t26 = H[15] * H[16];
+    const real t27 = H[10] * H[11];
+    const real t28 = H[5] * H[6];
+    const real t29 = H[0] * H[1];
+    const real t30 = t28 + t29;
+    const real t31 = t27 + t30;
+    const real t32 = t26 + t31;
+    const real t33 = t25 + t32;
+    const real t34 = t24 + t33;
+    const real t35 = 1.0 / t10;
+    const real t36 = t34 * t35;
+    const real t37 = t34 * t36;
+    const real t38 = t22 - t37;
+    const real t39 = t23 < t38;
+    if (!(t39 != 0)) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t40 = H[2] * H[2];
+    const real t41 = H[7] * H[7];
+    const real t42 = t40 + t41;
+    const real t43 = H[12] * H[12];
+    const real t44 = t42 + t43;
+    const real t45 = H[17] * H[17];
+    const real t46 = t44 + t45;
+    const real t47 = H[22] * H[22];
+    const real t48 = t46 + t47;
+    const real t49 = H[27] * H[27];
+    const real t50 = t48 + t49;
+    const real t51 = t50 * ((real)1 / (real)10000000000000);
+    const real t52 = H[25] * H[27];
+    const real t53 = H[20] * H[22];
+    const real t54 = H[15] * H[17];
+    const real t55 = H[10] * H[12];
+    const real t56 = H[5] * H[7];
+    const real t57 = H[0] * H[2];
+    const real t58 = t56 + t57;
+    const real t59 = t55 + t58;
+    const real t60 = t54 + t59;
+    const real t61 = t53 + t60;
+    const real t62 = t52 + t61;
+    const real t63 = t62 * t35;
+    const real t64 = t62 * t63;
+    const real t65 = t50 - t64;
+    const real t66 = H[1] * H[2];
+    const real t67 = H[6] * H[7];
+    const real t68 = t66 + t67;
+    const real t69 = H[11] * H[12];
+    const real t70 = t68 + t69;
+    const real t71 = H[16] * H[17];
+    const real t72 = t70 + t71;
+    const real t73 = H[21] * H[22];
+    const real t74 = t72 + t73;
+    const real t75 = H[26] * H[27];
+    const real t76 = t74 + t75;
+    const real t77 = t62 * t36;
+    const real t78 = t76 - t77;
+    const real t79 = 1.0 / t38;
+    const real t80 = t79 * t78;
+    const real t81 = t78 * t80;
+    const real t82 = t65 - t81;
+    const real t83 = t51 < t82;
+    if (!(t83 != 0)) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t84 = H[3] * H[3];
+    const real t85 = H[8] * H[8];
+    const real t86 = t84 + t85;
+    const real t87 = H[13] * H[13];
+    const real t88 = t86 + t87;
+    const real t89 = H[18] * H[18];
+    const real t90 = t88 + t89;
+    const real t91 = H[23] * H[23];
+    const real t92 = t90 + t91;
+    const real t93 = H[28] * H[28];
+    const real t94 = t92 + t93;
+    const real t95 = t94 * ((real)1 / (real)10000000000000);
+    const real t96 = H[25] * H[28];
+    const real t97 = H[20] * H[23];
+    const real t98 = H[15] * H[18];
+    const real t99 = H[10] * H[13];
+    const real t100 = H[5] * H[8];
+    const real t101 = H[0] * H[3];
+    const real t102 = t100 + t101;
+    const real t103 = t99 + t102;
+    const real t104 = t98 + t103;
+    const real t105 = t97 + t104;
+    const real t106 = t96 + t105;
+    const real t107 = t106 * t35;
+    const real t108 = t106 * t107;
+    const real t109 = t94 - t108;
+    const real t110 = H[1] * H[3];
+    const real t111 = H[6] * H[8];
+    const real t112 = t110 + t111;
+    const real t113 = H[11] * H[13];
+    const real t114 = t112 + t113;
+    const real t115 = H[16] * H[18];
+    const real t116 = t114 + t115;
+    const real t117 = H[21] * H[23];
+    const real t118 = t116 + t117;
+    const real t119 = H[26] * H[28];
+    const real t120 = t118 + t119;
+    const real t121 = t106 * t36;
+    const real t122 = t120 - t121;
+    const real t123 = t79 * t122;
+    const real t124 = t122 * t123;
+    const real t125 = t109 - t124;
+    const real t126 = H[2] * H[3];
+    const real t127 = H[7] * H[8];
+    const real t128 = t126 + t127;
+    const real t129 = H[12] * H[13];
+    const real t130 = t128 + t129;
+    const real t131 = H[17] * H[18];
+    const real t132 = t130 + t131;
+    const real t133 = H[22] * H[23];
+    const real t134 = t132 + t133;
+    const real t135 = H[27] * H[28];
+    const real t136 = t134 + t135;
+    const real t137 = t106 * t63;
+    const real t138 = t136 - t137;
+    const real t139 = t80 * t122;
+    const real t140 = t138 - t139;
+    const real t141 = 1.0 / t82;
+    const real t142 = t141 * t140;
+    const real t143 = t140 * t142;
+    const real t144 = t125 - t143;
+    const real t145 = t95 < t144;
+    if (!(t145 != 0)) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t146 = H[4] * H[4];
+    const real t147 = H[9] * H[9];
+    const real t148 = t146 + t147;
+    const real t149 = H[14] * H[14];
+    const real t150 = t148 + t149;
+    const real t151 = H[19] * H[19];
+    const real t152 = t150 + t151;
+    const real t153 = H[24] * H[24];
+    const real t154 = t152 + t153;
+    const real t155 = H[29] * H[29];
+    const real t156 = t154 + t155;
+    const real t157 = t156 * ((real)1 / (real)10000000000000);
+    const real t158 = H[25] * H[29];
+    const real t159 = H[20] * H[24];
+    const real t160 = H[15] * H[19];
+    const real t161 = H[10] * H[14];
+    const real t162 = H[5] * H[9];
+    const real t163 = H[0] * H[4];
+    const real t164 = t162 + t163;
+    const real t165 = t161 + t164;
+    const real t166 = t160 + t165;
+    const real t167 = t159 + t166;
+    const real t168 = t158 + t167;
+    const real t169 = t168 * t35;
+    const real t170 = t168 * t169;
+    const real t171 = t156 - t170;
+    const real t172 = H[1] * H[4];
+    const real t173 = H[6] * H[9];
+    const real t174 = t172 + t173;
+    const real t175 = H[11] * H[14];
+    const real t176 = t174 + t175;
+    const real t177 = H[16] * H[19];
+    const real t178 = t176 + t177;
+    const real t179 = H[21] * H[24];
+    const real t180 = t178 + t179;
+    const real t181 = H[26] * H[29];
+    const real t182 = t180 + t181;
+    const real t183 = t168 * t36;
+    const real t184 = t182 - t183;
+    const real t185 = t79 * t184;
+    const real t186 = t184 * t185;
+    const real t187 = t171 - t186;
+    const real t188 = H[2] * H[4];
+    const real t189 = H[7] * H[9];
+    const real t190 = t188 + t189;
+    const real t191 = H[12] * H[14];
+    const real t192 = t190 + t191;
+    const real t193 = H[17] * H[19];
+    const real t194 = t192 + t193;
+    const real t195 = H[22] * H[24];
+    const real t196 = t194 + t195;
+    const real t197 = H[27] * H[29];
+    const real t198 = t196 + t197;
+    const real t199 = t168 * t63;
+    const real t200 = t198 - t199;
+    const real t201 = t80 * t184;
+    const real t202 = t200 - t201;
+    const real t203 = t141 * t202;
+    const real t204 = t202 * t203;
+    const real t205 = t187 - t204;
+    const real t206 = H[3] * H[4];
+    const real t207 = H[8] * H[9];
+    const real t208 = t206 + t207;
+    const real t209 = H[13] * H[14];
+    const real t210 = t208 + t209;
+    const real t211 = H[18] * H[19];
+    const real t212 = t210 + t211;
+    const real t213 = H[23] * H[24];
+    const real t214 = t212 + t213;
+    const real t215 = H[28] * H[29];
+    const real t216 = t214 + t215;
+    const real t217 = t168 * t107;
+    const real t218 = t216 - t217;
+    const real t219 = t123 * t184;
+    const real t220 = t218 - t219;
+    const real t221 = t142 * t202;
+    const real t222 = t220 - t221;
+    const real t223 = 1.0 / t144;
+    const real t224 = t223 * t222;
+    const real t225 = t222 * t224;
+    const real t226 = t205 - t225;
+    const real t227 = t157 < t226;
+    if (!(t227 != 0)) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
+    const real t228 = H[0] * t35;
+    const real t229 = H[0] * t36;
+    const real t230 = H[1] - t229;
+    const real t231 = t79 * t230;
+    const real t232 = H[0] * t63;
+    const real t233 = H[2] - t232;
+    const real t234 = t80 * t230;
+    const real t235 = t233 - t234;
+    const real t236 = t141 * t235;
+    const real t237 = H[0] * t107;
+    const real t238 = H[3] - t237;
+    const real t239 = t123 * t230;
+    const real t240 = t238 - t239;
+    const real t241 = t142 * t235;
+    const real t242 = t240 - t241;
+    const real t243 = t223 * t242;
+    const real t244 = 1.0 / t226;
+    const real t245 = H[0] * t169;
+    const real t246 = H[4] - t245;
+    const real t247 = t185 * t230;
+    const real t248 = t246 - t247;
+    const real t249 = t203 * t235;
+    const real t250 = t248 - t249;
+    const real t251 = t224 * t242;
+    const real t252 = t250 - t251;
+    const real t253 = t244 * t252;
+    const real t254 = t224 * t253;
+    const real t255 = t243 - t254;
+    const real t256 = t142 * t255;
+    const real t257 = t236 - t256;
+    const real t258 = t203 * t253;
+    const real t259 = t257 - t258;
+    const real t260 = t80 * t259;
+    const real t261 = t231 - t260;
+    const real t262 = t123 * t255;
+    const real t263 = t261 - t262;
+    const real t264 = t185 * t253;
+    const real t265 = t263 - t264;
+    const real t266 = t36 * t265;
+    const real t267 = t228 - t266;
+    const real t268 = t63 * t259;
+    const real t269 = t267 - t268;
+    const real t270 = t107 * t255;
+    const real t271 = t269 - t270;
+    const real t272 = t169 * t253;
+    const real t273 = t271 - t272;
+    W[0] = t273;
+    const real t274 = H[5] * t35;
+    const real t275 = H[5] * t36;
+    const real t276 = H[6] - t275;
+    const real t277 = t79 * t276;
+    const real t278 = H[5] * t63;
+    const real t279 = H[7] - t278;
+    const real t280 = t80 * t276;
+    const real t281 = t279 - t280;
+    const real t282 = t141 * t281;
+    const real t283 = H[5] * t107;
+    const real t284 = H[8] - t283;
+    const real t285 = t123 * t276;
+    const real t286 = t284 - t285;
+    const real t287 = t142 * t281;
+    const real t288 = t286 - t287;
+    const real t289 = t223 * t288;
+    const real t290 = H[5] * t169;
+    const real t291 = H[9] - t290;
+    const real t292 = t185 * t276;
+    const real t293 = t291 - t292;
+    const real t294 = t203 * t281;
+    const real t295 = t293 - t294;
+    const real t296 = t224 * t288;
+    const real t297 = t295 - t296;
+    const real t298 = t244 * t297;
+    const real t299 = t224 * t298;
+    const real t300 = t289 - t299;
+    const real t301 = t142 * t300;
+    const real t302 = t282 - t301;
+    const real t303 = t203 * t298;
+    const real t304 = t302 - t303;
+    const real t305 = t80 * t304;
+    const real t306 = t277 - t305;
+    const real t307 = t123 * t300;
+    const real t308 = t306 - t307;
+    const real t309 = t185 * t298;
+    const real t310 = t308 - t309;
+    const real t311 = t36 * t310;
+    const real t312 = t274 - t311;
+    const real t313 = t63 * t304;
+    const real t314 = t312 - t313;
+    const real t315 = t107 * t300;
+    const real t316 = t314 - t315;
+    const real t317 = t169 * t298;
+    const real t318 = t316 - t317;
+    W[1] = t318;
+    const real t319 = H[10] * t35;
+    const real t320 = H[10] * t36;
+    const real t321 = H[11] - t320;
+    const real t322 = t79 * t321;
+    const real t323 = H[10] * t63;
+    const real t324 = H[12] - t323;
+    const real t325 = t80 * t321;
+    const real t326 = t324 - t325;
+    const real t327 = t141 * t326;
+    const real t328 = H[10] * t107;
+    const real t329 = H[13] - t328;
+    const real t330 = t123 * t321;
+    const real t331 = t329 - t330;
+    const real t332 = t142 * t326;
+    const real t333 = t331 - t332;
+    const real t334 = t223 * t333;
+    const real t335 = H[10] * t169;
+    const real t336 = H[14] - t335;
+    const real t337 = t185 * t321;
+    const real t338 = t336 - t337;
+    const real t339 = t203 * t326;
+    const real t340 = t338 - t339;
+    const real t341 = t224 * t333;
+    const real t342 = t340 - t341;
+    const real t343 = t244 * t342;
+    const real t344 = t224 * t343;
+    const real t345 = t334 - t344;
+    const real t346 = t142 * t345;
+    const real t347 = t327 - t346;
+    const real t348 = t203 * t343;
+    const real t349 = t347 - t348;
+    const real t350 = t80 * t349;
+    const real t351 = t322 - t350;
+    const real t352 = t123 * t345;
+    const real t353 = t351 - t352;
+    const real t354 = t185 * t343;
+    const real t355 = t353 - t354;
+    const real t356 = t36 * t355;
+    const real t357 = t319 - t356;
+    const real t358 = t63 * t349;
+    const real t359 = t357 - t358;
+    const real t360 = t107 * t345;
+    const real t361 = t359 - t360;
+    const real t362 = t169 * t343;
+    const real t363 = t361 - t362;
+    W[2] = t363;
+    const real t364 = H[15] * t35;
+    const real t365 = H[15] * t36;
+    const real t366 = H[16] - t365;
+    const real t367 = t79 * t366;
+    const real t368 = H[15] * t63;
+    const real t369 = H[17] - t368;
+    const real t370 = t80 * t366;
+    const real t371 = t369 - t370;
+    const real t372 = t141 * t371;
+    const real t373 = H[15] * t107;
+    const real t374 = H[18] - t373;
+    const real t375 = t123 * t366;
+    const real t376 = t374 - t375;
+    const real t377 = t142 * t371;
+    const real t378 = t376 - t377;
+    const real t379 = t223 * t378;
+    const real t380 = H[15] * t169;
+    const real t381 = H[19] - t380;
+    const real t382 = t185 * t366;
+    const real t383 = t381 - t382;
+    const real t384 = t203 * t371;
+    const real t385 = t383 - t384;
+    const real t386 = t224 * t378;
+    const real t387 = t385 - t386;
+    const real t388 = t244 * t387;
+    const real t389 = t224 * t388;
+    const real t390 = t379 - t389;
+    const real t391 = t142 * t390;
+    const real t392 = t372 - t391;
+    const real t393 = t203 * t388;
+    const real t394 = t392 - t393;
+    const real t395 = t80 * t394;
+    const real t396 = t367 - t395;
+    const real t397 = t123 * t390;
+    const real t398 = t396 - t397;
+    const real t399 = t185 * t388;
+    const real t400 = t398 - t399;
+    const real t401 = t36 * t400;
+    const real t402 = t364 - t401;
+    const real t403 = t63 * t394;
+    const real t404 = t402 - t403;
+    const real t405 = t107 * t390;
+    const real t406 = t404 - t405;
+    const real t407 = t169 * t388;
+    const real t408 = t406 - t407;
+    W[3] = t408;
+    const real t409 = H[20] * t35;
+    const real t410 = H[20] * t36;
+    const real t411 = H[21] - t410;
+    const real t412 = t79 * t411;
+    const real t413 = H[20] * t63;
+    const real t414 = H[22] - t413;
+    const real t415 = t80 * t411;
+    const real t416 = t414 - t415;
+    const real t417 = t141 * t416;
+    const real t418 = H[20] * t107;
+    const real t419 = H[23] - t418;
+    const real t420 = t123 * t411;
+    const real t421 = t419 - t420;
+    const real t422 = t142 * t416;
+    const real t423 = t421 - t422;
+    const real t424 = t223 * t423;
+    const real t425 = H[20] * t169;
+    const real t426 = H[24] - t425;
+    const real t427 = t185 * t411;
+    const real t428 = t426 - t427;
+    const real t429 = t203 * t416;
+    const real t430 = t428 - t429;
+    const real t431 = t224 * t423;
+    const real t432 = t430 - t431;
+    const real t433 = t244 * t432;
+    const real t434 = t224 * t433;
+    const real t435 = t424 - t434;
+    const real t436 = t142 * t435;
+    const real t437 = t417 - t436;
+    const real t438 = t203 * t433;
+    const real t439 = t437 - t438;
+    const real t440 = t80 * t439;
+    const real t441 = t412 - t440;
+    const real t442 = t123 * t435;
+    const real t443 = t441 - t442;
+    const real t444 = t185 * t433;
+    const real t445 = t443 - t444;
+    const real t446 = t36 * t445;
+    const real t447 = t409 - t446;
+    const real t448 = t63 * t439;
+    const real t449 = t447 - t448;
+    const real t450 = t107 * t435;
+    const real t451 = t449 - t450;
+    const real t452 = t169 * t433;
+    const real t453 = t451 - t452;
+    W[4] = t453;
+    const real t454 = H[25] * t35;
+    const real t455 = H[25] * t36;
+    const real t456 = H[26] - t455;
+    const real t457 = t79 * t456;
+    const real t458 = H[25] * t63;
+    const real t459 = H[27] - t458;
+    const real t460 = t80 * t456;
+    const real t461 = t459 - t460;
+    const real t462 = t141 * t461;
+    const real t463 = H[25] * t107;
+    const real t464 = H[28] - t463;
+    const real t465 = t123 * t456;
+    const real t466 = t464 - t465;
+    const real t467 = t142 * t461;
+    const real t468 = t466 - t467;
+    const real t469 = t223 * t468;
+    const real t470 = H[25] * t169;
+    const real t471 = H[29] - t470;
+    const real t472 = t185 * t456;
+    const real t473 = t471 - t472;
+    const real t474 = t203 * t461;
+    const real t475 = t473 - t474;
+    const real t476 = t224 * t468;
+    const real t477 = t475 - t476;
+    const real t478 = t244 * t477;
+    const real t479 = t224 * t478;
+    const real t480 = t469 - t479;
+    const real t481 = t142 * t480;
+    const real t482 = t462 - t481;
+    const real t483 = t203 * t478;
+    const real t484 = t482 - t483;
+    const real t485 = t80 * t484;
+    const real t486 = t457 - t485;
+    const real t487 = t123 * t480;
+    const real t488 = t486 - t487;
+    const real t489 = t185 * t478;
+    const real t490 = t488 - t489;
+    const real t491 = t36 * t490;
+    const real t492 = t454 - t491;
+    const real t493 = t63 * t484;
+    const real t494 = t492 - t493;
+    const real t495 = t107 * t480;
+    const real t496 = t494 - t495;
+    const real t497 = t169 * t478;
+    const real t498 = t496 - t497;
+    W[5] = t498;
+    W[6] = t265;
+    W[7] = t310;
+    W[8] = t355;
+    W[9] = t400;
+    W[10] = t445;
+    W[11] = t490;
+    W[12] = t259;
+    W[13] = t304;
+    W[14] = t349;
+    W[15] = t394;
+    W[16] = t439;
+    W[17] = t484;
+    W[18] = t255;
+    W[19] = t300;
+    W[20] = t345;
+    W[21] = t390;
+    W[22] = t435;
+    W[23] = t480;
+    W[24] = t253;
+    W[25] = t298;
+    W[26] = t343;
+    W[27] = t388;
+    W[28] = t433;
+    W[29] = t478;
+    const real t499 = H[0] < 0.0;
+    const real t500 = sqrt(t10);
+    const real t501 = -t500;
+    const real t502 = t499 != 0 ? t501 : t500;
+    const real t503 = H[0] + t502;
+    const real t504 = fabs(H[0]);
+    const real t505 = t500 + t504;
+    const real t506 = t500 * t505;
+    const real t507 = 0.0 < t506;
+    const real t508 = 1.0 / t506;
+    const real t509 = t507 != 0 ? t508 : 0.0;
+    const real t510 = H[4] * t503;
+    const real t511 = t510 + t162;
+    const real t512 = t161 + t511;
+    const real t513 = t160 + t512;
+    const real t514 = t159 + t513;
+    const real t515 = t158 + t514;
+    const real t516 = t509 * t515;
+    const real t517 = H[25] * t516;
+    const real t518 = H[29] - t517;
+    const real t519 = H[1] * t503;
+    const real t520 = t519 + t28;
+    const real t521 = t27 + t520;
+    const real t522 = t26 + t521;
+    const real t523 = t25 + t522;
+    const real t524 = t24 + t523;
+    const real t525 = t509 * t524;
+    const real t526 = H[25] * t525;
+    const real t527 = H[26] - t526;
+    const real t528 = t527 * t527;
+    const real t529 = H[20] * t525;
+    const real t530 = H[21] - t529;
+    const real t531 = t530 * t530;
+    const real t532 = H[15] * t525;
+    const real t533 = H[16] - t532;
+    const real t534 = t533 * t533;
+    const real t535 = H[5] * t525;
+    const real t536 = H[6] - t535;
+    const real t537 = t536 * t536;
+    const real t538 = H[10] * t525;
+    const real t539 = H[11] - t538;
+    const real t540 = t539 * t539;
+    const real t541 = t537 + t540;
+    const real t542 = t534 + t541;
+    const real t543 = t531 + t542;
+    const real t544 = t528 + t543;
+    const real t545 = sqrt(t544);
+    const real t546 = fabs(t536);
+    const real t547 = t545 + t546;
+    const real t548 = t545 * t547;
+    const real t549 = 0.0 < t548;
+    const real t550 = 1.0 / t548;
+    const real t551 = t549 != 0 ? t550 : 0.0;
+    const real t552 = t527 * t518;
+    const real t553 = H[20] * t516;
+    const real t554 = H[24] - t553;
+    const real t555 = t530 * t554;
+    const real t556 = H[15] * t516;
+    const real t557 = H[19] - t556;
+    const real t558 = t533 * t557;
+    const real t559 = H[5] * t516;
+    const real t560 = H[9] - t559;
+    const real t561 = t536 < 0.0;
+    const real t562 = -t545;
+    const real t563 = t561 != 0 ? t562 : t545;
+    const real t564 = t536 + t563;
+    const real t565 = t560 * t564;
+    const real t566 = H[10] * t516;
+    const real t567 = H[14] - t566;
+    const real t568 = t539 * t567;
+    const real t569 = t565 + t568;
+    const real t570 = t558 + t569;
+    const real t571 = t555 + t570;
+    const real t572 = t552 + t571;
+    const real t573 = t551 * t572;
+    const real t574 = t527 * t573;
+    const real t575 = t518 - t574;
+    const real t576 = H[2] * t503;
+    const real t577 = t576 + t56;
+    const real t578 = t55 + t577;
+    const real t579 = t54 + t578;
+    const real t580 = t53 + t579;
+    const real t581 = t52 + t580;
+    const real t582 = t509 * t581;
+    const real t583 = H[25] * t582;
+    const real t584 = H[27] - t583;
+    const real t585 = t527 * t584;
+    const real t586 = H[20] * t582;
+    const real t587 = H[22] - t586;
+    const real t588 = t530 * t587;
+    const real t589 = H[15] * t582;
+    const real t590 = H[17] - t589;
+    const real t591 = t533 * t590;
+    const real t592 = H[5] * t582;
+    const real t593 = H[7] - t592;
+    const real t594 = t593 * t564;
+    const real t595 = H[10] * t582;
+    const real t596 = H[12] - t595;
+    const real t597 = t539 * t596;
+    const real t598 = t594 + t597;
+    const real t599 = t591 + t598;
+    const real t600 = t588 + t599;
+    const real t601 = t585 + t600;
+    const real t602 = t551 * t601;
+    const real t603 = t527 * t602;
+    const real t604 = t584 - t603;
+    const real t605 = t604 * t604;
+    const real t606 = t530 * t602;
+    const real t607 = t587 - t606;
+    const real t608 = t607 * t607;
+    const real t609 = t539 * t602;
+    const real t610 = t596 - t609;
+    const real t611 = t610 * t610;
+    const real t612 = t533 * t602;
+    const real t613 = t590 - t612;
+    const real t614 = t613 * t613;
+    const real t615 = t611 + t614;
+    const real t616 = t608 + t615;
+    const real t617 = t605 + t616;
+    const real t618 = sqrt(t617);
+    const real t619 = fabs(t610);
+    const real t620 = t618 + t619;
+    const real t621 = t618 * t620;
+    const real t622 = 0.0 < t621;
+    const real t623 = 1.0 / t621;
+    const real t624 = t622 != 0 ? t623 : 0.0;
+    const real t625 = t604 * t575;
+    const real t626 = t530 * t573;
+    const real t627 = t554 - t626;
+    const real t628 = t607 * t627;
+    const real t629 = t539 * t573;
+    const real t630 = t567 - t629;
+    const real t631 = t610 < 0.0;
+    const real t632 = -t618;
+    const real t633 = t631 != 0 ? t632 : t618;
+    const real t634 = t610 + t633;
+    const real t635 = t630 * t634;
+    const real t636 = t533 * t573;
+    const real t637 = t557 - t636;
+    const real t638 = t613 * t637;
+    const real t639 = t635 + t638;
+    const real t640 = t628 + t639;
+    const real t641 = t625 + t640;
+    const real t642 = t624 * t641;
+    const real t643 = t604 * t642;
+    const real t644 = t575 - t643;
+    const real t645 = H[3] * t503;
+    const real t646 = t645 + t100;
+    const real t647 = t99 + t646;
+    const real t648 = t98 + t647;
+    const real t649 = t97 + t648;
+    const real t650 = t96 + t649;
+    const real t651 = t509 * t650;
+    const real t652 = H[25] * t651;
+    const real t653 = H[28] - t652;
+    const real t654 = t527 * t653;
+    const real t655 = H[20] * t651;
+    const real t656 = H[23] - t655;
+    const real t657 = t530 * t656;
+    const real t658 = H[15] * t651;
+    const real t659 = H[18] - t658;
+    const real t660 = t533 * t659;
+    const real t661 = H[5] * t651;
+    const real t662 = H[8] - t661;
+    const real t663 = t662 * t564;
+    const real t664 = H[10] * t651;
+    const real t665 = H[13] - t664;
+    const real t666 = t539 * t665;
+    const real t667 = t663 + t666;
+    const real t668 = t660 + t667;
+    const real t669 = t657 + t668;
+    const real t670 = t654 + t669;
+    const real t671 = t551 * t670;
+    const real t672 = t527 * t671;
+    const real t673 = t653 - t672;
+    const real t674 = t604 * t673;
+    const real t675 = t530 * t671;
+    const real t676 = t656 - t675;
+    const real t677 = t607 * t676;
+    const real t678 = t539 * t671;
+    const real t679 = t665 - t678;
+    const real t680 = t679 * t634;
+    const real t681 = t533 * t671;
+    const real t682 = t659 - t681;
+    const real t683 = t613 * t682;
+    const real t684 = t680 + t683;
+    const real t685 = t677 + t684;
+    const real t686 = t674 + t685;
+    const real t687 = t624 * t686;
+    const real t688 = t604 * t687;
+    const real t689 = t673 - t688;
+    const real t690 = t689 * t689;
+    const real t691 = t613 * t687;
+    const real t692 = t682 - t691;
+    const real t693 = t692 * t692;
+    const real t694 = t607 * t687;
+    const real t695 = t676 - t694;
+    const real t696 = t695 * t695;
+    const real t697 = t693 + t696;
+    const real t698 = t690 + t697;
+    const real t699 = sqrt(t698);
+    const real t700 = fabs(t692);
+    const real t701 = t699 + t700;
+    const real t702 = t699 * t701;
+    const real t703 = 0.0 < t702;
+    const real t704 = 1.0 / t702;
+    const real t705 = t703 != 0 ? t704 : 0.0;
+    const real t706 = t689 * t644;
+    const real t707 = t613 * t642;
+    const real t708 = t637 - t707;
+    const real t709 = t692 < 0.0;
+    const real t710 = -t699;
+    const real t711 = t709 != 0 ? t710 : t699;
+    const real t712 = t692 + t711;
+    const real t713 = t708 * t712;
+    const real t714 = t607 * t642;
+    const real t715 = t627 - t714;
+    const real t716 = t695 * t715;
+    const real t717 = t713 + t716;
+    const real t718 = t706 + t717;
+    const real t719 = t705 * t718;
+    const real t720 = t689 * t719;
+    const real t721 = t644 - t720;
+    const real t722 = t721 * t721;
+    const real t723 = t695 * t719;
+    const real t724 = t715 - t723;
+    const real t725 = t724 * t724;
+    const real t726 = t725 + t722;
+    const real t727 = sqrt(t726);
+    const real t728 = fabs(t724);
+    const real t729 = t727 + t728;
+    const real t730 = t727 * t729;
+    const real t731 = 0.0 < t730;
+    const real t732 = 1.0 / t730;
+    const real t733 = t731 != 0 ? t732 : 0.0;
+    const real t734 = t722 * t733;
+    const real t735 = 1.0 - t734;
+    const real t736 = t689 * t735;
+    const real t737 = t724 < 0.0;
+    const real t738 = -t727;
+    const real t739 = t737 != 0 ? t738 : t727;
+    const real t740 = t724 + t739;
+    const real t741 = t740 * t733;
+    const real t742 = t721 * t741;
+    const real t743 = t695 * t742;
+    const real t744 = t736 - t743;
+    const real t745 = t705 * t744;
+    const real t746 = t689 * t745;
+    const real t747 = t735 - t746;
+    const real t748 = t604 * t747;
+    const real t749 = t712 * t745;
+    const real t750 = t613 * t749;
+    const real t751 = t695 * t745;
+    const real t752 = t742 + t751;
+    const real t753 = t607 * t752;
+    const real t754 = t750 + t753;
+    const real t755 = t748 - t754;
+    const real t756 = t624 * t755;
+    const real t757 = t604 * t756;
+    const real t758 = t747 - t757;
+    const real t759 = t527 * t758;
+    const real t760 = t607 * t756;
+    const real t761 = t752 + t760;
+    const real t762 = t530 * t761;
+    const real t763 = t634 * t756;
+    const real t764 = t539 * t763;
+    const real t765 = t613 * t756;
+    const real t766 = t749 + t765;
+    const real t767 = t533 * t766;
+    const real t768 = t764 + t767;
+    const real t769 = t762 + t768;
+    const real t770 = t759 - t769;
+    const real t771 = t551 * t770;
+    const real t772 = t527 * t771;
+    const real t773 = t758 - t772;
+    const real t774 = H[25] * t773;
+    const real t775 = t530 * t771;
+    const real t776 = t761 + t775;
+    const real t777 = H[20] * t776;
+    const real t778 = t533 * t771;
+    const real t779 = t766 + t778;
+    const real t780 = H[15] * t779;
+    const real t781 = t564 * t771;
+    const real t782 = H[5] * t781;
+    const real t783 = t539 * t771;
+    const real t784 = t763 + t783;
+    const real t785 = H[10] * t784;
+    const real t786 = t782 + t785;
+    const real t787 = t780 + t786;
+    const real t788 = t777 + t787;
+    const real t789 = t774 - t788;
+    const real t790 = t509 * t789;
+    const real t791 = t503 * t790;
+    const real t792 = -t791;
+    W[30] = t792;
+    const real t793 = H[5] * t790;
+    const real t794 = t781 + t793;
+    const real t795 = -t794;
+    W[31] = t795;
+    const real t796 = H[10] * t790;
+    const real t797 = t784 + t796;
+    const real t798 = -t797;
+    W[32] = t798;
+    const real t799 = H[15] * t790;
+    const real t800 = t779 + t799;
+    const real t801 = -t800;
+    W[33] = t801;
+    const real t802 = H[20] * t790;
+    const real t803 = t776 + t802;
+    const real t804 = -t803;
+    W[34] = t804;
+    const real t805 = H[25] * t790;
+    const real t806 = t773 - t805;
+    W[35] = t806;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_complement_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_complement(in[0], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_complement_inputs[] = {
+    {"H", 30, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_complement_outputs[] = {
+    {"W", 36, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic5_complement_guards[] = {
+    {1, "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* a column's rows divided by D, across a hinge with 5 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  F[5][5] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  y[5] -H^T K - C
+ * out z[5] D^-1 y
+ */
+int mstmm_sweep_generic5_divide(const real *restrict F, const real *restrict y, real *restrict z)
+{
+    const real t0 = F[0] * y[0];
+    const real t1 = F[5] * y[0];
+    const real t2 = y[1] - t1;
+    const real t3 = F[6] * t2;
+    const real t4 = F[10] * y[0];
+    const real t5 = y[2] - t4;
+    const real t6 = F[11] * t2;
+    const real t7 = t5 - t6;
+    const real t8 = F[12] * t7;
+    const real t9 = F[15] * y[0];
+    const real t10 = y[3] - t9;
+    const real t11 = F[16] * t2;
+    const real t12 = t10 - t11;
+    const real t13 = F[17] * t7;
+    const real t14 = t12 - t13;
+    const real t15 = F[18] * t14;
+    const real t16 = F[20] * y[0];
+    const real t17 = y[4] - t16;
+    const real t18 = F[21] * t2;
+    const real t19 = t17 - t18;
+    const real t20 = F[22] * t7;
+    const real t21 = t19 - t20;
+    const real t22 = F[23] * t14;
+    const real t23 = t21 - t22;
+    const real t24 = F[24] * t23;
+    const real t25 = F[23] * t24;
+    const real t26 = t15 - t25;
+    const real t27 = F[17] * t26;
+    const real t28 = t8 - t27;
+    const real t29 = F[22] * t24;
+    const real t30 = t28 - t29;
+    const real t31 = F[11] * t30;
+    const real t32 = t3 - t31;
+    const real t33 = F[16] * t26;
+    const real t34 = t32 - t33;
+    const real t35 = F[21] * t24;
+    const real t36 = t34 - t35;
+    const real t37 = F[5] * t36;
+    const real t38 = t0 - t37;
+    const real t39 = F[10] * t30;
+    const real t40 = t38 - t39;
+    const real t41 = F[15] * t26;
+    const real t42 = t40 - t41;
+    const real t43 = F[20] * t24;
+    const real t44 = t42 - t43;
+    z[0] = t44;
+    z[1] = t36;
+    z[2] = t30;
+    z[3] = t26;
+    z[4] = t24;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_divide_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_divide(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_divide_inputs[] = {
+    {"F", 25, "", 0, 0},
+    {"y", 5, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_divide_outputs[] = {
+    {"z", 5, "", 0, 0},
+};
+
+/* two columns coupled by a hinge with 5 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[5] of one row
+ * in  z[5] of the other
+ * out L_ij[1] entry of L of both, added to what is there
+ */
+int mstmm_sweep_generic5_couple(const real *restrict y, const real *restrict z, real *restrict L_ij)
+{
+    const real t0 = y[0] * z[0];
+    const real t1 = y[1] * z[1];
+    const real t2 = t0 + t1;
+    const real t3 = y[2] * z[2];
+    const real t4 = t2 + t3;
+    const real t5 = y[3] * z[3];
+    const real t6 = t4 + t5;
+    const real t7 = y[4] * z[4];
+    const real t8 = t6 + t7;
+    L_ij[0] += t8;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_couple_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_couple(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_couple_inputs[] = {
+    {"y", 5, "", 0, 0},
+    {"z", 5, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_couple_outputs[] = {
+    {"L_ij", 1, "", 1, 0},
+};
+
+/* what a hinge with 5 speeds tells a row
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[5] tau - H^T e
+ * in  z[5] of the row
+ * out l[1] known part of the row, added to what is there
+ */
+int mstmm_sweep_generic5_answered(const real *restrict y, const real *restrict z, real *restrict l)
+{
+    const real t0 = y[0] * z[0];
+    const real t1 = y[1] * z[1];
+    const real t2 = t0 + t1;
+    const real t3 = y[2] * z[2];
+    const real t4 = t2 + t3;
+    const real t5 = y[3] * z[3];
+    const real t6 = t4 + t5;
+    const real t7 = y[4] * z[4];
+    const real t8 = t6 + t7;
+    const real t9 = -t8;
+    l[0] += t9;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_answered_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_answered(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_answered_inputs[] = {
+    {"y", 5, "", 0, 0},
+    {"z", 5, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_answered_outputs[] = {
+    {"l", 1, "", 1, 0},
+};
+
+/* a multiplier felt by a hinge with 5 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[5] of the row
+ * in  x[1] (N, N*m) multiplier
+ * out y_0[5] tau - H^T e, added to what is there
+ */
+int mstmm_sweep_generic5_pull(const real *restrict y, const real *restrict x, real *restrict y_0)
+{
+    const real t0 = y[0] * x[0];
+    y_0[0] += t0;
+    const real t1 = y[1] * x[0];
+    y_0[1] += t1;
+    const real t2 = y[2] * x[0];
+    y_0[2] += t2;
+    const real t3 = y[3] * x[0];
+    y_0[3] += t3;
+    const real t4 = y[4] * x[0];
+    y_0[4] += t4;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_pull_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_pull(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_pull_inputs[] = {
+    {"y", 5, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_pull_outputs[] = {
+    {"y_0", 5, "", 1, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -11738,6 +12812,66 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "complement",
+        .function = (void (*)(void))mstmm_sweep_generic5_complement,
+        .call = mstmm_sweep_generic5_complement_call,
+        .n_inputs = 1,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic5_complement_inputs,
+        .outputs = mstmm_sweep_generic5_complement_outputs,
+        .ir_hash = "4e308a772c669ee4494b82c89b92c22da0272e0d8c39601bb699555f1c29eda9",
+        .n_guards = 5,
+        .guards = mstmm_sweep_generic5_complement_guards,
+    },
+    {
+        .name = "divide",
+        .function = (void (*)(void))mstmm_sweep_generic5_divide,
+        .call = mstmm_sweep_generic5_divide_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic5_divide_inputs,
+        .outputs = mstmm_sweep_generic5_divide_outputs,
+        .ir_hash = "2978c5d66d774fedd56cfd3d9be83c435cedc1c51e5c7bc0fad44ae536882880",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "couple",
+        .function = (void (*)(void))mstmm_sweep_generic5_couple,
+        .call = mstmm_sweep_generic5_couple_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic5_couple_inputs,
+        .outputs = mstmm_sweep_generic5_couple_outputs,
+        .ir_hash = "7a2f4ba59f5752a466f9a3a0b2943e8d7c93198acde23744e85a13ab06a9b426",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "answered",
+        .function = (void (*)(void))mstmm_sweep_generic5_answered,
+        .call = mstmm_sweep_generic5_answered_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic5_answered_inputs,
+        .outputs = mstmm_sweep_generic5_answered_outputs,
+        .ir_hash = "fe494bd82c8da49836706f2fb17f5fd009c55e1a254bfd61d7a5fcd8b95b1671",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "pull",
+        .function = (void (*)(void))mstmm_sweep_generic5_pull,
+        .call = mstmm_sweep_generic5_pull_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic5_pull_inputs,
+        .outputs = mstmm_sweep_generic5_pull_outputs,
+        .ir_hash = "bdf00556b7124a41610210b398babfff4175f34356d2de5dbc32423788bae808",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic5_forward_slope,
         .call = mstmm_sweep_generic5_forward_slope_call,
@@ -11767,7 +12901,7 @@ const mstmm_element mstmm_sweep_generic5 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic5",
-    .hash = "5315816d27559ae965e133489ce94e605929ad2df2f7312631ad558595922d6b",
+    .hash = "b8375cdf79c7f062b53c79b9530575399b262d9b993890546e20c13bece3e9d2",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -11777,6 +12911,6 @@ const mstmm_element mstmm_sweep_generic5 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 22,
+    .n_kernels = 27,
     .kernels = mstmm_sweep_generic5_kernels,
 };

@@ -81,6 +81,11 @@ int mstmm_sweep_generic6_tangent_answer_known(const real *restrict Rc, const rea
     const real *restrict w_I, const real *restrict v, const real *restrict w,
     const real *restrict z_I, const real *restrict B, const real *restrict gain,
     const real *restrict y, const real *restrict b, real *restrict x, real *restrict z);
+int mstmm_sweep_generic6_complement(const real *restrict H, real *restrict W);
+int mstmm_sweep_generic6_divide(const real *restrict F, const real *restrict y, real *restrict z);
+int mstmm_sweep_generic6_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
+int mstmm_sweep_generic6_answered(const real *restrict y, const real *restrict z, real *restrict l);
+int mstmm_sweep_generic6_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
 int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -12849,6 +12854,1027 @@ static const mstmm_port mstmm_sweep_generic6_tangent_answer_known_outputs[] = {
     {"z", 9, "", 0, 0},
 };
 
+/* what a hinge with 6 speeds lets go and holds
+ * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
+ * in  H[6][6] motion subspace
+ * out W[6][6] rows: H^+, then what the hinge holds
+ */
+int mstmm_sweep_generic6_complement(const real *restrict H, real *restrict W)
+{
+    const real t0 = H[30] * H[30];
+    const real t1 = H[24] * H[24];
+    const real t2 = H[18] * H[18];
+    const real t3 = H[12] * H[12];
+    const real t4 = H[0] * H[0];
+    const real t5 = H[6] * H[6];
+    const real t6 = t4 + t5;
+    const real t7 = t3 + t6;
+    const real t8 = t2 + t7;
+    const real t9 = t1 + t8;
+    const real t10 = t0 + t9;
+    const real t11 = 0.0 < t10;
+    if (!(t11 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
+    const real t12 = H[1] * H[1];
+    const real t13 = H[7] * H[7];
+    const real t14 = t12 + t13;
+    const real t15 = H[13] * H[13];
+    const real t16 = t14 + t15;
+    const real t17 = H[19] * H[19];
+    const real t18 = t16 + t17;
+    const real t19 = H[25] * H[25];
+    const real t20 = t18 + t19;
+    const real t21 = H[31] * H[31];
+    const real t22 = t20 + t21;
+    const real t23 = t22 * ((real)1 / (real)10000000000000);
+    const real t24 = H[30] * H[31];
+    const real t25 = H[24] * H[25];
+    const real t26 = H[18] * H[19];
+    const real t27 = H[12] * H[13];
+    const real t28 = H[6] * H[7];
+    const real t29 = H[0] * H[1];
+    const real t30 = t28 + t29;
+    const real t31 = t27 + t30;
+    const real t32 = t26 + t31;
+    const real t33 = t25 + t32;
+    const real t34 = t24 + t33;
+    const real t35 = 1.0 / t10;
+    const real t36 = t34 * t35;
+    const real t37 = t34 * t36;
+    const real t38 = t22 - t37;
+    const real t39 = t23 < t38;
+    if (!(t39 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
+    const real t40 = H[2] * H[2];
+    const real t41 = H[8] * H[8];
+    const real t42 = t40 + t41;
+    const real t43 = H[14] * H[14];
+    const real t44 = t42 + t43;
+    const real t45 = H[20] * H[20];
+    const real t46 = t44 + t45;
+    const real t47 = H[26] * H[26];
+    const real t48 = t46 + t47;
+    const real t49 = H[32] * H[32];
+    const real t50 = t48 + t49;
+    const real t51 = t50 * ((real)1 / (real)10000000000000);
+    const real t52 = H[30] * H[32];
+    const real t53 = H[24] * H[26];
+    const real t54 = H[18] * H[20];
+    const real t55 = H[12] * H[14];
+    const real t56 = H[6] * H[8];
+    const real t57 = H[0] * H[2];
+    const real t58 = t56 + t57;
+    const real t59 = t55 + t58;
+    const real t60 = t54 + t59;
+    const real t61 = t53 + t60;
+    const real t62 = t52 + t61;
+    const real t63 = t62 * t35;
+    const real t64 = t62 * t63;
+    const real t65 = t50 - t64;
+    const real t66 = H[1] * H[2];
+    const real t67 = H[7] * H[8];
+    const real t68 = t66 + t67;
+    const real t69 = H[13] * H[14];
+    const real t70 = t68 + t69;
+    const real t71 = H[19] * H[20];
+    const real t72 = t70 + t71;
+    const real t73 = H[25] * H[26];
+    const real t74 = t72 + t73;
+    const real t75 = H[31] * H[32];
+    const real t76 = t74 + t75;
+    const real t77 = t62 * t36;
+    const real t78 = t76 - t77;
+    const real t79 = 1.0 / t38;
+    const real t80 = t79 * t78;
+    const real t81 = t78 * t80;
+    const real t82 = t65 - t81;
+    const real t83 = t51 < t82;
+    if (!(t83 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
+    const real t84 = H[3] * H[3];
+    const real t85 = H[9] * H[9];
+    const real t86 = t84 + t85;
+    const real t87 = H[15] * H[15];
+    const real t88 = t86 + t87;
+    const real t89 = H[21] * H[21];
+    const real t90 = t88 + t89;
+    const real t91 = H[27] * H[27];
+    const real t92 = t90 + t91;
+    const real t93 = H[33] * H[33];
+    const real t94 = t92 + t93;
+    const real t95 = t94 * ((real)1 / (real)10000000000000);
+    const real t96 = H[30] * H[33];
+    const real t97 = H[24] * H[27];
+    const real t98 = H[18] * H[21];
+    const real t99 = H[12] * H[15];
+    const real t100 = H[6] * H[9];
+    const real t101 = H[0] * H[3];
+    const real t102 = t100 + t101;
+    const real t103 = t99 + t102;
+    const real t104 = t98 + t103;
+    const real t105 = t97 + t104;
+    const real t106 = t96 + t105;
+    const real t107 = t106 * t35;
+    const real t108 = t106 * t107;
+    const real t109 = t94 - t108;
+    const real t110 = H[1] * H[3];
+    const real t111 = H[7] * H[9];
+    const real t112 = t110 + t111;
+    const real t113 = H[13] * H[15];
+    const real t114 = t112 + t113;
+    const real t115 = H[19] * H[21];
+    const real t116 = t114 + t115;
+    const real t117 = H[25] * H[27];
+    const real t118 = t116 + t117;
+    const real t119 = H[31] * H[33];
+    const real t120 = t118 + t119;
+    const real t121 = t106 * t36;
+    const real t122 = t120 - t121;
+    const real t123 = t79 * t122;
+    const real t124 = t122 * t123;
+    const real t125 = t109 - t124;
+    const real t126 = H[2] * H[3];
+    const real t127 = H[8] * H[9];
+    const real t128 = t126 + t127;
+    const real t129 = H[14] * H[15];
+    const real t130 = t128 + t129;
+    const real t131 = H[20] * H[21];
+    const real t132 = t130 + t131;
+    const real t133 = H[26] * H[27];
+    const real t134 = t132 + t133;
+    const real t135 = H[32] * H[33];
+    const real t136 = t134 + t135;
+    const real t137 = t106 * t63;
+    const real t138 = t136 - t137;
+    const real t139 = t80 * t122;
+    const real t140 = t138 - t139;
+    const real t141 = 1.0 / t82;
+    const real t142 = t141 * t140;
+    const real t143 = t140 * t142;
+    const real t144 = t125 - t143;
+    const real t145 = t95 < t144;
+    if (!(t145 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
+    const real t146 = H[4] * H[4];
+    const real t147 = H[10] * H[10];
+    const real t148 = t146 + t147;
+    const real t149 = H[16] * H[16];
+    const real t150 = t148 + t149;
+    const real t151 = H[22] * H[22];
+    const real t152 = t150 + t151;
+    const real t153 = H[28] * H[28];
+    const real t154 = t152 + t153;
+    const real t155 = H[34] * H[34];
+    const real t156 = t154 + t155;
+    const real t157 = t156 * ((real)1 / (real)10000000000000);
+    const real t158 = H[30] * H[34];
+    const real t159 = H[24] * H[28];
+    const real t160 = H[18] * H[22];
+    const real t161 = H[12] * H[16];
+    const real t162 = H[6] * H[10];
+    const real t163 = H[0] * H[4];
+    const real t164 = t162 + t163;
+    const real t165 = t161 + t164;
+    const real t166 = t160 + t165;
+    const real t167 = t159 + t166;
+    const real t168 = t158 + t167;
+    const real t169 = t168 * t35;
+    const real t170 = t168 * t169;
+    const real t171 = t156 - t170;
+    const real t172 = H[1] * H[4];
+    const real t173 = H[7] * H[10];
+    const real t174 = t172 + t173;
+    const real t175 = H[13] * H[16];
+    const real t176 = t174 + t175;
+    const real t177 = H[19] * H[22];
+    const real t178 = t176 + t177;
+    const real t179 = H[25] * H[28];
+    const real t180 = t178 + t179;
+    const real t181 = H[31] * H[34];
+    const real t182 = t180 + t181;
+    const real t183 = t168 * t36;
+    const real t184 = t182 - t183;
+    const real t185 = t79 * t184;
+    const real t186 = t184 * t185;
+    const real t187 = t171 - t186;
+    const real t188 = H[2] * H[4];
+    const real t189 = H[8] * H[10];
+    const real t190 = t188 + t189;
+    const real t191 = H[14] * H[16];
+    const real t192 = t190 + t191;
+    const real t193 = H[20] * H[22];
+    const real t194 = t192 + t193;
+    const real t195 = H[26] * H[28];
+    const real t196 = t194 + t195;
+    const real t197 = H[32] * H[34];
+    const real t198 = t196 + t197;
+    const real t199 = t168 * t63;
+    const real t200 = t198 - t199;
+    const real t201 = t80 * t184;
+    const real t202 = t200 - t201;
+    const real t203 = t141 * t202;
+    const real t204 = t202 * t203;
+    const real t205 = t187 - t204;
+    const real t206 = H[3] * H[4];
+    const real t207 = H[9] * H[10];
+    const real t208 = t206 + t207;
+    const real t209 = H[15] * H[16];
+    const real t210 = t208 + t209;
+    const real t211 = H[21] * H[22];
+    const real t212 = t210 + t211;
+    const real t213 = H[27] * H[28];
+    const real t214 = t212 + t213;
+    const real t215 = H[33] * H[34];
+    const real t216 = t214 + t215;
+    const real t217 = t168 * t107;
+    const real t218 = t216 - t217;
+    const real t219 = t123 * t184;
+    const real t220 = t218 - t219;
+    const real t221 = t142 * t202;
+    const real t222 = t220 - t221;
+    const real t223 = 1.0 / t144;
+    const real t224 = t223 * t222;
+    const real t225 = t222 * t224;
+    const real t226 = t205 - t225;
+    const real t227 = t157 < t226;
+    if (!(t227 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
+    const real t228 = H[5] * H[5];
+    const real t229 = H[11] * H[11];
+    const real t230 = t228 + t229;
+    const real t231 = H[17] * H[17];
+    const real t232 = t230 + t231;
+    const real t233 = H[23] * H[23];
+    const real t234 = t232 + t233;
+    const real t235 = H[29] * H[29];
+    const real t236 = t234 + t235;
+    const real t237 = H[35] * H[35];
+    const real t238 = t236 + t237;
+    const real t239 = t238 * ((real)1 / (real)10000000000000);
+    const real t240 = H[30] * H[35];
+    const real t241 = H[24] * H[29];
+    const real t242 = H[18] * H[23];
+    const real t243 = H[12] * H[17];
+    const real t244 = H[6] * H[11];
+    const real t245 = H[0] * H[5];
+    const real t246 = t244 + t245;
+    const real t247 = t243 + t246;
+    const real t248 = t242 + t247;
+    const real t249 = t241 + t248;
+    const real t250 = t240 + t249;
+    const real t251 = t250 * t35;
+    const real t252 = t250 * t251;
+    const real t253 = t238 - t252;
+    const real t254 = H[1] * H[5];
+    const real t255 = H[7] * H[11];
+    const real t256 = t254 + t255;
+    const real t257 = H[13] * H[17];
+    const real t258 = t256 + t257;
+    const real t259 = H[19] * H[23];
+    const real t260 = t258 + t259;
+    const real t261 = H[25] * H[29];
+    const real t262 = t260 + t261;
+    const real t263 = H[31] * H[35];
+    const real t264 = t262 + t263;
+    const real t265 = t250 * t36;
+    const real t266 = t264 - t265;
+    const real t267 = t79 * t266;
+    const real t268 = t266 * t267;
+    const real t269 = t253 - t268;
+    const real t270 = H[2] * H[5];
+    const real t271 = H[8] * H[11];
+    const real t272 = t270 + t271;
+    const real t273 = H[14] * H[17];
+    const real t274 = t272 + t273;
+    const real t275 = H[20] * H[23];
+    const real t276 = t274 + t275;
+    const real t277 = H[26] * H[29];
+    const real t278 = t276 + t277;
+    const real t279 = H[32] * H[35];
+    const real t280 = t278 + t279;
+    const real t281 = t250 * t63;
+    const real t282 = t280 - t281;
+    const real t283 = t80 * t266;
+    const real t284 = t282 - t283;
+    const real t285 = t141 * t284;
+    const real t286 = t284 * t285;
+    const real t287 = t269 - t286;
+    const real t288 = H[3] * H[5];
+    const real t289 = H[9] * H[11];
+    const real t290 = t288 + t289;
+    const real t291 = H[15] * H[17];
+    const real t292 = t290 + t291;
+    const real t293 = H[21] * H[23];
+    const real t294 = t292 + t293;
+    const real t295 = H[27] * H[29];
+    const real t296 = t294 + t295;
+    const real t297 = H[33] * H[35];
+    const real t298 = t296 + t297;
+    const real t299 = t250 * t107;
+    const real t300 = t298 - t299;
+    const real t301 = t123 * t266;
+    const real t302 = t300 - t301;
+    const real t303 = t142 * t284;
+    const real t304 = t302 - t303;
+    const real t305 = t223 * t304;
+    const real t306 = t304 * t305;
+    const real t307 = t287 - t306;
+    const real t308 = H[4] * H[5];
+    const real t309 = H[10] * H[11];
+    const real t310 = t308 + t309;
+    const real t311 = H[16] * H[17];
+    const real t312 = t310 + t311;
+    const real t313 = H[22] * H[23];
+    const real t314 = t312 + t313;
+    const real t315 = H[28] * H[29];
+    const real t316 = t314 + t315;
+    const real t317 = H[34] * H[35];
+    const real t318 = t316 + t317;
+    const real t319 = t250 * t169;
+    const real t320 = t318 - t319;
+    const real t321 = t185 * t266;
+    const real t322 = t320 - t321;
+    const real t323 = t203 * t284;
+    const real t324 = t322 - t323;
+    const real t325 = t224 * t304;
+    const real t326 = t324 - t325;
+    const real t327 = 1.0 / t226;
+    const real t328 = t327 * t326;
+    const real t329 = t326 * t328;
+    const real t330 = t307 - t329;
+    const real t331 = t239 < t330;
+    if (!(t331 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
+    const real t332 = H[0] * t35;
+    const real t333 = H[0] * t36;
+    const real t334 = H[1] - t333;
+    const real t335 = t79 * t334;
+    const real t336 = H[0] * t63;
+    const real t337 = H[2] - t336;
+    const real t338 = t80 * t334;
+    const real t339 = t337 - t338;
+    const real t340 = t141 * t339;
+    const real t341 = H[0] * t107;
+    const real t342 = H[3] - t341;
+    const real t343 = t123 * t334;
+    const real t344 = t342 - t343;
+    const real t345 = t142 * t339;
+    const real t346 = t344 - t345;
+    const real t347 = t223 * t346;
+    const real t348 = H[0] * t169;
+    const real t349 = H[4] - t348;
+    const real t350 = t185 * t334;
+    const real t351 = t349 - t350;
+    const real t352 = t203 * t339;
+    const real t353 = t351 - t352;
+    const real t354 = t224 * t346;
+    const real t355 = t353 - t354;
+    const real t356 = t327 * t355;
+    const real t357 = 1.0 / t330;
+    const real t358 = H[0] * t251;
+    const real t359 = H[5] - t358;
+    const real t360 = t267 * t334;
+    const real t361 = t359 - t360;
+    const real t362 = t285 * t339;
+    const real t363 = t361 - t362;
+    const real t364 = t305 * t346;
+    const real t365 = t363 - t364;
+    const real t366 = t328 * t355;
+    const real t367 = t365 - t366;
+    const real t368 = t357 * t367;
+    const real t369 = t328 * t368;
+    const real t370 = t356 - t369;
+    const real t371 = t224 * t370;
+    const real t372 = t347 - t371;
+    const real t373 = t305 * t368;
+    const real t374 = t372 - t373;
+    const real t375 = t142 * t374;
+    const real t376 = t340 - t375;
+    const real t377 = t203 * t370;
+    const real t378 = t376 - t377;
+    const real t379 = t285 * t368;
+    const real t380 = t378 - t379;
+    const real t381 = t80 * t380;
+    const real t382 = t335 - t381;
+    const real t383 = t123 * t374;
+    const real t384 = t382 - t383;
+    const real t385 = t185 * t370;
+    const real t386 = t384 - t385;
+    const real t387 = t267 * t368;
+    const real t388 = t386 - t387;
+    const real t389 = t36 * t388;
+    const real t390 = t332 - t389;
+    const real t391 = t63 * t380;
+    const real t392 = t390 - t391;
+    const real t393 = t107 * t374;
+    const real t394 = t392 - t393;
+    const real t395 = t169 * t370;
+    const real t396 = t394 - t395;
+    const real t397 = t251 * t368;
+    const real t398 = t396 - t397;
+    W[0] = t398;
+    const real t399 = H[6] * t35;
+    const real t400 = H[6] * t36;
+    const real t401 = H[7] - t400;
+    const real t402 = t79 * t401;
+    const real t403 = H[6] * t63;
+    const real t404 = H[8] - t403;
+    const real t405 = t80 * t401;
+    const real t406 = t404 - t405;
+    const real t407 = t141 * t406;
+    const real t408 = H[6] * t107;
+    const real t409 = H[9] - t408;
+    const real t410 = t123 * t401;
+    const real t411 = t409 - t410;
+    const real t412 = t142 * t406;
+    const real t413 = t411 - t412;
+    const real t414 = t223 * t413;
+    const real t415 = H[6] * t169;
+    const real t416 = H[10] - t415;
+    const real t417 = t185 * t401;
+    const real t418 = t416 - t417;
+    const real t419 = t203 * t406;
+    const real t420 = t418 - t419;
+    const real t421 = t224 * t413;
+    const real t422 = t420 - t421;
+    const real t423 = t327 * t422;
+    const real t424 = H[6] * t251;
+    const real t425 = H[11] - t424;
+    const real t426 = t267 * t401;
+    const real t427 = t425 - t426;
+    const real t428 = t285 * t406;
+    const real t429 = t427 - t428;
+    const real t430 = t305 * t413;
+    const real t431 = t429 - t430;
+    const real t432 = t328 * t422;
+    const real t433 = t431 - t432;
+    const real t434 = t357 * t433;
+    const real t435 = t328 * t434;
+    const real t436 = t423 - t435;
+    const real t437 = t224 * t436;
+    const real t438 = t414 - t437;
+    const real t439 = t305 * t434;
+    const real t440 = t438 - t439;
+    const real t441 = t142 * t440;
+    const real t442 = t407 - t441;
+    const real t443 = t203 * t436;
+    const real t444 = t442 - t443;
+    const real t445 = t285 * t434;
+    const real t446 = t444 - t445;
+    const real t447 = t80 * t446;
+    const real t448 = t402 - t447;
+    const real t449 = t123 * t440;
+    const real t450 = t448 - t449;
+    const real t451 = t185 * t436;
+    const real t452 = t450 - t451;
+    const real t453 = t267 * t434;
+    const real t454 = t452 - t453;
+    const real t455 = t36 * t454;
+    const real t456 = t399 - t455;
+    const real t457 = t63 * t446;
+    const real t458 = t456 - t457;
+    const real t459 = t107 * t440;
+    const real t460 = t458 - t459;
+    const real t461 = t169 * t436;
+    const real t462 = t460 - t461;
+    const real t463 = t251 * t434;
+    const real t464 = t462 - t463;
+    W[1] = t464;
+    const real t465 = H[12] * t35;
+    const real t466 = H[12] * t36;
+    const real t467 = H[13] - t466;
+    const real t468 = t79 * t467;
+    const real t469 = H[12] * t63;
+    const real t470 = H[14] - t469;
+    const real t471 = t80 * t467;
+    const real t472 = t470 - t471;
+    const real t473 = t141 * t472;
+    const real t474 = H[12] * t107;
+    const real t475 = H[15] - t474;
+    const real t476 = t123 * t467;
+    const real t477 = t475 - t476;
+    const real t478 = t142 * t472;
+    const real t479 = t477 - t478;
+    const real t480 = t223 * t479;
+    const real t481 = H[12] * t169;
+    const real t482 = H[16] - t481;
+    const real t483 = t185 * t467;
+    const real t484 = t482 - t483;
+    const real t485 = t203 * t472;
+    const real t486 = t484 - t485;
+    const real t487 = t224 * t479;
+    const real t488 = t486 - t487;
+    const real t489 = t327 * t488;
+    const real t490 = H[12] * t251;
+    const real t491 = H[17] - t490;
+    const real t492 = t267 * t467;
+    const real t493 = t491 - t492;
+    const real t494 = t285 * t472;
+    const real t495 = t493 - t494;
+    const real t496 = t305 * t479;
+    const real t497 = t495 - t496;
+    const real t498 = t328 * t488;
+    const real t499 = t497 - t498;
+    const real t500 = t357 * t499;
+    const real t501 = t328 * t500;
+    const real t502 = t489 - t501;
+    const real t503 = t224 * t502;
+    const real t504 = t480 - t503;
+    const real t505 = t305 * t500;
+    const real t506 = t504 - t505;
+    const real t507 = t142 * t506;
+    const real t508 = t473 - t507;
+    const real t509 = t203 * t502;
+    const real t510 = t508 - t509;
+    const real t511 = t285 * t500;
+    const real t512 = t510 - t511;
+    const real t513 = t80 * t512;
+    const real t514 = t468 - t513;
+    const real t515 = t123 * t506;
+    const real t516 = t514 - t515;
+    const real t517 = t185 * t502;
+    const real t518 = t516 - t517;
+    const real t519 = t267 * t500;
+    const real t520 = t518 - t519;
+    const real t521 = t36 * t520;
+    const real t522 = t465 - t521;
+    const real t523 = t63 * t512;
+    const real t524 = t522 - t523;
+    const real t525 = t107 * t506;
+    const real t526 = t524 - t525;
+    const real t527 = t169 * t502;
+    const real t528 = t526 - t527;
+    const real t529 = t251 * t500;
+    const real t530 = t528 - t529;
+    W[2] = t530;
+    const real t531 = H[18] * t35;
+    const real t532 = H[18] * t36;
+    const real t533 = H[19] - t532;
+    const real t534 = t79 * t533;
+    const real t535 = H[18] * t63;
+    const real t536 = H[20] - t535;
+    const real t537 = t80 * t533;
+    const real t538 = t536 - t537;
+    const real t539 = t141 * t538;
+    const real t540 = H[18] * t107;
+    const real t541 = H[21] - t540;
+    const real t542 = t123 * t533;
+    const real t543 = t541 - t542;
+    const real t544 = t142 * t538;
+    const real t545 = t543 - t544;
+    const real t546 = t223 * t545;
+    const real t547 = H[18] * t169;
+    const real t548 = H[22] - t547;
+    const real t549 = t185 * t533;
+    const real t550 = t548 - t549;
+    const real t551 = t203 * t538;
+    const real t552 = t550 - t551;
+    const real t553 = t224 * t545;
+    const real t554 = t552 - t553;
+    const real t555 = t327 * t554;
+    const real t556 = H[18] * t251;
+    const real t557 = H[23] - t556;
+    const real t558 = t267 * t533;
+    const real t559 = t557 - t558;
+    const real t560 = t285 * t538;
+    const real t561 = t559 - t560;
+    const real t562 = t305 * t545;
+    const real t563 = t561 - t562;
+    const real t564 = t328 * t554;
+    const real t565 = t563 - t564;
+    const real t566 = t357 * t565;
+    const real t567 = t328 * t566;
+    const real t568 = t555 - t567;
+    const real t569 = t224 * t568;
+    const real t570 = t546 - t569;
+    const real t571 = t305 * t566;
+    const real t572 = t570 - t571;
+    const real t573 = t142 * t572;
+    const real t574 = t539 - t573;
+    const real t575 = t203 * t568;
+    const real t576 = t574 - t575;
+    const real t577 = t285 * t566;
+    const real t578 = t576 - t577;
+    const real t579 = t80 * t578;
+    const real t580 = t534 - t579;
+    const real t581 = t123 * t572;
+    const real t582 = t580 - t581;
+    const real t583 = t185 * t568;
+    const real t584 = t582 - t583;
+    const real t585 = t267 * t566;
+    const real t586 = t584 - t585;
+    const real t587 = t36 * t586;
+    const real t588 = t531 - t587;
+    const real t589 = t63 * t578;
+    const real t590 = t588 - t589;
+    const real t591 = t107 * t572;
+    const real t592 = t590 - t591;
+    const real t593 = t169 * t568;
+    const real t594 = t592 - t593;
+    const real t595 = t251 * t566;
+    const real t596 = t594 - t595;
+    W[3] = t596;
+    const real t597 = H[24] * t35;
+    const real t598 = H[24] * t36;
+    const real t599 = H[25] - t598;
+    const real t600 = t79 * t599;
+    const real t601 = H[24] * t63;
+    const real t602 = H[26] - t601;
+    const real t603 = t80 * t599;
+    const real t604 = t602 - t603;
+    const real t605 = t141 * t604;
+    const real t606 = H[24] * t107;
+    const real t607 = H[27] - t606;
+    const real t608 = t123 * t599;
+    const real t609 = t607 - t608;
+    const real t610 = t142 * t604;
+    const real t611 = t609 - t610;
+    const real t612 = t223 * t611;
+    const real t613 = H[24] * t169;
+    const real t614 = H[28] - t613;
+    const real t615 = t185 * t599;
+    const real t616 = t614 - t615;
+    const real t617 = t203 * t604;
+    const real t618 = t616 - t617;
+    const real t619 = t224 * t611;
+    const real t620 = t618 - t619;
+    const real t621 = t327 * t620;
+    const real t622 = H[24] * t251;
+    const real t623 = H[29] - t622;
+    const real t624 = t267 * t599;
+    const real t625 = t623 - t624;
+    const real t626 = t285 * t604;
+    const real t627 = t625 - t626;
+    const real t628 = t305 * t611;
+    const real t629 = t627 - t628;
+    const real t630 = t328 * t620;
+    const real t631 = t629 - t630;
+    const real t632 = t357 * t631;
+    const real t633 = t328 * t632;
+    const real t634 = t621 - t633;
+    const real t635 = t224 * t634;
+    const real t636 = t612 - t635;
+    const real t637 = t305 * t632;
+    const real t638 = t636 - t637;
+    const real t639 = t142 * t638;
+    const real t640 = t605 - t639;
+    const real t641 = t203 * t634;
+    const real t642 = t640 - t641;
+    const real t643 = t285 * t632;
+    const real t644 = t642 - t643;
+    const real t645 = t80 * t644;
+    const real t646 = t600 - t645;
+    const real t647 = t123 * t638;
+    const real t648 = t646 - t647;
+    const real t649 = t185 * t634;
+    const real t650 = t648 - t649;
+    const real t651 = t267 * t632;
+    const real t652 = t650 - t651;
+    const real t653 = t36 * t652;
+    const real t654 = t597 - t653;
+    const real t655 = t63 * t644;
+    const real t656 = t654 - t655;
+    const real t657 = t107 * t638;
+    const real t658 = t656 - t657;
+    const real t659 = t169 * t634;
+    const real t660 = t658 - t659;
+    const real t661 = t251 * t632;
+    const real t662 = t660 - t661;
+    W[4] = t662;
+    const real t663 = H[30] * t35;
+    const real t664 = H[30] * t36;
+    const real t665 = H[31] - t664;
+    const real t666 = t79 * t665;
+    const real t667 = H[30] * t63;
+    const real t668 = H[32] - t667;
+    const real t669 = t80 * t665;
+    const real t670 = t668 - t669;
+    const real t671 = t141 * t670;
+    const real t672 = H[30] * t107;
+    const real t673 = H[33] - t672;
+    const real t674 = t123 * t665;
+    const real t675 = t673 - t674;
+    const real t676 = t142 * t670;
+    const real t677 = t675 - t676;
+    const real t678 = t223 * t677;
+    const real t679 = H[30] * t169;
+    const real t680 = H[34] - t679;
+    const real t681 = t185 * t665;
+    const real t682 = t680 - t681;
+    const real t683 = t203 * t670;
+    const real t684 = t682 - t683;
+    const real t685 = t224 * t677;
+    const real t686 = t684 - t685;
+    const real t687 = t327 * t686;
+    const real t688 = H[30] * t251;
+    const real t689 = H[35] - t688;
+    const real t690 = t267 * t665;
+    const real t691 = t689 - t690;
+    const real t692 = t285 * t670;
+    const real t693 = t691 - t692;
+    const real t694 = t305 * t677;
+    const real t695 = t693 - t694;
+    const real t696 = t328 * t686;
+    const real t697 = t695 - t696;
+    const real t698 = t357 * t697;
+    const real t699 = t328 * t698;
+    const real t700 = t687 - t699;
+    const real t701 = t224 * t700;
+    const real t702 = t678 - t701;
+    const real t703 = t305 * t698;
+    const real t704 = t702 - t703;
+    const real t705 = t142 * t704;
+    const real t706 = t671 - t705;
+    const real t707 = t203 * t700;
+    const real t708 = t706 - t707;
+    const real t709 = t285 * t698;
+    const real t710 = t708 - t709;
+    const real t711 = t80 * t710;
+    const real t712 = t666 - t711;
+    const real t713 = t123 * t704;
+    const real t714 = t712 - t713;
+    const real t715 = t185 * t700;
+    const real t716 = t714 - t715;
+    const real t717 = t267 * t698;
+    const real t718 = t716 - t717;
+    const real t719 = t36 * t718;
+    const real t720 = t663 - t719;
+    const real t721 = t63 * t710;
+    const real t722 = t720 - t721;
+    const real t723 = t107 * t704;
+    const real t724 = t722 - t723;
+    const real t725 = t169 * t700;
+    const real t726 = t724 - t725;
+    const real t727 = t251 * t698;
+    const real t728 = t726 - t727;
+    W[5] = t728;
+    W[6] = t388;
+    W[7] = t454;
+    W[8] = t520;
+    W[9] = t586;
+    W[10] = t652;
+    W[11] = t718;
+    W[12] = t380;
+    W[13] = t446;
+    W[14] = t512;
+    W[15] = t578;
+    W[16] = t644;
+    W[17] = t710;
+    W[18] = t374;
+    W[19] = t440;
+    W[20] = t506;
+    W[21] = t572;
+    W[22] = t638;
+    W[23] = t704;
+    W[24] = t370;
+    W[25] = t436;
+    W[26] = t502;
+    W[27] = t568;
+    W[28] = t634;
+    W[29] = t700;
+    W[30] = t368;
+    W[31] = t434;
+    W[32] = t500;
+    W[33] = t566;
+    W[34] = t632;
+    W[35] = t698;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_complement_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_complement(in[0], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_complement_inputs[] = {
+    {"H", 36, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_complement_outputs[] = {
+    {"W", 36, "", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_generic6_complement_guards[] = {
+    {1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"},
+    {1, "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"},
+};
+
+/* a column's rows divided by D, across a hinge with 6 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  F[6][6] D = L diag(d) L^T: L, and 1 / d on the diagonal
+ * in  y[6] -H^T K - C
+ * out z[6] D^-1 y
+ */
+int mstmm_sweep_generic6_divide(const real *restrict F, const real *restrict y, real *restrict z)
+{
+    const real t0 = F[0] * y[0];
+    const real t1 = F[6] * y[0];
+    const real t2 = y[1] - t1;
+    const real t3 = F[7] * t2;
+    const real t4 = F[12] * y[0];
+    const real t5 = y[2] - t4;
+    const real t6 = F[13] * t2;
+    const real t7 = t5 - t6;
+    const real t8 = F[14] * t7;
+    const real t9 = F[18] * y[0];
+    const real t10 = y[3] - t9;
+    const real t11 = F[19] * t2;
+    const real t12 = t10 - t11;
+    const real t13 = F[20] * t7;
+    const real t14 = t12 - t13;
+    const real t15 = F[21] * t14;
+    const real t16 = F[24] * y[0];
+    const real t17 = y[4] - t16;
+    const real t18 = F[25] * t2;
+    const real t19 = t17 - t18;
+    const real t20 = F[26] * t7;
+    const real t21 = t19 - t20;
+    const real t22 = F[27] * t14;
+    const real t23 = t21 - t22;
+    const real t24 = F[28] * t23;
+    const real t25 = F[30] * y[0];
+    const real t26 = y[5] - t25;
+    const real t27 = F[31] * t2;
+    const real t28 = t26 - t27;
+    const real t29 = F[32] * t7;
+    const real t30 = t28 - t29;
+    const real t31 = F[33] * t14;
+    const real t32 = t30 - t31;
+    const real t33 = F[34] * t23;
+    const real t34 = t32 - t33;
+    const real t35 = F[35] * t34;
+    const real t36 = F[34] * t35;
+    const real t37 = t24 - t36;
+    const real t38 = F[27] * t37;
+    const real t39 = t15 - t38;
+    const real t40 = F[33] * t35;
+    const real t41 = t39 - t40;
+    const real t42 = F[20] * t41;
+    const real t43 = t8 - t42;
+    const real t44 = F[26] * t37;
+    const real t45 = t43 - t44;
+    const real t46 = F[32] * t35;
+    const real t47 = t45 - t46;
+    const real t48 = F[13] * t47;
+    const real t49 = t3 - t48;
+    const real t50 = F[19] * t41;
+    const real t51 = t49 - t50;
+    const real t52 = F[25] * t37;
+    const real t53 = t51 - t52;
+    const real t54 = F[31] * t35;
+    const real t55 = t53 - t54;
+    const real t56 = F[6] * t55;
+    const real t57 = t0 - t56;
+    const real t58 = F[12] * t47;
+    const real t59 = t57 - t58;
+    const real t60 = F[18] * t41;
+    const real t61 = t59 - t60;
+    const real t62 = F[24] * t37;
+    const real t63 = t61 - t62;
+    const real t64 = F[30] * t35;
+    const real t65 = t63 - t64;
+    z[0] = t65;
+    z[1] = t55;
+    z[2] = t47;
+    z[3] = t41;
+    z[4] = t37;
+    z[5] = t35;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_divide_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_divide(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_divide_inputs[] = {
+    {"F", 36, "", 0, 0},
+    {"y", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_divide_outputs[] = {
+    {"z", 6, "", 0, 0},
+};
+
+/* two columns coupled by a hinge with 6 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[6] of one row
+ * in  z[6] of the other
+ * out L_ij[1] entry of L of both, added to what is there
+ */
+int mstmm_sweep_generic6_couple(const real *restrict y, const real *restrict z, real *restrict L_ij)
+{
+    const real t0 = y[0] * z[0];
+    const real t1 = y[1] * z[1];
+    const real t2 = t0 + t1;
+    const real t3 = y[2] * z[2];
+    const real t4 = t2 + t3;
+    const real t5 = y[3] * z[3];
+    const real t6 = t4 + t5;
+    const real t7 = y[4] * z[4];
+    const real t8 = t6 + t7;
+    const real t9 = y[5] * z[5];
+    const real t10 = t8 + t9;
+    L_ij[0] += t10;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_couple_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_couple(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_couple_inputs[] = {
+    {"y", 6, "", 0, 0},
+    {"z", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_couple_outputs[] = {
+    {"L_ij", 1, "", 1, 0},
+};
+
+/* what a hinge with 6 speeds tells a row
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[6] tau - H^T e
+ * in  z[6] of the row
+ * out l[1] known part of the row, added to what is there
+ */
+int mstmm_sweep_generic6_answered(const real *restrict y, const real *restrict z, real *restrict l)
+{
+    const real t0 = y[0] * z[0];
+    const real t1 = y[1] * z[1];
+    const real t2 = t0 + t1;
+    const real t3 = y[2] * z[2];
+    const real t4 = t2 + t3;
+    const real t5 = y[3] * z[3];
+    const real t6 = t4 + t5;
+    const real t7 = y[4] * z[4];
+    const real t8 = t6 + t7;
+    const real t9 = y[5] * z[5];
+    const real t10 = t8 + t9;
+    const real t11 = -t10;
+    l[0] += t11;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_answered_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_answered(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_answered_inputs[] = {
+    {"y", 6, "", 0, 0},
+    {"z", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_answered_outputs[] = {
+    {"l", 1, "", 1, 0},
+};
+
+/* a multiplier felt by a hinge with 6 speeds
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[6] of the row
+ * in  x[1] (N, N*m) multiplier
+ * out y_0[6] tau - H^T e, added to what is there
+ */
+int mstmm_sweep_generic6_pull(const real *restrict y, const real *restrict x, real *restrict y_0)
+{
+    const real t0 = y[0] * x[0];
+    y_0[0] += t0;
+    const real t1 = y[1] * x[0];
+    y_0[1] += t1;
+    const real t2 = y[2] * x[0];
+    y_0[2] += t2;
+    const real t3 = y[3] * x[0];
+    y_0[3] += t3;
+    const real t4 = y[4] * x[0];
+    y_0[4] += t4;
+    const real t5 = y[5] * x[0];
+    y_0[5] += t5;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_pull_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_pull(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_pull_inputs[] = {
+    {"y", 6, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_pull_outputs[] = {
+    {"y_0", 6, "", 1, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -13893,6 +14919,66 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "complement",
+        .function = (void (*)(void))mstmm_sweep_generic6_complement,
+        .call = mstmm_sweep_generic6_complement_call,
+        .n_inputs = 1,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic6_complement_inputs,
+        .outputs = mstmm_sweep_generic6_complement_outputs,
+        .ir_hash = "688d03dbda83940f64996397e9305d9031747265626bd31e0b015f633e313c6c",
+        .n_guards = 6,
+        .guards = mstmm_sweep_generic6_complement_guards,
+    },
+    {
+        .name = "divide",
+        .function = (void (*)(void))mstmm_sweep_generic6_divide,
+        .call = mstmm_sweep_generic6_divide_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic6_divide_inputs,
+        .outputs = mstmm_sweep_generic6_divide_outputs,
+        .ir_hash = "a1fc3262e4e77a9a2b5f74658061f8c508758a1943cbba925174922e045544a0",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "couple",
+        .function = (void (*)(void))mstmm_sweep_generic6_couple,
+        .call = mstmm_sweep_generic6_couple_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic6_couple_inputs,
+        .outputs = mstmm_sweep_generic6_couple_outputs,
+        .ir_hash = "b191468f9d3d493b0cf5a0bcc6cca0f97195393ca3b951be76f5d191c23a3fb6",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "answered",
+        .function = (void (*)(void))mstmm_sweep_generic6_answered,
+        .call = mstmm_sweep_generic6_answered_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic6_answered_inputs,
+        .outputs = mstmm_sweep_generic6_answered_outputs,
+        .ir_hash = "97d2f8a94e0726d02be406b002faea5cf6dd681195ef57f01b0dba92ea07138d",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "pull",
+        .function = (void (*)(void))mstmm_sweep_generic6_pull,
+        .call = mstmm_sweep_generic6_pull_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic6_pull_inputs,
+        .outputs = mstmm_sweep_generic6_pull_outputs,
+        .ir_hash = "14d7a1e78e434c40352a5f092543d48dfa1bf944c7e013b989433487270d301d",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic6_forward_slope,
         .call = mstmm_sweep_generic6_forward_slope_call,
@@ -13922,7 +15008,7 @@ const mstmm_element mstmm_sweep_generic6 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic6",
-    .hash = "2cfe6cfd2c87e1a1509c55b75c2601af6f38e77ceb99460cd6811b2144089973",
+    .hash = "84346cc6516e752e42b5674e351147ed001962a91c5b00f8e1f685af85966bf9",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -13932,6 +15018,6 @@ const mstmm_element mstmm_sweep_generic6 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 22,
+    .n_kernels = 27,
     .kernels = mstmm_sweep_generic6_kernels,
 };

@@ -99,6 +99,56 @@ mstmm_generic_qr_eliminate_kernel *const mstmm_generic_qr_eliminate_table[] = {
     mstmm_sweep_generic6_qr_eliminate,
 };
 
+mstmm_generic_complement_kernel *const mstmm_generic_complement_table[] = {
+    mstmm_sweep_generic0_complement,
+    mstmm_sweep_generic1_complement,
+    mstmm_sweep_generic2_complement,
+    mstmm_sweep_generic3_complement,
+    mstmm_sweep_generic4_complement,
+    mstmm_sweep_generic5_complement,
+    mstmm_sweep_generic6_complement,
+};
+
+mstmm_generic_divide_kernel *const mstmm_generic_divide_table[] = {
+    NULL,
+    mstmm_sweep_generic1_divide,
+    mstmm_sweep_generic2_divide,
+    mstmm_sweep_generic3_divide,
+    mstmm_sweep_generic4_divide,
+    mstmm_sweep_generic5_divide,
+    mstmm_sweep_generic6_divide,
+};
+
+mstmm_generic_couple_kernel *const mstmm_generic_couple_table[] = {
+    NULL,
+    mstmm_sweep_generic1_couple,
+    mstmm_sweep_generic2_couple,
+    mstmm_sweep_generic3_couple,
+    mstmm_sweep_generic4_couple,
+    mstmm_sweep_generic5_couple,
+    mstmm_sweep_generic6_couple,
+};
+
+mstmm_generic_answered_kernel *const mstmm_generic_answered_table[] = {
+    NULL,
+    mstmm_sweep_generic1_answered,
+    mstmm_sweep_generic2_answered,
+    mstmm_sweep_generic3_answered,
+    mstmm_sweep_generic4_answered,
+    mstmm_sweep_generic5_answered,
+    mstmm_sweep_generic6_answered,
+};
+
+mstmm_generic_pull_kernel *const mstmm_generic_pull_table[] = {
+    NULL,
+    mstmm_sweep_generic1_pull,
+    mstmm_sweep_generic2_pull,
+    mstmm_sweep_generic3_pull,
+    mstmm_sweep_generic4_pull,
+    mstmm_sweep_generic5_pull,
+    mstmm_sweep_generic6_pull,
+};
+
 mstmm_generic_forward_slope_kernel *const mstmm_generic_forward_slope_table[] = {
     mstmm_sweep_generic0_forward_slope,
     mstmm_sweep_generic1_forward_slope,
@@ -917,6 +967,300 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
     return 0;
 }
 
+/* Rows of a hinge that closes a loop, and the load of its laws. */
+static int mstmm_at_closures(mstmm_state *state, int index)
+{
+    real drift[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    const mstmm_closure *closure = looped->closure;
+    real *outboard = closure ? mstmm_block(state->model, state->workspace, closure->outboard) : NULL;
+    real *loops = state->workspace + state->model->loops;
+    real *closed = closure ? loops + closure->numbers : NULL;
+    int code;
+    if (!looped->closure) return 0;
+    if (!body->generic) {
+        code = mstmm_at_hinge_motion(state, index);
+        if (code) return code;
+    }
+    code = mstmm_generic_complement(nu,
+        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .W = closed + MSTMM_CLOSURE_W);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
+    mstmm_loops_gap(
+        .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
+        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .R_e = closure->turn,
+        .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .R_C = closed + MSTMM_CLOSURE_R_C, .r_A = closed + MSTMM_CLOSURE_LEVER,
+        .d = closed + MSTMM_CLOSURE_D, .gap = closed + MSTMM_CLOSURE_GAP);
+    mstmm_loops_slip(
+        .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
+        .v_C = block + MSTMM_BLOCK_V, .w_C = block + MSTMM_BLOCK_MOTION,
+        .v_B = outboard + MSTMM_BLOCK_V, .w_B = outboard + MSTMM_BLOCK_MOTION,
+        .slip = closed + MSTMM_CLOSURE_SLIP);
+    if (state->level == MSTMM_GAP) {
+        mstmm_loops_rows(
+            .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = closed + MSTMM_CLOSURE_GAP,
+            .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
+            .l = closed + MSTMM_CLOSURE_L);
+    }
+    if (state->level == MSTMM_SLIP) {
+        mstmm_loops_rows(
+            .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = closed + MSTMM_CLOSURE_SLIP,
+            .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
+            .l = closed + MSTMM_CLOSURE_L);
+    }
+    if (!state->level) {
+        real *parent = mstmm_block(state->model, state->workspace, body->parent);
+        mstmm_loops_drift(
+            .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
+            .d = closed + MSTMM_CLOSURE_D, .slip = closed + MSTMM_CLOSURE_SLIP,
+            .motion_C = block + MSTMM_BLOCK_MOTION, .motion_B = outboard + MSTMM_BLOCK_MOTION,
+            .drift = drift);
+        mstmm_loops_rows(
+            .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = drift,
+            .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
+            .l = closed + MSTMM_CLOSURE_L);
+        for (int k = 0; k < body->nu; k++) {
+            mstmm_loops_act(
+                .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
+                .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
+                .e = parent + MSTMM_BLOCK_E);
+            mstmm_loops_act(
+                .J = closed + MSTMM_CLOSURE_J_B + 6 * k,
+                .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
+                .e = outboard + MSTMM_BLOCK_E);
+        }
+    }
+    for (int c = 0; c < 6; c++) {
+        if (closure->rows[c] < 0) continue;
+        memcpy(loops + closure->inner[c], closed + MSTMM_CLOSURE_J_A + 6 * c, (size_t)(6) * sizeof(real));
+        memcpy(loops + closure->outer[c], closed + MSTMM_CLOSURE_J_B + 6 * c, (size_t)(6) * sizeof(real));
+        memcpy(loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN, closed + MSTMM_CLOSURE_L + c, (size_t)(1) * sizeof(real));
+        if (state->level && (state->model->rows[closure->rows[c]].softness > 0)) {
+            (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN)[0] = 0;
+        }
+    }
+    return 0;
+}
+
+/* A row closed on the body where its ends meet. */
+static int mstmm_at_row_closed(mstmm_state *state, int index)
+{
+    real *loops = state->workspace + state->model->loops;
+    const mstmm_loop_row *row = &state->model->rows[index];
+    real *line = loops + MSTMM_ROW * (int64_t)index;
+    real *meeting = mstmm_block(state->model, state->workspace, row->body);
+    mstmm_loops_close(
+        .K = line + MSTMM_ROW_K, .l = line + MSTMM_ROW_KNOWN, .L = line + MSTMM_ROW_PIVOT,
+        .floor_ = &row->floor, .inverse = line + MSTMM_ROW_INVERSE, .S = meeting + MSTMM_BLOCK_S,
+        .e = meeting + MSTMM_BLOCK_E);
+    for (int c = 0; c < row->n_others; c++) {
+        const mstmm_other *other = &row->others[c];
+        mstmm_loops_shed(
+            .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
+            .l = line + MSTMM_ROW_KNOWN, .L_p = loops + other->pair,
+            .K_p = loops + other->column,
+            .l_p = loops + MSTMM_ROW * (int64_t)other->row + MSTMM_ROW_KNOWN);
+        for (int b = 0; b <= c; b++) {
+            mstmm_loops_shed_pair(
+                .inverse = line + MSTMM_ROW_INVERSE, .L_p = loops + other->pair,
+                .L_q = loops + row->others[b].pair, .L_pq = loops + other->pairs[b]);
+        }
+    }
+    return 0;
+}
+
+/* S, e and the columns of open rows carried across the hinge to the parent. */
+static int mstmm_at_carried(mstmm_state *state, int index)
+{
+    real hinge_J_free[6];
+    real hinge_tau_free[6];
+    real z[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    real *loops = state->workspace + state->model->loops;
+    int columns[6];
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
+    int code;
+    if (mstmm_aside(state, index)) return 0;
+    for (int r = looped->first_row; r < looped->first_row + looped->n_rows; r++) {
+        code = mstmm_at_row_closed(state, r);
+        if (code) return code;
+    }
+    if (!body->generic) {
+        code = mstmm_at_hinge_motion(state, index);
+        if (code) return code;
+    }
+    for (int k = 0; k < speeds; k++)
+        for (int row = 0; row < 6; row++)
+            (mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
+    for (int k = 0; k < speeds; k++)
+        hinge_J_free[k] = body->rotor[columns[k]];
+    for (int k = 0; k < speeds; k++)
+        hinge_tau_free[k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU))[columns[k]];
+    code = mstmm_generic_factor(speeds,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE), .J = hinge_J_free, .W = mstmm_zeros,
+        .floor_ = block + MSTMM_BLOCK_FLOOR, .S = block + MSTMM_BLOCK_S,
+        .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .S_I = parent + MSTMM_BLOCK_S);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
+    mstmm_generic_push(speeds,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
+        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = block + MSTMM_BLOCK_E,
+        .tau = hinge_tau_free, .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET),
+        .e_I = parent + MSTMM_BLOCK_E);
+    for (int c = 0; c < looped->n_pending; c++) {
+        const mstmm_pending *pending = &looped->pending[c];
+        mstmm_generic_push(speeds,
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
+            .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = loops + pending->column,
+            .tau = mstmm_zeros, .y = loops + pending->y, .e_I = loops + pending->onward);
+        if (!body->section && speeds) {
+            mstmm_generic_divide(speeds,
+                .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .y = loops + pending->y, .z = z);
+        }
+        if (!body->section && speeds) {
+            mstmm_generic_answered(speeds,
+                .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .z = z,
+                .l = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_KNOWN);
+        }
+        if (!body->section && speeds) {
+            for (int b = 0; b <= c; b++) {
+                mstmm_generic_couple(speeds,
+                    .y = loops + looped->pending[b].y, .z = z, .L_ij = loops + pending->pairs[b]);
+            }
+        }
+    }
+    return 0;
+}
+
+/* The multiplier of a row, from the motion of the body where it closes. */
+static int mstmm_at_row_found(mstmm_state *state, int index)
+{
+    real *loops = state->workspace + state->model->loops;
+    const mstmm_loop_row *row = &state->model->rows[index];
+    real *line = loops + MSTMM_ROW * (int64_t)index;
+    real *meeting = mstmm_block(state->model, state->workspace, row->body);
+    mstmm_loops_multiplier(
+        .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
+        .l = line + MSTMM_ROW_KNOWN, .delta = meeting + MSTMM_BLOCK_DELTA,
+        .x = line + MSTMM_ROW_X);
+    for (int c = 0; c < row->n_others; c++) {
+        const mstmm_other *other = &row->others[c];
+        mstmm_loops_multiplier_less(
+            .inverse = line + MSTMM_ROW_INVERSE, .L_p = loops + other->pair,
+            .x_p = loops + MSTMM_ROW * (int64_t)other->row + MSTMM_ROW_X,
+            .x = line + MSTMM_ROW_X);
+    }
+    return 0;
+}
+
+/* Accelerations of a hinge under the multipliers of its open rows. */
+static int mstmm_at_answered(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    real *loops = state->workspace + state->model->loops;
+    int columns[6];
+    const int speeds = mstmm_free_speeds(state->memory, body, columns);
+    int code;
+    if (mstmm_aside(state, index)) return 0;
+    for (int c = 0; c < looped->n_pending; c++) {
+        const mstmm_pending *pending = &looped->pending[c];
+        if (!body->section && speeds) {
+            mstmm_generic_pull(speeds,
+                .y = loops + pending->y,
+                .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
+                .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET));
+        }
+        if ((state->observed || state->balance)) {
+            mstmm_loops_loaded(
+                .K = loops + pending->column,
+                .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
+                .e = block + MSTMM_BLOCK_E);
+        }
+    }
+    mstmm_generic_answer(speeds,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
+        .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN),
+        .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET),
+        .delta_I = parent + MSTMM_BLOCK_DELTA,
+        .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_RATES),
+        .delta = block + MSTMM_BLOCK_DELTA);
+    for (int j = 0, k = 0; j < nu; j++)
+        (state->udot + body->u)[j] = k < speeds && columns[k] == j ? (mstmm_of_speeds(block, nu, MSTMM_SPEED_RATES))[k++]
+                     : (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j];
+    for (int r = looped->first_row + looped->n_rows - 1; r >= looped->first_row; r--) {
+        code = mstmm_at_row_found(state, r);
+        if (code) return code;
+    }
+    if (mstmm_imposed(body, state->memory) && state->balance) {
+        code = mstmm_at_hinge_motion(state, index);
+        if (code) return code;
+    }
+    return 0;
+}
+
+/* Accelerations and load of a hinge that closes a loop. */
+static int mstmm_at_closures_answered(mstmm_state *state, int index)
+{
+    real along[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    const mstmm_closure *closure = looped->closure;
+    real *outboard = closure ? mstmm_block(state->model, state->workspace, closure->outboard) : NULL;
+    real *loops = state->workspace + state->model->loops;
+    real *closed = closure ? loops + closure->numbers : NULL;
+    if (!looped->closure) return 0;
+    mstmm_loops_told(
+        .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
+        .l = closed + MSTMM_CLOSURE_L, .delta_A = parent + MSTMM_BLOCK_DELTA,
+        .delta_B = outboard + MSTMM_BLOCK_DELTA, .c = along);
+    for (int j = 0; j < nu; j++)
+        (state->udot + body->u)[j] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j];
+    for (int k = 0; k < body->nu; k++) {
+        (state->udot + body->u + k)[0] += (along + k)[0];
+    }
+    if ((state->observed || state->balance)) {
+        memset(block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
+        for (int k = 0; k < body->nu; k++) {
+            mstmm_loops_loaded(
+                .K = closed + MSTMM_CLOSURE_W + 6 * k,
+                .x = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = block + MSTMM_BLOCK_E);
+        }
+        for (int c = 0; c < 6; c++) {
+            if (closure->rows[c] < 0) continue;
+            mstmm_loops_act(
+                .J = closed + MSTMM_CLOSURE_W + 6 * c,
+                .tau = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
+                .e = block + MSTMM_BLOCK_E);
+        }
+    }
+    return 0;
+}
+
 /* Power that drives and holds feed in. */
 static int mstmm_at_drive_power(mstmm_state *state, int index)
 {
@@ -992,6 +1336,18 @@ static int mstmm_at_required(mstmm_state *state, int index)
     mstmm_frames_transport(
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .e = block + MSTMM_BLOCK_E,
         .e_I = parent + MSTMM_BLOCK_E);
+    return 0;
+}
+
+/* No load and no effort: the rows alone are to be met. */
+static int mstmm_at_unloaded(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    memset(block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
+    for (int j = 0; j < nu; j++)
+        (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU))[j] = 0;
     return 0;
 }
 
@@ -4163,6 +4519,108 @@ static int mstmm_pass_recover(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_closures(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(block + MSTMM_BLOCK_A, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
+static int mstmm_pass_closures(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_closures(state, i, MSTMM_TILE);
+        const int code = mstmm_at_closures(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_carried(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
+}
+static int mstmm_pass_carried(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->n_bodies - 1; i >= 0; i--) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_carried(state, i, -MSTMM_TILE);
+        const int code = mstmm_at_carried(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_row_closed(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->first_ground_row; i < model->n_rows; i++) {
+        const int code = mstmm_at_row_closed(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_row_found(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->n_rows - 1; i >= model->first_ground_row; i--) {
+        const int code = mstmm_at_row_found(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_answered(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_DELTA, block + MSTMM_BLOCK_DELTA + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
+}
+static int mstmm_pass_answered(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_answered(state, i, MSTMM_TILE);
+        const int code = mstmm_at_answered(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_closures_answered(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
+}
+static int mstmm_pass_closures_answered(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_closures_answered(state, i, MSTMM_TILE);
+        const int code = mstmm_at_closures_answered(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 MSTMM_AT_ONCE void mstmm_fetch_drive_power(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -4199,6 +4657,26 @@ static int mstmm_pass_required(mstmm_state *state)
     for (int i = model->n_bodies - 1; i >= 0; i--) {
         if (mstmm_beyond_cache(model)) mstmm_fetch_required(state, i, -MSTMM_TILE);
         const int code = mstmm_at_required(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_unloaded(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
+}
+static int mstmm_pass_unloaded(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_unloaded(state, i, MSTMM_TILE);
+        const int code = mstmm_at_unloaded(state, i);
         if (code) return code;
     }
     return 0;
@@ -4708,6 +5186,41 @@ static int mstmm_chain_inverse_dynamics(mstmm_state *state)
         for (; law < model->n_laws && model->laws[law].body < end; law++) {
             const int i = law;
             code = mstmm_at_laws(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_correction_chain(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
+static int mstmm_chain_correction(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code;
+    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
+        const int end = mstmm_end_of_tile(model, first);
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_prescribed(state, i);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_correction_chain(state, i, MSTMM_TILE);
+            code = mstmm_at_forward(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_poses(state, i);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_unloaded(state, i);
             if (code) return code;
         }
     }
@@ -5284,7 +5797,7 @@ int mstmm_run_accelerations(mstmm_state *state)
         code = mstmm_hook_links_recover(state);
         if (code) return code;
     }
-    if (!state->linked && !model->qr) {
+    if (!state->linked && !model->qr && !model->looped) {
         code = mstmm_pass_condense(state);
         if (code) return code;
     }
@@ -5292,8 +5805,36 @@ int mstmm_run_accelerations(mstmm_state *state)
         code = mstmm_pass_qr_condense(state);
         if (code) return code;
     }
-    if (!state->linked) {
+    if (!state->linked && !model->looped) {
         code = mstmm_pass_recover(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_hook_rows_begun(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_closures(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_carried(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_row_closed(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_row_found(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_answered(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_closures_answered(state);
         if (code) return code;
     }
     if (state->balance) {
@@ -5358,6 +5899,49 @@ int mstmm_run_inverse_dynamics(mstmm_state *state)
         if (code) return code;
     }
     code = mstmm_pass_required(state);
+    if (code) return code;
+    return 0;
+}
+
+/* The least change, by inertia, that closes gaps or stops slips of closed loops. */
+int mstmm_run_correction(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code;
+    if (model->n_drives) {
+        code = mstmm_pass_prescribed(state);
+        if (code) return code;
+        if (model->n_drives) {
+            code = mstmm_hook_drive_values(state);
+            if (code) return code;
+        }
+        if (model->n_drives) {
+            code = mstmm_pass_drives(state);
+            if (code) return code;
+        }
+        code = mstmm_pass_forward(state);
+        if (code) return code;
+        code = mstmm_pass_poses(state);
+        if (code) return code;
+        code = mstmm_pass_unloaded(state);
+        if (code) return code;
+    } else {
+        code = mstmm_chain_correction(state);
+        if (code) return code;
+    }
+    code = mstmm_hook_rows_begun(state);
+    if (code) return code;
+    code = mstmm_pass_closures(state);
+    if (code) return code;
+    code = mstmm_pass_carried(state);
+    if (code) return code;
+    code = mstmm_pass_row_closed(state);
+    if (code) return code;
+    code = mstmm_pass_row_found(state);
+    if (code) return code;
+    code = mstmm_pass_answered(state);
+    if (code) return code;
+    code = mstmm_pass_closures_answered(state);
     if (code) return code;
     return 0;
 }

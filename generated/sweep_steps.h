@@ -15,6 +15,7 @@ int mstmm_at_rates_change(mstmm_state *state, int index);
 int mstmm_run_given(mstmm_state *state);
 int mstmm_run_accelerations(mstmm_state *state);
 int mstmm_run_inverse_dynamics(mstmm_state *state);
+int mstmm_run_correction(mstmm_state *state);
 int mstmm_run_motion(mstmm_state *state);
 int mstmm_run_posed(mstmm_state *state);
 int mstmm_run_factorisation(mstmm_state *state);
@@ -39,6 +40,7 @@ int mstmm_hook_links_recover(mstmm_state *state);
 int mstmm_hook_product(mstmm_state *state);
 int mstmm_hook_product_before_loads(mstmm_state *state);
 int mstmm_hook_product_compared(mstmm_state *state);
+int mstmm_hook_rows_begun(mstmm_state *state);
 int mstmm_hook_unit_load(mstmm_state *state);
 
 #endif

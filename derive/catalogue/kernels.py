@@ -14,9 +14,10 @@ from ..classical import harmonic_stiffness
 from ..classical.catalogue import CLASSICAL, classical_derivation, classical_guards
 from ..elements.body_rigid import RigidBody
 from ..equations import body as body_kernels
-from ..equations import columns, frames, laws, link, qr, screw, sweep, tangent, tangent_hinge
+from ..equations import columns, frames, laws, link, loops, qr, screw, sweep, tangent, tangent_hinge
 from ..equations import force as force_kernels
 from ..equations import tangent_placed as placed
+from ..equations.complement import complement
 from ..equations.factored import eliminate_factored, recover_factored
 from ..equations.hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
 from ..flexible import beam_fields, beam_second_order, modal, modal_sweep, section
@@ -131,6 +132,8 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
         Kernel("qr_eliminate", qr.qr_eliminate(nu), qr.qr_guards(nu)),
         *(Kernel(make.__name__, make(nu)) for make in _ALONG_HINGES),
         *(Kernel(make.__name__, make(nu)) for make in _OF_SPEEDS if nu),
+        Kernel("complement", complement(nu)),
+        *(Kernel(make.__name__, make(nu)) for make in loops.OF_SPEEDS if nu),
         *((Kernel("eliminate", eliminate_factored(nu)),) if nu else ()),
         *((Kernel("recover_factored", recover_factored(nu)),) if nu else ()),
     )
@@ -161,6 +164,11 @@ def qr_kernels() -> tuple[Kernel, ...]:
     return tuple(
         Kernel(make.__name__, make()) for make in (qr.factor, qr.bias, qr.merge, qr.restored)
     )
+
+
+def loop_kernels() -> tuple[Kernel, ...]:
+    """Closed loops, but for what goes by the speeds of a hinge."""
+    return tuple(Kernel(make.__name__, make()) for make in loops.STEPS)
 
 
 def links() -> dict[str, Hinge]:
@@ -240,6 +248,7 @@ def built_in() -> dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]:
     table["sweep", "laws"] = law_kernels
     table["sweep", "screw"] = screw_kernels
     table["sweep", "qr"] = qr_kernels
+    table["sweep", "loops"] = loop_kernels
     table["sweep", "modal"] = modal_kernels
     table["sweep", "tangent"] = tangent_kernels
     table["sweep", "beam"] = beam_kernels

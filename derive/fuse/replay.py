@@ -136,7 +136,8 @@ class Replay(Slots):
     def _scene_has(self, trait: str) -> bool:
         s = self.state.structure
         known = {
-            "linked": False, "product": False, "qr": False, "balance": True, "efforts": True,
+            "linked": False, "product": False, "qr": False, "looped": False,
+            "balance": True, "efforts": True,
             "inverse": self.inverse,
             "driving": True,
             "laws": bool(s.laws), "driven": s.drives is not None,

@@ -23,6 +23,7 @@ DIRECT = {
     "modal": ("sweep", "modal"),
     "tangent": ("sweep", "tangent"),
     "qr": ("sweep", "qr"),
+    "loops": ("sweep", "loops"),
     "classical_body": ("classical", "body_spatial"),
     "classical_pin": ("classical", "pin_spatial"),
     "classical_ball": ("classical", "ball"),
@@ -75,7 +76,7 @@ POINTED = {
 MOST_SPEEDS = 6
 GENERIC = (
     "forward", "condense", "recover", "effort", "project", "factor", "push", "answer",
-    "qr_eliminate",
+    "qr_eliminate", "complement", "divide", "couple", "answered", "pull",
     "forward_slope", "effort_slope", "tangent_carrier", "tangent_column", "tangent_along",
     "tangent_steady", "tangent_turning", "tangent_rows", "tangent_reduce", "tangent_push",
     "tangent_answer", "tangent_push_known", "tangent_answer_known",

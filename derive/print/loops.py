@@ -13,8 +13,10 @@ from .tiles import Chained, Tiled, tiled
 #: How many subjects a scene has.
 _COUNTS = {
     "body": "n_bodies", "law": "n_laws", "load": "n_loads", "force": "n_forces",
-    "drive": "n_drives", "speed": "nu",
+    "drive": "n_drives", "speed": "nu", "row": "n_rows",
 }  # fmt: skip
+#: The first that a loop meets, where others are met on their way: rows that close on bodies.
+_FIRSTS = {"row": "model->first_ground_row"}
 #: Laws of the bodies that a tile begins: they stand in the order of bodies.
 _LAWS = """\
         const int behind = law;
@@ -55,9 +57,10 @@ def _loop(whole: Pass) -> str:
         )
     else:
         count = f"model->{_COUNTS[whole.subject]}"
-        order, ahead = f"int i = 0; i < {count}; i++", "MSTMM_TILE"
+        first = _FIRSTS.get(whole.subject, "0")
+        order, ahead = f"int i = {first}; i < {count}; i++", "MSTMM_TILE"
         if whole.order == TIPS_TO_ROOT:
-            order, ahead = f"int i = {count} - 1; i >= 0; i--", "-MSTMM_TILE"
+            order, ahead = f"int i = {count} - 1; i >= {first}; i--", "-MSTMM_TILE"
         fetches = fetching(whole.name, [whole])
         fetched = f"        {_fetched(whole.name, ahead)}" if fetches else ""
         text = f"    for ({order}) {{\n{fetched}        {at.format(indent=' ' * 8)}    }}\n"

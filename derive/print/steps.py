@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from mstmm.border.elements import c_outputs
 
@@ -14,6 +14,7 @@ from ..schedule.steps import (
     Call,
     Copy,
     Do,
+    Each,
     EachSpeed,
     Evaluate,
     Gather,
@@ -63,6 +64,27 @@ _RESTS = {
     **dict.fromkeys(("motion", "spin"), "mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, -1)"),
     **dict.fromkeys(("place", "turn"), "mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), -1)"),
 }
+#: Rows met one by one: the loop, what it declares, variables that both read.
+_EACH = {
+    "closings": (
+        "int r = looped->first_row; r < looped->first_row + looped->n_rows; r++", "", ("looped",),
+    ),
+    "openings": (
+        "int r = looped->first_row + looped->n_rows - 1; r >= looped->first_row; r--", "",
+        ("looped",),
+    ),
+    "pending": (
+        "int c = 0; c < looped->n_pending; c++",
+        "const mstmm_pending *pending = &looped->pending[c];", ("looped", "loops"),
+    ),
+    "before": ("int b = 0; b <= c; b++", "", ()),
+    "rows": ("int c = 0; c < 6; c++", "if (closure->rows[c] < 0) continue;", ("closure", "loops")),
+    "others": (
+        "int c = 0; c < row->n_others; c++", "const mstmm_other *other = &row->others[c];",
+        ("row", "loops"),
+    ),
+    "seconds": ("int b = 0; b <= c; b++", "", ()),
+}  # fmt: skip
 #: Sizes of kernels for any size: C expression, variables that it reads.
 _SIZES: dict[str, tuple[str, set[str]]] = {
     "modes": ("modal->n", {"modal"}),
@@ -90,6 +112,7 @@ class StepText:
     def __init__(self, kernels: dict[str, Callee], whole: Pass) -> None:
         self.kernels, self.name, self.subject = kernels, whole.name, whole.subject
         self.given = {slot: word_of(slot) for slot in whole.given}
+        self.at = "index"
         self.locals = self._local_sizes(whole)
 
     def _place(self, slot: str) -> Place:
@@ -146,9 +169,10 @@ class StepText:
             more = {word for slot in slots for word in size_words(slot)}
         elif isinstance(step, Move):
             slots, more = [step.to, step.source], {step.count} & VARIABLES.keys()
-        elif isinstance(step, Along):
+        elif isinstance(step, (Along, Each)):
             parts = [self.needs(part) | condition_needs(part.when) for part in step.steps]
-            return set(_ALONG[step.of][2]).union(*parts)
+            table = _ALONG if isinstance(step, Along) else _EACH
+            return set(table[step.of][2]).union(*parts)
         elif isinstance(step, Pick):
             slots, more = [step.to, step.source], {"speeds", "columns"}
             more |= {"nu"} if step.rows > 1 else set()
@@ -182,7 +206,7 @@ class StepText:
             return self._call(step, indent)
         if isinstance(step, Do):
             assert step.whole is not None
-            return [f"{indent}code = mstmm_at_{step.whole.name}(state, index);",
+            return [f"{indent}code = mstmm_at_{step.whole.name}(state, {self.at});",
                     f"{indent}if (code) return code;"]  # fmt: skip
         if isinstance(step, (Copy, Add)):
             return self._moved(step, indent)
@@ -191,6 +215,8 @@ class StepText:
             return [f"{indent}memcpy({to}, {source}, (size_t)({step.count}) * sizeof(real));"]
         if isinstance(step, Along):
             return self._along(step, indent)
+        if isinstance(step, Each):
+            return self._each(step, indent)
         if isinstance(step, Pick):
             return self._picked(step, indent)
         if isinstance(step, Spread):
@@ -304,13 +330,27 @@ class StepText:
         count, aim, _ = _ALONG[step.of]
         aims = f"{aim};".replace("\n", f"\n{indent}    ")
         lines = [f"{indent}for (int c = 0; c < {count}; c++) {{", f"{indent}    {aims}"]
-        for part in step.steps:
-            if part.when:
-                inside = self.lines(part, indent + "        ")
-                lines += [f"{indent}    if ({condition(part.when)}) {{", *inside, f"{indent}    }}"]
-            else:
-                lines += self.lines(part, indent + "    ")
+        lines += self._inside(step.steps, indent + "    ")
         return [*lines, f"{indent}}}", f"{indent}{_RESTS[step.of]};"]
+
+    def _inside(self, steps: Iterable[Step], indent: str) -> list[str]:
+        """Steps in a loop, each behind its condition."""
+        lines = []
+        for part in steps:
+            if part.when:
+                inside = self.lines(part, indent + "    ")
+                lines += [f"{indent}if ({condition(part.when)}) {{", *inside, f"{indent}}}"]
+            else:
+                lines += self.lines(part, indent)
+        return lines
+
+    def _each(self, step: Each, indent: str) -> list[str]:
+        order, declared, _ = _EACH[step.of]
+        self.at = "r" if step.of in ("closings", "openings") else self.at
+        inside = self._inside(step.steps, indent + "    ")
+        self.at = "index"
+        said = [f"{indent}    {declared}"] if declared else []
+        return [f"{indent}for ({order}) {{", *said, *inside, f"{indent}}}"]
 
     def _each_speed(self, step: EachSpeed, indent: str) -> list[str]:
         only = [f"{indent}    if (!body->imposed_mask[k]) continue;"] if step.imposed else []
@@ -334,7 +374,7 @@ def size_words(slot: str) -> set[str]:
 
 def _printed_here(step: Step) -> Iterator[Step]:
     """The step and those inside it that are no call of another function."""
-    if isinstance(step, (EachSpeed, Along)):
+    if isinstance(step, (EachSpeed, Along, Each)):
         for part in step.steps:
             yield from _printed_here(part)
     elif not isinstance(step, Do):

@@ -62,6 +62,13 @@ PORT = {
     "port.B": (9, 0), "port.G": (6, 0), "port.W": (0, 1), "port.K": (6, 0),
     "port.place_B": (9, 0),
 }  # fmt: skip
+#: Numbers of a hinge that closes a loop, in their order: slot -> how many.
+CLOSURE = {
+    "closure.W": 36, "closure.J_A": 36, "closure.J_B": 36, "closure.l": 6, "closure.R_C": 9,
+    "closure.d": 3, "closure.lever": 3, "closure.gap": 6, "closure.slip": 6,
+}  # fmt: skip
+#: Numbers of a row: slot -> how many.
+ROW = {"row.K": 6, "row.known": 1, "row.pivot": 1, "row.inverse": 1, "row.x": 1}
 #: Slots that lie where another does, which is not wanted any more by then.
 SHARED = {
     "hinge.F": "hinge.H", "modes.felt": "modes.right", "bend.place_right": "bend.right",
@@ -125,6 +132,13 @@ _PLACES = {
     "step.q": "&state->tangents->sq", "step.kappa": "&state->tangents->kappa",
     "body.rho": "state->tangents->rho + body->q",
     "body.change": "state->tangents->change + body->q",
+    "closure.turn": "closure->turn", "closure.end": "closure->end", "row.floor": "&row->floor",
+    "side.inner": "loops + closure->inner[c]", "side.outer": "loops + closure->outer[c]",
+    "pending.K": "loops + pending->column", "pending.onward": "loops + pending->onward",
+    "pending.y": "loops + pending->y", "before.y": "loops + looped->pending[b].y",
+    "pair.L": "loops + pending->pairs[b]",
+    "other.K": "loops + other->column", "other.L": "loops + other->pair",
+    "second.L": "loops + row->others[b].pair", "both.L": "loops + other->pairs[b]",
     "scene.t": "&state->t", "sums.power": "&state->balance->power",
     "sums.potential": "&state->balance->potential", "identity": "mstmm_identity",
     "zero": "mstmm_zeros", "none": "mstmm_zeros",
@@ -166,6 +180,21 @@ VARIABLES: dict[str, tuple[str, tuple[str, ...]]] = {
     "bend": ("real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;", ("modal",)),
     "port": ("real *port = section ? state->tangents->numbers + section->tangent : NULL;",
              ("section",)),
+    "looped": ("const mstmm_looped *looped = &state->model->looped[index];", ()),
+    "closure": ("const mstmm_closure *closure = looped->closure;", ("looped",)),
+    "outboard": (
+        "real *outboard ="
+        " closure ? mstmm_block(state->model, state->workspace, closure->outboard) : NULL;",
+        ("closure",),
+    ),
+    "loops": ("real *loops = state->workspace + state->model->loops;", ()),
+    "closed": (
+        "real *closed = closure ? loops + closure->numbers : NULL;", ("loops", "closure"),
+    ),
+    "row": ("const mstmm_loop_row *row = &state->model->rows[index];", ()),
+    "line": ("real *line = loops + MSTMM_ROW * (int64_t)index;", ("loops",)),
+    "meeting": ("real *meeting = mstmm_block(state->model, state->workspace, row->body);",
+                ("row",)),
     "columns": ("int columns[6];", ()),
     "speeds": ("const int speeds = mstmm_free_speeds(state->memory, body, columns);",
                ("body", "columns")),
@@ -229,6 +258,13 @@ def _place_of_derivative(slot: str) -> Place | None:
     return Place(text, {word for word in VARIABLES if reads(text, word)})
 
 
+#: Numbers of the row at hand in a loop over rows: slot -> its number.
+_OF_ROWS = {
+    "line.known": "closure->rows[c]", "line.x": "closure->rows[c]", "other.known": "other->row",
+    "other.x": "other->row", "pending.known": "pending->row", "pending.x": "pending->row",
+}  # fmt: skip
+
+
 def _stored(slot: str) -> str | None:
     owner, _, name = slot.partition(".")
     if owner in ROLES:
@@ -239,6 +275,12 @@ def _stored(slot: str) -> str | None:
         return f"block + MSTMM_BLOCK_{BLOCK[slot]}"
     if slot in PER_SPEED:
         return f"mstmm_of_speeds(block, nu, MSTMM_SPEED_{PER_SPEED[slot][0]})"
+    if slot in CLOSURE:
+        return f"closed + {_macro(slot)}"
+    if slot in ROW:
+        return f"line + {_macro(slot)}"
+    if slot in _OF_ROWS:
+        return f"loops + MSTMM_ROW * (int64_t){_OF_ROWS[slot]} + {_macro('row.' + name)}"
     for layout, start in ((MODES, "modes"), (SECTION, "laid"), (BEND, "bend"), (PORT, "port")):
         if slot in layout:
             return f"{start} + {_macro(slot)}(n)"
@@ -251,6 +293,15 @@ def _stored(slot: str) -> str | None:
 
 def _macro(slot: str) -> str:
     return f"MSTMM_{slot.replace('.', '_').upper()}"
+
+
+def _listed(layout: Mapping[str, int], total: str) -> list[str]:
+    """Constants of where the slots of a layout begin, and of how long it is."""
+    lines, at = [], 0
+    for slot, count in layout.items():
+        lines.append(f"#define {_macro(slot)} {at}")
+        at += count
+    return [*lines, f"#define {total} {at}"]
 
 
 def _per_mode(layout: dict[str, tuple[int, int]]) -> list[str]:
@@ -330,6 +381,8 @@ def layout_header() -> str:
         + "\n".join(rows)
         + "\n/* Flexible bodies and sections: arrays behind so many numbers per mode. */\n"
         + "\n".join([*_per_mode(MODES), *_per_mode(SECTION)])
+        + "\n/* A hinge that closes a loop; a row. */\n"
+        + "\n".join([*_listed(CLOSURE, "MSTMM_CLOSURE"), *_listed(ROW, "MSTMM_ROW")])
         + "\n/* cdef end */\n\n"
         + "/* Arrays of a flexible body of n modes, and of one of its sections. */\n"
         + "\n".join([*_offsets(MODES, _PAIRS), *_offsets(SECTION, "")])

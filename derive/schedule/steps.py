@@ -128,6 +128,21 @@ class Along(Step):
 
 
 @dataclass(frozen=True)
+class Each(Step):
+    """Steps for each of
+
+    `of`: "closings", the rows that close on a body, where the passes done are those of rows, and
+    "openings", the same the other way round; "pending", the rows whose columns go across its hinge;
+    "before", those of them up to the one at hand; "rows", the rows of a hinge that closes a loop,
+    each in direction number c; "others", the rows that a row is coupled with when it closes;
+    "seconds", those of them up to the one at hand.
+    """
+
+    of: str = ""
+    steps: tuple[Step, ...] = ()
+
+
+@dataclass(frozen=True)
 class ByScrew(Step):
     """Steps chosen by what is known of a rotation and a position when code is made for a scene.
 
@@ -222,7 +237,7 @@ def inner(step: Step) -> Iterator[Step]:
     """The step and every step inside it."""
     yield step
     parts: tuple[Step, ...] = ()
-    if isinstance(step, (EachSpeed, Along)):
+    if isinstance(step, (EachSpeed, Along, Each)):
         parts = step.steps
     elif isinstance(step, ByScrew):
         parts = (*step.about_x, *step.about_z, *step.turning, *step.otherwise)

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from .flexible import DRAG, MOMENTUM, SECTION_MOTION, STRAIN
 from .inverse import REQUIRED
 from .laws_alone import LAWS_ALONE, LAWS_SOLUTION, RATES_CHANGE
 from .links import LINK_ANGLE, LINK_CONDENSE, LINK_FORWARD, LINK_RECOVER
 from .loads import DRIVE_POWER, EFFORTS, EFFORTS_POWER, FORCES, LAWS, LOADS
+from .loops import (
+    ANSWERED,
+    CARRIED,
+    CLOSURES,
+    CLOSURES_ANSWERED,
+    ROW_CLOSED,
+    ROW_FOUND,
+    UNLOADED,
+)
 from .motion import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
 from .qr import QR_CONDENSE, QR_OWN
 from .riccati import CONDENSE, RECOVER
@@ -35,6 +46,17 @@ _APPLIED = (
     Run(whole=FORCES, when="posed"),
 )
 
+#: Rows closed and multipliers found, in place of `condense` and `recover`.
+_CLOSED = (
+    Run(hook="rows_begun"),
+    Run(whole=CLOSURES),
+    Run(whole=CARRIED),
+    Run(whole=ROW_CLOSED),
+    Run(whole=ROW_FOUND),
+    Run(whole=ANSWERED),
+    Run(whole=CLOSURES_ANSWERED),
+)
+
 ACCELERATIONS = Sweep(
     "accelerations", "Rates of the coordinates and accelerations.",
     (
@@ -52,9 +74,10 @@ ACCELERATIONS = Sweep(
         Run(hook="product", when="product"),
         Run(hook="links_condense", when="linked"),
         Run(hook="links_recover", when="linked"),
-        Run(whole=CONDENSE, when="!linked !qr"),
+        Run(whole=CONDENSE, when="!linked !qr !looped"),
         Run(whole=QR_CONDENSE, when="qr"),
-        Run(whole=RECOVER, when="!linked"),
+        Run(whole=RECOVER, when="!linked !looped"),
+        *(replace(run, when="looped") for run in _CLOSED),
         Run(whole=DRIVE_POWER, when="balance"),
         Run(hook="product_compared", when="product"),
     ),
@@ -74,6 +97,20 @@ INVERSE_DYNAMICS = Sweep(
     ),
 )  # fmt: skip
 
+CORRECTION = Sweep(
+    "correction",
+    "The least change, by inertia, that closes gaps or stops slips of closed loops.",
+    (
+        Run(whole=PRESCRIBED),
+        Run(hook="drive_values", when="driven"),
+        Run(whole=DRIVES, when="driven"),
+        Run(whole=FORWARD),
+        Run(whole=POSES),
+        Run(whole=UNLOADED),
+        *_CLOSED,
+    ),
+)
+
 MOTION = Sweep(
     "motion", "Poses and velocities of all bodies.",
     (*_GIVEN, Run(whole=FORWARD), Run(whole=POSES)),
@@ -91,8 +128,8 @@ SOLUTION = Sweep(
     (Run(whole=COLUMN), Run(whole=COLUMN_CARRIED), Run(whole=COLUMN_ANSWERED)),
 )
 
-SWEEPS = (GIVEN, ACCELERATIONS, INVERSE_DYNAMICS, MOTION, POSED, FACTORISATION, SOLUTION,
-          DIRECTIONAL, APPLIED_SLOPE, TANGENT, BROUGHT, TANGENT_SOLUTION,
+SWEEPS = (GIVEN, ACCELERATIONS, INVERSE_DYNAMICS, CORRECTION, MOTION, POSED, FACTORISATION,
+          SOLUTION, DIRECTIONAL, APPLIED_SLOPE, TANGENT, BROUGHT, TANGENT_SOLUTION,
           TANGENT_BEYOND, LAWS_ALONE, LAWS_SOLUTION)  # fmt: skip
 
 #: Passes that the looped engine's own C does for one subject at a time: links and what lies between

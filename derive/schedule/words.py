@@ -14,7 +14,7 @@ from dataclasses import dataclass
 CONSTANTS = {"identity": "axes without a turn", "zero": "zeros", "none": "no numbers at all"}
 
 #: Owners that stand for a body by its role.
-ROLES = ("parent", "on", "axes", "from", "to")
+ROLES = ("parent", "on", "axes", "from", "to", "outboard", "meeting")
 
 
 @dataclass(frozen=True)
@@ -140,6 +140,40 @@ outer.S | 21 | S handed on to what the link hangs on
 outer.e | 6 | e handed on
 inner.S | 21 | S of what hangs on the link
 inner.e | 6 | e of what hangs on the link
+closure.turn | 9 | rotation, axes of C to axes of B where the loop is closed
+closure.end | 3 | the end of B that the hinge holds, axes of B
+closure.R_C | 9 | rotation, axes of C to axes of B
+closure.d | 3 | the end of B from the origin of C, axes of C
+closure.lever | 3 | the end of B from P of A, axes of A
+closure.gap | 6 | gap, axes of C
+closure.slip | 6 | relative motion of the end of B, axes of C
+closure.W | 36 | directions: own speeds, then what the hinge holds; a row each
+closure.J_A | 36 | rows by the acceleration of A
+closure.J_B | 36 | rows by the acceleration of B
+closure.l | 6 | rows of what is known
+side.inner | 6 | column of the row at hand, on the side of A
+side.outer | 6 | column of the row at hand, on the side of B
+line.known | 1 | known part of the row at hand
+line.x | 1 | its multiplier
+row.K | 6 | column on the body where the row closes
+row.known | 1 | known part
+row.pivot | 1 | its own entry of L
+row.inverse | 1 | 1 / L, zero for a row that nothing moves
+row.x | 1 | multiplier
+row.floor | 1 | largest pivot that is rounding
+other.K | 6 | column of a row that stays
+other.known | 1 | its known part
+other.x | 1 | its multiplier
+other.L | 1 | its entry of L with the row that closes
+second.L | 1 | entry of L of another that stays with the row that closes
+both.L | 1 | entry of L of the two that stay
+pending.K | 6 | column of a row that is open
+pending.onward | 6 | its column on the parent
+pending.y | free | -H^T K
+pending.known | 1 | its known part
+pending.x | 1 | its multiplier
+before.y | free | -H^T K of another open row
+pair.L | 1 | entry of L of both
 drive.value | 1 | value of the drive
 drive.rate | 1 | its rate
 drive.acceleration | 1 | its acceleration
@@ -297,6 +331,13 @@ TRAITS: dict[str, str] = {
     "posed": "loads or force elements need poses",
     "shifted": "some increments of a right-hand side are known",
     "united": "a load is one in a right-hand side",
+    "looped": "loops are closed",
+    "cut": "the hinge closes a loop",
+    "aside": "the hinge closes a loop, or the body is idle",
+    "corrected": "a gap or a slip is to be corrected",
+    "soft": "the row is that of a rotor",
+    "gaping": "a gap",
+    "slipping": "a slip",
     "qr": "the sweep is that of least squares",
     "rigid": "the body is the built-in rigid one",
     "kept": "somebody reads S and e behind the sweep",

@@ -19,6 +19,7 @@ from ..schedule.steps import (
     ChooseBias,
     Copy,
     Do,
+    Each,
     EachSpeed,
     Evaluate,
     Gather,
@@ -142,6 +143,8 @@ class _Steps:
             return [f"{indent}for {which}:", *self.lines(step.steps, depth + 1)]
         if isinstance(step, Along):
             return [f"{indent}along {_DIRECTIONS[step.of]}:", *self.lines(step.steps, depth + 1)]
+        if isinstance(step, Each):
+            return [f"{indent}for {_EACH[step.of]}:", *self.lines(step.steps, depth + 1)]
         told = self._call(step) if isinstance(step, Call) else _TOLD[type(step)](step)
         return textwrap.wrap(
             indent + told, WIDTH, subsequent_indent=indent + "    ", break_long_words=False,
@@ -185,6 +188,17 @@ _DIRECTIONS = {
     "spin": "every entry c of the body's angular velocity",
     "place": "every entry c of a change of the body's place",
     "turn": "every entry c of a turn of the body",
+}
+
+#: Rows met one by one.
+_EACH = {
+    "closings": "every row that closes on the body",
+    "openings": "every row that closes on the body, the other way round",
+    "pending": "every row that is open across the hinge",
+    "before": "every open row up to this one",
+    "rows": "every row of the hinge, in direction c",
+    "others": "every row that is coupled with it",
+    "seconds": "every such row up to this one",
 }
 
 

@@ -28,3 +28,5 @@ class Failed(IntEnum):
     """The tangent of a step leaves a motion undetermined."""
     CONTROLLER = 10
     """A controller measures, or gives, what is not finite."""
+    LOOP = 11
+    """A loop cannot be closed near a state."""

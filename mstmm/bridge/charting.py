@@ -63,6 +63,7 @@ def chart(
     within its part of the budget.
     """
     from ..runtime.chart.charting import charted, request
+    from ..runtime.pack.loops.refusal import INSTEAD, refuse
 
     asked = request(t_end, quantities, methods, models, error, budget, samples, rounds)
 
@@ -77,6 +78,7 @@ def chart(
         model = scene
     else:
         raise SceneError(f"scene = {scene!r:.60}: expected a Scene, or a Model of one")
+    refuse(model.packed, "a chart", INSTEAD)
     return charted(model, asked, compiled, title, progress or _quiet, state or _quiet)
 
 

@@ -323,6 +323,8 @@ def _obstacle(packed: Packed, most: int) -> str:
         return "the product of classical matrices is looped"
     if packed.qr:
         return "the sweep as least squares is looped"
+    if packed.system.closures:
+        return "closed loops are looped"
     hinges = {body.hinge for body in packed.system.distinct}
     if any(packed.elements[key].tape is not None for key in hinges):
         return "a hinge is interpreted because it was generated without a compiler"

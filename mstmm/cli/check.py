@@ -159,6 +159,11 @@ def _tree_lines(scene: Scene) -> list[str]:
         shown += run.count
     if shown < tree.count:
         lines.append(f"  ... and {tree.count - shown} more bodies")
+    for number in tree.cut[:_SHOWN]:
+        cut = skeleton.hinges[number]
+        lines.append(f"  {cut.name}: {cut.type} closes a loop: {cut.inboard} - {cut.outboard}")
+    if len(tree.cut) > _SHOWN:
+        lines.append(f"  ... and {len(tree.cut) - _SHOWN} more loops")
     return lines
 
 

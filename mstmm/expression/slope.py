@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from ..ir.graph import Graph
 from ..ir.tangent import derivatives
@@ -29,3 +29,35 @@ def slopes(expression: Expression, values: Callable[[Name], float]) -> dict[Name
         name: value(derivatives([root], {**still, leaf: 1})[0], number)
         for name, leaf in leaves.items()
     }
+
+
+def parted(
+    expression: Expression, names: Sequence[Name]
+) -> tuple[list[tuple[Name, ...] | None], bool]:
+    """What an expression is made of: per name of `names` the names on which the slope by it
+    depends, None where that slope is zero everywhere; and whether anything is left where all of
+    them are zero."""
+    graph = Graph()
+    leaves = {name: graph.element("names", i) for i, name in enumerate(expression.names)}
+    root = expression.build(graph, leaves.__getitem__)
+    still = dict.fromkeys(leaves.values(), 0)
+    ways: list[tuple[Name, ...] | None] = []
+    for name in names:
+        slope = derivatives([root], {**still, leaves[name]: 1})[0]
+        zero = slope.value == 0
+        used = _under(slope)
+        ways.append(None if zero else tuple(n for n, leaf in leaves.items() if leaf.number in used))
+    zeros = {name: graph.constant(0) if name in names else leaf for name, leaf in leaves.items()}
+    return ways, expression.build(graph, zeros.__getitem__).value != 0
+
+
+def _under(root: Node) -> set[int]:
+    """Numbers of the nodes that a node depends on, itself among them."""
+    seen: set[int] = set()
+    stack = [root]
+    while stack:
+        node = stack.pop()
+        if node.number not in seen:
+            seen.add(node.number)
+            stack.extend(node.args)
+    return seen

@@ -10,6 +10,7 @@ from .tables.beam import Beam
 from .tables.beam_keys import Modes, Section, Shapes
 from .tables.body import Body, End
 from .tables.chain import Chain
+from .tables.closures import Constraint, Coupling
 from .tables.elastic import Elastic
 from .tables.elastic_keys import Arrays, Box, ElasticEnd
 from .tables.flexible import Damping, Start
@@ -20,8 +21,8 @@ from .tables.loads import Event, Load, Spring
 from .tables.outside.inputs import Input, Output, Signal
 
 __all__ = [
-    "Arrays", "Beam", "Body", "Box", "Chain", "Damping", "Elastic", "ElasticEnd", "End", "Event",
-    "Friction", "Hinge", "Initial", "Input", "Law", "LawEntry", "Limits", "Load", "Modes", "Output",
-    "Scene", "Section", "Shapes", "Signal", "Spring", "SpringLaw", "Start", "load_scene", "read",
-    "split",
+    "Arrays", "Beam", "Body", "Box", "Chain", "Constraint", "Coupling", "Damping", "Elastic",
+    "ElasticEnd", "End", "Event", "Friction", "Hinge", "Initial", "Input", "Law", "LawEntry",
+    "Limits", "Load", "Modes", "Output", "Scene", "Section", "Shapes", "Signal", "Spring",
+    "SpringLaw", "Start", "load_scene", "read", "split",
 ]  # fmt: skip

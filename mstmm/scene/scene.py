@@ -15,7 +15,7 @@ from pydantic import ConfigDict, ValidationError, model_validator
 
 from ..ir.spec import ElementSpec
 from ..risk import Risk, sentences
-from .checks import flexible, types
+from .checks import couplings, flexible, types
 from .checks import scene as checks
 from .files.write import to_toml
 from .rules import written
@@ -92,7 +92,8 @@ class Scene(SceneTables):
         problems = types.problems(self, known_types)
         if not problems:
             with written.known(self.constants, self.channels):
-                problems = types.learn(self, known_types) + list(flexible.spins(self))
+                problems = types.learn(self, known_types)
+                problems = problems or [*couplings.problems(self), *flexible.spins(self)]
         if problems:
             raise report(problems, self._tables(), where)
 
@@ -101,7 +102,7 @@ class Scene(SceneTables):
 
     @model_validator(mode="after")
     def _settle(self) -> Scene:
-        for table in ("load", "event", "spring"):
+        for table in ("load", "event", "spring", "constraint", "coupling"):
             object.__setattr__(self, table, _named(table, getattr(self, table)))
         for table, elements in _at_roots(self).items():
             object.__setattr__(self, table, elements)
@@ -140,7 +141,7 @@ def _named(table: str, elements: tuple[Any, ...]) -> tuple[Any, ...]:
 #: The keys that refer to a body or an end of one.
 _REFERENCES = {
     "hinge": ("inboard", "outboard"), "chain": ("inboard",), "load": ("on",),
-    "spring": ("from_", "to"),
+    "spring": ("from_", "to"), "constraint": ("from_", "to"),
 }  # fmt: skip
 
 

@@ -228,6 +228,12 @@ class Calls:
                 "inertia, stiffness or damping holds it, or a negative stiffness cancels them; "
                 "take a shorter step, or give the motion inertia (law.inertia) or a spring"
             )
+        if reason == Failed.LOOP:
+            return (
+                f'hinge "{self.hinge_name(element)}" {at}: the loop that it closes is open, and '
+                "no state near closes it; start from model.assemble(q, u), or see whether a drive "
+                "asks for more than the mechanism can do"
+            )
         if reason == Failed.PRODUCT_PIVOT:
             return (
                 f'hinge "{self.hinge_name(element)}" {at}: the pivot of its classical matrix '

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, Self
 
+from mstmm.errors import NumericalFailure, SceneError
 from mstmm.scene import Scene
 
 from ..flexible.modal_body import ModalBody
@@ -18,6 +19,7 @@ from ..pack.packed import Packed
 from .code import Fusing, NotFused
 from .engine import Engine
 from .given import GivenInput, at_once, with_inputs
+from .loops.closed import Closed
 from .renewed import with_values
 from .slopes import Slopes
 
@@ -30,6 +32,7 @@ class Compiled:
         known: elements that are not prebuilt, by (kind, name).
         looped: the looped engine on the packed scene.
         fusion: what is known of the fused code of the scene.
+        closed: its closed loops, assembled; None for a tree.
     """
 
     def __init__(
@@ -43,6 +46,13 @@ class Compiled:
         self.scene, self.known = scene, known
         self._fusing, self._product_accuracy = fusing, product_accuracy
         self.looped = Engine(pack(scene, known, product_accuracy, least_squares=least_squares))
+        self.closed: Closed | None = None
+        if self.packed.system.closures:
+            try:
+                self.closed = Closed(self.looped, len(self.free_speeds))
+            except NumericalFailure as failure:
+                raise SceneError(f"scene: {failure}") from None
+            self.looped = self.closed.engine
         self.fusion: Fusing = fusing(self.packed, known or {}) if fusing else NotFused()
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -11,6 +11,7 @@ from mstmm.arrays import Array
 from mstmm.border.failures import Failed
 from mstmm.errors import NumericalFailure, UndeterminedMotion
 
+from ..pack.loops.refusal import INSTEAD, refuse
 from .calls import Calls
 from .culprit import culprit
 
@@ -91,6 +92,7 @@ class Engine(Calls):
 
     def mass_matrix(self, q: Array) -> Array:
         """(nu, nu) symmetric, of one state; driven coordinates as if free."""
+        refuse(self.packed, "the mass matrix of all speeds", INSTEAD)
         engine, still = self.inertia_alone, np.zeros(self.nu)
         memory = engine.start_memory()
         strained = engine.inverse_dynamics(0.0, q, still, still, memory)
@@ -106,6 +108,7 @@ class Engine(Calls):
         the others.  q (nq,) of one state; S is factored once, each column is O(bodies); of least
         squares there is no factor to keep, and each column is a sweep at rest with its efforts.
         Without `memory` nothing is released."""
+        refuse(self.packed, "the solution with columns of efforts", INSTEAD)
         engine = self.inertia_alone
         memory = engine.start_memory() if memory is None else memory
         if self.packed.qr:

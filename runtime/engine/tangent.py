@@ -15,6 +15,8 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
+from ..pack.loops.refusal import INSTEAD, refuse
+
 if TYPE_CHECKING:
     from .engine import Engine
 
@@ -29,6 +31,7 @@ class Tangent:
     def __init__(self, engine: Engine, memory: Array | None = None) -> None:
         self.engine = engine
         packed, ffi = engine.packed, engine.ffi
+        refuse(packed, "the tangent of the equations", INSTEAD)
         self.nq, self.nu = engine.nq, engine.nu
         self.state = np.zeros(self.nq), np.zeros(self.nu)
         slopes = packed.slopes()

@@ -23,6 +23,7 @@ from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.live import LiveInputs
 from ..engine.tangents import Tangents
+from ..pack.loops.refusal import INSTEAD, refuse
 from ..pack.slopes import slopes
 from ..pack.structure import structure_of
 
@@ -71,6 +72,7 @@ class Differentiation:
         self._model = model
         self.names = tuple(names)
         known = model.known or {}
+        refuse(model.packed, "exact derivatives", INSTEAD)
         _refuse(model)
         if names:
             structure, self.p, self.slopes = slopes(model.scene, known, names)

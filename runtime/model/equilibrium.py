@@ -14,6 +14,7 @@ from ..engine.rest import Rest, Undetermined, Unsettled, at_rest
 from ..engine.rest_by_sweep import RestBySweep
 from ..engine.sizes import speed_sizes
 from ..engine.tangent import Tangent
+from ..pack.loops.refusal import INSTEAD, refuse
 from ..run.system import SceneSystem
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ class Equilibrium(np.ndarray[Any, np.dtype[np.float64]]):
 
 def equilibrium(model: Compiled, q: Array, t: float, tolerance: float) -> Equilibrium:
     """q at which the free coordinates need no effort at rest; see `Model.equilibrium`."""
+    refuse(model.packed, "an equilibrium", INSTEAD)
     free = list(model.free_speeds)
     problem = _problem(model, t, free)
     try:

@@ -15,6 +15,7 @@ from ..engine.sizes import speed_sizes
 from ..linear.channels import GROUND, Channel, inputs_of, pushes_of
 from ..linear.linear import Linear
 from ..linear.matrices import State, matrices
+from ..pack.loops.refusal import INSTEAD, refuse
 from ..run.start import initial_state
 from ..run.system import SceneSystem
 from .derivatives import Differentiation
@@ -33,6 +34,7 @@ class Linearising:
     """Makes one model linear, at many states."""
 
     def __init__(self, model: Compiled) -> None:
+        refuse(model.packed, "a linear model", INSTEAD)
         self._model = model
         system, layout = model.packed.system, model.layout
         twists = any(law.twist >= 0 for law in system.laws)

@@ -20,8 +20,10 @@ from ..engine.compiled import Compiled
 from ..engine.given import GivenInput
 from ..integrate.settings import Settings, checked, times_of
 from ..pack.layout import refuse_dense
+from ..pack.loops.refusal import INSTEAD, refuse
 
 if TYPE_CHECKING:
+    from ..engine.loops.closed import Loops
     from ..engine.solver import Solver
     from ..linear.harmonic.counted import ExactModes
     from ..linear.harmonic.exact import Chosen
@@ -63,6 +65,35 @@ class Model(Compiled):
         from ..run.start import initial_state
 
         return initial_state(self)
+
+    @property
+    def loops(self) -> Loops:
+        """What closes in the scene: cut hinges, rows and those that repeat others, mobility."""
+        from ..engine.loops.closed import Loops
+
+        return Loops() if self.closed is None else self.closed.loops
+
+    def assemble(
+        self,
+        q: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        hold: Sequence[str] = (),
+    ) -> tuple[Array, Array]:
+        """The nearest (q, u) at which all loops are closed; near the start where nothing is given.
+
+        q (nq,) and u (nu,) are wishes, but for the coordinates of the hinges named in `hold`, and
+        for the speeds of hinges that have some, which stay what they are; driven coordinates are
+        those at t = 0.  What changes changes least, by inertia.  Without loops the state itself.
+
+        Raises SceneError for a hinge that there is not, for loops that do not close near the
+        state, and for speeds that contradict each other.
+        """
+        from .assemble import assemble
+
+        start = self.initial_state()
+        wish_q = start[0] if q is None else one("q", q, self.nq, "assemble takes one state")
+        wish_u = start[1] if u is None else one("u", u, self.nu, "assemble takes one state")
+        return assemble(self, wish_q, wish_u, hold)
 
     def refuse_undetermined_start(self) -> None:
         """SceneError naming the hinges if the masses leave a motion of the start undetermined."""
@@ -116,6 +147,7 @@ class Model(Compiled):
         does not fit.
         """
         engine = self.looped
+        refuse(self.packed, "inverse dynamics", INSTEAD)
         memory, nu = engine.start_memory(), self.nu
         lead, (times, coordinates, speeds, rates) = batch(
             ("t", t, None), ("q", q, self.nq), ("u", u, nu), ("udot", udot, nu)

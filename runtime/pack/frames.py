@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from mstmm.graph.mechanism import GROUND
 from mstmm.scene import Scene, split
-from mstmm.scene.checks.topology import GROUND_INDEX, Topology
+from mstmm.scene.checks.topology import Topology
 
 from ..flexible.modal_body import ModalBody
 from .elements import Elements
@@ -52,7 +53,7 @@ class Frames:
         """(body position, axes (9), offset (3)) of "body" or "body.end", internal axes."""
         name, at = split(self.expanded.nodes.get(reference, reference))
         if name == "ground":
-            return GROUND_INDEX, (1, 0, 0, 0, 1, 0, 0, 0, 1), (0.0, 0.0, 0.0)
+            return GROUND, (1, 0, 0, 0, 1, 0, 0, 0, 1), (0.0, 0.0, 0.0)
         place = self.placements[name]
         body = self.scene.bodies.by_name[name]
         axes = place.axes(body.end_rotation(at))

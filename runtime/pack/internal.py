@@ -23,6 +23,9 @@ from .flexible.expansion import Expanded, expand
 from .frames import Frames
 from .laws import laws_of
 from .letting_go import releasable
+from .loops.closures import closures_of
+from .loops.opened import opened
+from .loops.unknown import refuse_unknown
 from .slots import layout_of
 from .system import ForceNumbers, Held, LoadNumbers, Numbers, System
 from .values import MOVING, Moving, Values, drive_kernel, effort_kernel
@@ -34,7 +37,9 @@ def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) 
     `flexible` are the numbers of all modal bodies where they are known already.
     """
     if not (scene.beam or scene.elastic):
-        return Expanded(scene, scene, {})
+        nodes, cuts = opened(scene)
+        return Expanded(nodes, scene, {}, cuts=cuts)
+    refuse_unknown(scene)
     from ..flexible.bodies import modal_bodies
     from .flexible.rigidified import rigidified
 
@@ -84,7 +89,7 @@ def system_of(
         values.kernel() if len(values) else None,
         drive_kernel([drive for _, _, drive in driven], layout, ports) if driven else None,
         tuple((place, k) for place, k, _ in driven), tuple(scene.channels.values()),
-        held, by_time(nodes, nodes.channels), moving or {},
+        held, by_time(nodes, nodes.channels), moving or {}, tuple(closures_of(frames, runs)),
     )  # fmt: skip
     return system, frames
 

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 from mstmm.errors import SceneError
 
+from .loops.refusal import refuse
+
 if TYPE_CHECKING:
     from mstmm.scene import Hinge
 
@@ -33,6 +35,7 @@ def _kind(hinge: Hinge) -> str | None:
 def attach(packed: Packed, accuracy: float) -> None:
     """Let the packed scene use the product.  SceneError for a scene it has no matrices for."""
     scene, lib = packed.scene, packed.lib
+    refuse(packed, 'sweep = "product"', 'use sweep = "riccati"')
     _refuse(packed)
     packed.product = record = packed.ffi.new("mstmm_product *")
     record.kind = getattr(lib, f"MSTMM_PRODUCT_{_kind(scene.hinges[0])}")

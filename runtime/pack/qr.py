@@ -9,6 +9,8 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
+from .loops.refusal import refuse
+
 if TYPE_CHECKING:
     from .packed import Packed
     from .system import BodyNumbers
@@ -26,6 +28,7 @@ def attach(packed: Packed) -> None:
     negative moments of inertia, which no rows have.
     """
     way_out = 'use sweep = "riccati"'
+    refuse(packed, 'sweep = "qr"', way_out)
     if packed.flexible:
         name = next(iter(packed.flexible))
         raise SceneError(
@@ -68,6 +71,8 @@ def _least(matrix: Array) -> float:
 def refuse_steps(packed: Packed) -> None:
     """SceneError for steps that are not made from accelerations: the tangent of an implicit method
     and the classical matrices lose the digits again that this sweep keeps."""
+    instead = "use an explicit one (dop853, dopri5, rk4)"
+    refuse(packed, "an implicit or classical method", instead)
     if packed.qr:
         raise SceneError(
             'sweep = "qr" makes accelerations, which implicit and classical methods do not ask '

@@ -218,6 +218,19 @@ class Held:
     start: Numbers = ()
 
 
+@dataclass(frozen=True, slots=True)
+class ClosureNumbers:
+    """A hinge that closes a loop: the body without mass at place `frame` is to be where an end of
+    the body at place `outboard` is, its axes turned by `turn` (9) and its origin at `end` (3) in
+    that body's.  `directions` are those of the rows: 0 to 5, the hinge's speeds first."""
+
+    frame: int
+    outboard: int
+    turn: Numbers
+    end: Numbers
+    directions: tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class System:
     """A scene in internal frames.
@@ -226,7 +239,8 @@ class System:
     of each of `driven` (place of the body, coordinate).  `inputs` are inputs and signals over time,
     whose numbers expressions read, of which some may be `held`; `by_time` says whether an
     effort or load names the time, or an input that does not stand still.  `moving` are the numbers
-    in expressions that carry derivatives, by their places in the port "moving".
+    in expressions that carry derivatives, by their places in the port "moving".  `closures` are the
+    hinges that close loops, in the order in which those that end at one body are closed.
     """
 
     nq: int
@@ -244,6 +258,7 @@ class System:
     held: Held
     by_time: bool
     moving: Mapping[int, Any]
+    closures: tuple[ClosureNumbers, ...] = ()
 
     def awake(self, place: int) -> System:
         """The same where the body at a place of the tree is none that is idle."""

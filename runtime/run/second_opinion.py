@@ -23,6 +23,7 @@ from ..engine.jacobian import Jacobian
 from ..host.interruptible import interruptible
 from ..integrate.loop import Failure, Samples, Statistics, Status, failure_text
 from ..integrate.settings import Settings
+from ..pack.loops.refusal import refuse
 from . import sundials
 from .crossings import Crossings, Sight, dip, just_before
 from .endings import busiest, cause_of
@@ -133,6 +134,7 @@ def integrate(
     Raises SceneError for a fixed step, and by SUNDIALS for a scene without coordinates;
     EnvironmentFailure where the package is not installed.
     """
+    refuse(model.packed, f'method "{settings.method}"', "use dop853, dopri5 or rk4")
     if settings.step is not None:
         raise SceneError(f'method "{settings.method}" chooses its own steps: leave step out')
     if settings.method in sundials.METHODS:

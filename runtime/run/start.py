@@ -15,6 +15,9 @@ def initial_state(compiled: Compiled) -> tuple[Array, Array]:
     """(q, u) at t = 0.  Raises NumericalFailure where a static shape is not found."""
     packed, engine = compiled.packed, compiled.looped
     q, u = start_values(packed.scene, compiled.layout, packed.flexible)
+    if compiled.closed is not None:
+        q, u = compiled.closed.start
+        return q.copy(), u.copy()
     y = SceneSystem(engine).start(0.0, q, u)
     q, u = y[: compiled.nq], y[compiled.nq : compiled.nq + compiled.nu]
     described = (*packed.described.beam, *packed.described.elastic)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array
-from mstmm.errors import NumericalFailure
+from mstmm.border.failures import Failed
+from mstmm.errors import NumericalFailure, SceneError
 from mstmm.ir.tape import Tape
 
 from ..engine.calls import Probe
@@ -154,12 +155,17 @@ class SceneSystem:
         return y
 
     def start(self, t: float, q: ArrayLike, u: ArrayLike) -> Array:
-        """State vector at t with driven coordinates, quaternions and memory in order."""
+        """State vector at t with driven coordinates, quaternions, loops and memory in order.
+
+        Raises SceneError where a loop does not close near the state.
+        """
         y = np.concatenate(
             [np.asarray(q, float), np.asarray(u, float), np.zeros(int(self.with_power))]
         )
         y = np.ascontiguousarray(y)
         self.engine.lib.mstmm_scene_settle(self.run, t, self.engine.pointer(y))
+        if self.run.failure.reason == Failed.LOOP:
+            raise SceneError(f"scene: {self.engine.failure_text(self.run.failure, t)}")
         return y
 
     def components(self) -> StateNames:

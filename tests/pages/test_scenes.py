@@ -13,6 +13,8 @@ from mstmm.scene import (
     Body,
     Box,
     Chain,
+    Constraint,
+    Coupling,
     Damping,
     Elastic,
     ElasticEnd,
@@ -65,7 +67,7 @@ def test_scene_runs(block: str, tmp_path: Path) -> None:
     [
         Scene, Body, Hinge, Chain, Law, Friction, Limits, Load, Spring, SpringLaw, Event, Beam,
         Section, Modes, Shapes, Damping, Start, Elastic, ElasticEnd, Arrays, Box, Input, Signal,
-        Output,
+        Output, Constraint, Coupling,
     ],
     ids=lambda t: t.__name__,
 )  # fmt: skip

@@ -63,7 +63,7 @@ class Hinge:
 
 @dataclass(frozen=True)
 class Tree:
-    """`order` lists hinge numbers from the root outwards."""
+    """`order` lists hinge numbers from the root outwards, but for those that close loops."""
 
     bodies: tuple[Body, ...]
     hinges: tuple[Hinge, ...]
@@ -148,7 +148,10 @@ def _hinge(data: Mapping[str, Any], tree: Tree, nq: int, nu: int) -> Hinge:
 
 
 def read(scene: Mapping[str, Any] | Tree) -> Tree:
-    """Tree of a scene dictionary; ValueError if the hinges do not form a tree on ground."""
+    """Tree of a scene dictionary; ValueError if a body is not held.
+
+    Hinges whose outboard body is held already close loops: they are not in `order`.
+    """
     if isinstance(scene, Tree):
         return scene
     bodies = tuple(_body(b) for b in scene.get("body") or ())
@@ -162,10 +165,7 @@ def read(scene: Mapping[str, Any] | Tree) -> Tree:
         nq, nu = hinges[-1].q.stop, hinges[-1].u.stop
     order: list[int] = []
     held = {-1}
-    while len(order) < len(hinges):
-        ready = [i for i, h in enumerate(hinges) if h.parent in held and h.child not in held]
-        if not ready:
-            raise ValueError("the hinges do not form a tree on ground")
+    while ready := [i for i, h in enumerate(hinges) if h.parent in held and h.child not in held]:
         order.append(ready[0])
         held.add(hinges[ready[0]].child)
     if len(held) != len(bodies) + 1:

@@ -87,17 +87,15 @@ def test_random_trees_against_the_definition(seed: int) -> None:
 
 NOT_TREES = [
     (
-        {"h1": ("ground", "a"), "h2": ("a.tip", "b"), "h3": ("ground", "b")},
-        ['hinge "h2": closes a loop of the hinges "h1", "h2", "h3"; closed loops come in a later'],
-    ),
-    ({"h1": ("ground", "a"), "h2": ("ground", "a")}, ['closes a loop of the hinges "h1", "h2"']),
-    (
         {"h1": ("ground", "a"), "h2": ("a.tip", "b"), "h3": ("c", "b.tip")},
-        ['hinge "h3": points towards the ground: "c" is', "swap inboard and outboard"],
+        ['body "c": held by no hinge; turn hinge "h3" round: swap its inboard and outboard'],
     ),
     (
         {"h1": ("ground", "a"), "h2": ("c", "a.tip"), "h3": ("b", "c")},
-        ['hinge "h2": points towards', 'hinge "h3": points towards'],
+        [
+            'body "c": held by no hinge; turn hinge "h2"',
+            'body "b": held by no hinge; turn hinge "h3"',
+        ],
     ),
     (
         {"h1": ("ground", "a"), "h2": ("b", "c")},
@@ -109,7 +107,7 @@ NOT_TREES = [
     ),
     (
         {"h1": ("ground", "a"), "h2": ("b", "c"), "h3": ("c", "b")},
-        ['closes a loop of the hinges "h2", "h3"', 'body "b": no hinge connects it (with c)'],
+        ['body "b": no hinge connects it (with c)'],
     ),
 ]
 
@@ -136,12 +134,6 @@ def test_no_hinge_at_all() -> None:
     with pytest.raises(SceneError) as caught:
         Scene(gravity=[0, 0, 0], body=[body("a"), body("b")])
     assert str(caught.value).count("no hinge connects it to the ground") == 2
-
-
-def test_a_long_ring_is_abbreviated() -> None:
-    edges = {f"h{i}": (f"b{i - 1}" if i else "ground", f"b{i}") for i in range(30)}
-    with pytest.raises(SceneError, match="and 23 more; closed loops come in a later release"):
-        Scene(**scene_of(edges | {"h30": ("ground", "b29")}))
 
 
 def test_a_copy_that_lost_its_hinges_is_refused_too() -> None:

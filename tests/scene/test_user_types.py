@@ -81,6 +81,16 @@ BAD = [
 ]
 
 
+def coupled(expression: str) -> dict[str, Any]:
+    return knee() | {"coupling": [{"expression": expression}]}
+
+
+def test_coordinates_of_a_type_that_is_not_known_yet_may_be_coupled() -> None:
+    Scene(**coupled("shoulder.q[0] - 2*shoulder.roll")).check_types(KNOWN)
+    with pytest.raises(SceneError, match="the last entry of hinge"):
+        Scene(**coupled("shoulder.q[2]")).check_types(KNOWN)
+
+
 @pytest.mark.parametrize(("data", "fragment"), BAD)
 def test_what_does_not_fit_the_definition(data: dict[str, Any], fragment: str) -> None:
     scene = Scene(**data)

@@ -10,6 +10,7 @@ from ...numbers.rotations import Vector, apply, dot, norm, unit
 from ...risk import Risk
 from ..rules.values import Location, split
 from ..tables.hinge_frames import start_motion
+from .topology import holders
 from .welded import lines as lines_of
 
 if TYPE_CHECKING:
@@ -66,29 +67,30 @@ def spins(scene: SceneTables) -> Iterator[Problem]:
     carriers = {name for name, _ in _carried(scene)}
     released = {hinge.name for hinge in scene.hinge if hinge.lets_go}
     released |= {event.hinge for event in scene.event if event.hinge is not None}
-    for i, beam, hinge in _held(scene):
+    holding: dict[str, list[Hinge]] = {beam.name: [] for beam in scene.beam}
+    for hinge in scene.hinge:
+        holding.get(hinge.outboard_body, []).append(hinge)
+    for i, beam in enumerate(scene.beam):
+        held = holding[beam.name]
         if any(piece.polar_inertia_per_length is not None for piece in beam.sections):
             continue
-        rotor = any(hinge.law.inertia)
+        rotor = any(any(hinge.law.inertia) for hinge in held)
         if beam.name in carriers or rotor:
             continue
-        free = _share(beam, hinge, _ALONG, hinge.name in released) > 1 - 1e-9
-        slid = hinge.facts is not None and set(hinge.facts.turns) & set(hinge.facts.slides)
-        if free and not slid:  # what slides as it turns is resisted by the mass
+        if held and all(_spins(beam, hinge, hinge.name in released) for hinge in held):
             yield (
                 ("beam", i, "polar_inertia_per_length"),
-                f'missing; hinge "{hinge.name}" lets the beam spin about its axis and nothing '
+                f'missing; hinge "{held[0].name}" lets the beam spin about its axis and nothing '
                 "resists it; expected rho I_p in kg m, more than 0, or rotary_inertia, or "
                 "another hinge",
             )
 
 
-def _held(scene: SceneTables) -> Iterator[tuple[int, Beam, Hinge]]:
-    """(number, beam, the hinge that holds it); checked to be one."""
-    holding = {hinge.outboard_body: hinge for hinge in scene.hinge}
-    for i, beam in enumerate(scene.beam):
-        if beam.name in holding:
-            yield i, beam, holding[beam.name]
+def _spins(beam: Beam, hinge: Hinge, released: bool) -> bool:
+    """Whether a hinge lets a beam spin about its axis, its mass not resisting."""
+    free = _share(beam, hinge, _ALONG, released) > 1 - 1e-9
+    slid = hinge.facts is not None and set(hinge.facts.turns) & set(hinge.facts.slides)
+    return free and not slid  # what slides as it turns is resisted by the mass
 
 
 def _carried(scene: SceneTables) -> Iterator[tuple[str, str]]:
@@ -148,14 +150,15 @@ def risks(scene: SceneTables) -> Iterator[Risk]:
                 "damping", name, f"{name}: damping: a ratio of {ratio:g} is critical or more",
                 "0.01 is 1 percent", ratio, 1.0, doubt=False, before=True,
             )  # fmt: skip
-    for _, beam, hinge in _held(scene):
-        if beam.model != "rigid":
-            yield from _loose_frame(beam, hinge)
+    held = holders(scene)
+    for beam in scene.beam:
+        if beam.model != "rigid" and beam.name in held:
+            yield from _loose_frame(beam, held[beam.name])
     for beam in scene.beam:
         if beam.model != "rigid":
             yield from _weak_basis(scene, beam)
     tangent = {e.name for e in scene.elastic if e.frame == "tangent" and e.model != "rigid"}
-    for hinge in scene.hinge:
+    for hinge in held.values():
         if hinge.outboard_body in tangent and free_axes(hinge):
             yield _loose(f'elastic "{hinge.outboard_body}"', hinge)
 

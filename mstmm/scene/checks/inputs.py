@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
 from ...errors import ExpressionError
@@ -116,7 +116,7 @@ def drives(scene: SceneTables) -> Iterator[Problem]:
             if [name for name in unknown if name != "t"]:
                 continue  # the hinge's own check has said so
             still = [n.text for n in entry.names if _has_no_rates(inputs.get(n.text))]
-            switch = _switch(entry, scene)
+            switch = switching(entry, scene.channels)
             if switch:
                 yield (
                     at,
@@ -133,11 +133,11 @@ def drives(scene: SceneTables) -> Iterator[Problem]:
                 yield from _start(scene, entry, at)
 
 
-def _switch(entry: Expression, scene: SceneTables) -> str:
-    """The first term that switches with an input; "" where there is none."""
+def switching(entry: Expression, names: Collection[str]) -> str:
+    """The first term that switches with one of these names; "" where there is none."""
     follows = set[int]()
     for number, term in enumerate(entry.terms):
-        if term.name is not None and term.name.text in scene.channels:
+        if term.name is not None and term.name.text in names:
             follows.add(number)
         elif any(i in follows for i in term.args):
             follows.add(number)

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 from ...expression.expression import Expression
 from ...risk import Risk
+from ..rules.inertia import negative_moment, triangle_excess
 from ..rules.messages import MAX_PROBLEMS, TABLES, Problem, near
 from ..rules.values import GROUND, Location, split
-from ..tables.inertia import negative_moment, triangle_excess
+from . import constraints, couplings, inputs, topology
 from . import flexible as flexible_bodies
-from . import inputs, topology
 from .angles import notes
 from .names import Scope, flexible, problem_with
 
@@ -29,8 +29,10 @@ def problems(scene: SceneTables) -> list[Problem]:
         return [(("body",), "a scene needs at least one body; add a [[body]]")]
     found = _first(_duplicates(scene), _references(scene), _inertias(scene),
                    inputs.problems(scene), flexible_bodies.problems(scene))  # fmt: skip
-    return found or _first(_expressions(scene), inputs.drives(scene), _tree(scene),
-                           flexible_bodies.spins(scene))  # fmt: skip
+    return found or _first(
+        _expressions(scene), inputs.drives(scene), constraints.repeated(scene),
+        couplings.problems(scene), _tree(scene), flexible_bodies.spins(scene),
+    )  # fmt: skip
 
 
 def _tree(scene: SceneTables) -> Iterator[Problem]:
@@ -95,6 +97,9 @@ def _references(scene: SceneTables) -> Iterator[Problem]:
     for i, spring in enumerate(scene.spring):
         yield from _end(spring.from_, scene, ("spring", i, "from"))
         yield from _end(spring.to, scene, ("spring", i, "to"))
+    for i, constraint in enumerate(scene.constraint):
+        yield from _end(constraint.from_, scene, ("constraint", i, "from"))
+        yield from _end(constraint.to, scene, ("constraint", i, "to"))
     hinges = {hinge.name: hinge for hinge in scene.hinge}
     for i, event in enumerate(scene.event):
         if event.hinge is None:

@@ -1,25 +1,27 @@
 """The tree of a scene: which body hangs on which, in the order in which the sweeps visit them.
 
-A chain is one node of the tree, whatever its length: its members follow one another.
+A chain is one node of the tree, whatever its length: its members follow one another.  Where hinges
+close loops, each body hangs on one of those that hold it, and the others are cut.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from ..rules.messages import report
+from ...graph.mechanism import GROUND
+from ...graph.plan import Plan, planned
+from ..rules.messages import Problem, report
 from ..rules.values import split
+from . import tree
+from .joints import Joints
 
 if TYPE_CHECKING:
     from ..tables.all import SceneTables
-
-GROUND_INDEX = -1
-Problem = tuple[tuple[str | int, ...], str]
+    from ..tables.hinge import Hinge
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +66,19 @@ class Topology:
 
     The next member of a chain comes before what else hangs on a member.  `runs` are the tree in
     that order; `links` and what follows from it are made when first asked for, an object per body.
+
+    `plan` says how loops, constraints and couplings close, None where there is nothing to close:
+    bodies and hinges by their numbers in the scene; its rows are those of the cut hinges, of the
+    constraints and of the couplings, in this order.
     """
 
     runs: tuple[Run, ...]
+    plan: Plan | None = None
+
+    @property
+    def cut(self) -> tuple[int, ...]:
+        """The scene's hinges that are not part of the tree."""
+        return () if self.plan is None else self.plan.cut
 
     @property
     def count(self) -> int:
@@ -79,7 +91,7 @@ class Topology:
         parents = self.parents
         children: list[list[int]] = [[] for _ in parents]
         for place, parent in enumerate(parents):
-            if parent != GROUND_INDEX:
+            if parent != GROUND:
                 children[parent].append(place)
         return tuple(
             Link(
@@ -134,7 +146,7 @@ class Topology:
         return run.place + body - run.body
 
     def place_of_hinge(self, hinge: int) -> int:
-        """Place of the body whose inboard hinge is the scene's hinge."""
+        """Place of the body whose inboard hinge is the scene's hinge, which must not be cut."""
         firsts, runs = self._by_hinge
         run = runs[bisect_right(firsts, hinge) - 1]
         return run.place + hinge - run.hinge
@@ -148,7 +160,7 @@ class Topology:
     @property
     def roots(self) -> tuple[int, ...]:
         """Positions of the bodies hinged to the ground."""
-        return tuple(run.place for run in self.runs if run.parent == GROUND_INDEX)
+        return tuple(run.place for run in self.runs if run.parent == GROUND)
 
     @property
     def is_chain(self) -> bool:
@@ -157,88 +169,84 @@ class Topology:
 
 
 def build(scene: SceneTables) -> Topology:
-    """The tree of a scene.  O(tables), no recursion.
+    """The tree of a scene.  O(tables) without loops, no recursion.
 
-    Raises SceneError, one line per problem, for closed loops, hinges written the wrong way round
-    and bodies that no hinge connects to the ground.
+    Raises SceneError, one line per problem, for hinges written the wrong way round, wishes of what
+    to cut that leave no tree, and bodies that no hinge connects to the ground.
     """
-    tree = _tree(_Graph(scene))
-    if tree is None:
+    joints = Joints(scene)
+    found = _tree(joints)
+    if found is None:
         tables = {"body": scene.body, "hinge": scene.hinge, "chain": scene.chain}
-        raise report(list(problems(scene)), tables, "scene")
-    return tree
+        raise report(list(tree.problems(joints)), tables, "scene")
+    return found
 
 
-class _Graph:
-    """Nodes are the scene's bodies, then its chains; edges its hinges, then the chains' first."""
-
-    def __init__(self, scene: SceneTables) -> None:
-        self.scene = scene
-        self.index = {body.name: i for i, body in enumerate(scene.body)}
-        self.nodes = len(scene.body) + len(scene.chain)
-        self.inboard = [hinge.inboard for hinge in scene.hinge]
-        self.inboard += [chain.inboard for chain in scene.chain]
-        self.outboard = [self.index[hinge.outboard_body] for hinge in scene.hinge]
-        self.outboard += range(len(scene.body), self.nodes)
-
-    def holder(self, edge: int) -> tuple[int, int]:
-        """(node on which an edge hangs, member of it where it is a chain); -1: the ground."""
-        name = split(self.inboard[edge])[0]
-        known = self.index.get(name)
-        if known is not None:
-            return known, 0
-        place = self.scene.bodies.place(name)
-        return (GROUND_INDEX, 0) if place is None else (len(self.index) + place[0], place[1])
-
-    def place(self, edge: int) -> tuple[str, int]:
-        """Table and number of an edge."""
-        hinges = len(self.scene.hinge)
-        return ("hinge", edge) if edge < hinges else ("chain", edge - hinges)
-
-    def name(self, node: int) -> str:
-        """What a message calls a node."""
-        bodies = len(self.scene.body)
-        return self.scene.body[node].name if node < bodies else self.scene.chain[node - bodies].name
-
-    def edge_name(self, edge: int) -> str:
-        table, number = self.place(edge)
-        name: str = getattr(self.scene, table)[number].name
-        return f"{name}[0].hinge" if table == "chain" else name
+def holders(scene: SceneTables) -> dict[str, Hinge]:
+    """Per name of a body the hinge of the tree that holds it; of a scene whose tree there is."""
+    skeleton = scene.skeleton
+    loops = len(skeleton.hinge) > len(skeleton.body)  # every body is held
+    cut = set(build(skeleton).cut) if loops else set()
+    return {h.outboard_body: h for number, h in enumerate(scene.hinge) if number not in cut}
 
 
-def _tree(graph: _Graph) -> Topology | None:
-    """The tree, or None if the hinges are not one."""
-    nodes = graph.nodes
-    if len(graph.outboard) != nodes:
-        return None
-    # Per node (-1: the ground) its children, as (member that holds it, child).
-    children: list[list[tuple[int, int]]] = [[] for _ in range(nodes + 1)]
-    edge_of, holder_of = [0] * nodes, [(GROUND_INDEX, 0)] * nodes
-    for edge, child in enumerate(graph.outboard):
-        edge_of[child], holder_of[child] = edge, graph.holder(edge)
-        parent, member = holder_of[child]
+def problems(scene: SceneTables) -> Iterator[Problem]:
+    """Places and messages of everything that keeps the hinges from holding every body."""
+    yield from tree.problems(Joints(scene))
+
+
+def _tree(joints: Joints) -> Topology | None:
+    """The tree, or None where there is none."""
+    scene, plan = joints.scene, None
+    held = _only(joints)
+    if held is None or scene.constraint or scene.coupling:
+        if next(tree.problems(joints), None) is not None:
+            return None
+        plan = planned(joints.by_bodies())
+        chains = range(len(scene.hinge), len(joints.outboard))
+        held = [*plan.tree[: len(scene.body)], *chains]
+    runs = _runs(joints, held)
+    covered = sum(run.count for run in runs) == len(scene.bodies)
+    return Topology(runs, plan) if covered else None
+
+
+def _only(joints: Joints) -> list[int] | None:
+    """Per node the edge that holds it; None where one has none or several, or must not have it."""
+    held = [-1] * joints.nodes
+    for edge, node in enumerate(joints.outboard):
+        held[node] = edge
+    cut = any(hinge.cut for hinge in joints.scene.hinge)
+    return None if cut or -1 in held or len(joints.outboard) > joints.nodes else held
+
+
+def _runs(joints: Joints, held: Sequence[int]) -> tuple[Run, ...]:
+    """The runs of the tree in which `held` is the edge of every node."""
+    # Per node (last: the ground) its children, as (member that holds it, child).
+    children: list[list[tuple[int, int]]] = [[] for _ in range(joints.nodes + 1)]
+    holder_of = [joints.holder(edge) for edge in held]
+    for child, (parent, member) in enumerate(holder_of):
         children[parent].append((member, child))
     for siblings in children:
         # Popped from the end: what hangs farthest out on a chain comes first.
         siblings.sort(key=lambda one: (one[0], -one[1]))
     runs: list[Run] = []
-    first = [0] * (nodes + 1)
-    bodies, places = graph.scene.bodies, 0
-    stack = [child for _, child in children[GROUND_INDEX]]
+    first = [0] * (joints.nodes + 1)
+    places = 0
+    stack = [child for _, child in children[GROUND]]
     while stack:
         node = stack.pop()
         parent, member = holder_of[node]
-        at = GROUND_INDEX if parent == GROUND_INDEX else first[parent] + member
-        runs.append(_run(graph, node, edge_of[node], places, at))
+        at = GROUND if parent == GROUND else first[parent] + member
+        runs.append(_run(joints, node, held[node], places, at))
         first[node] = places
         places += runs[-1].count
         stack.extend(child for _, child in children[node])
-    return Topology(tuple(runs)) if places == len(bodies) else None
+    return tuple(runs)
 
 
-def _run(graph: _Graph, node: int, edge: int, place: int, parent: int) -> Run:
-    scene = graph.scene
-    inboard_end = split(graph.inboard[edge])[1]
+def _run(joints: Joints, node: int, edge: int, place: int, parent: int) -> Run:
+    scene = joints.scene
+    inboard_end = split(joints.inboard[edge])[1]
     bodies, hinges = len(scene.body), len(scene.hinge)
     if node < bodies:
         outboard_end = scene.hinge[edge].outboard_end
@@ -246,111 +254,3 @@ def _run(graph: _Graph, node: int, edge: int, place: int, parent: int) -> Run:
     chain = scene.chain[node - bodies]
     body, hinge = scene.bodies.starts[node - bodies], scene.hinges.starts[edge - hinges]
     return Run(body, hinge, chain.count, place, parent, inboard_end, "", chain.held_ends)
-
-
-# --- what is not a tree ---------------------------------------------------------------------------
-
-
-@dataclass
-class _Component:
-    """Nodes that hinges connect, walked from one of them without regard to direction.
-
-    `via[node]` = (node before it, edge); `closing` are the edges that close a loop.
-    """
-
-    nodes: list[int]
-    via: dict[int, tuple[int, int]]
-    turned: list[int]
-    closing: list[tuple[int, int, int]]
-
-
-def problems(scene: SceneTables) -> Iterator[Problem]:
-    """Places and messages of everything that keeps the hinges from being a tree."""
-    graph = _Graph(scene)
-    edges: list[list[tuple[int, int, bool]]] = [[] for _ in range(graph.nodes + 1)]
-    for edge, outboard in enumerate(graph.outboard):
-        inboard = graph.holder(edge)[0]
-        edges[inboard].append((outboard, edge, False))
-        edges[outboard].append((inboard, edge, True))
-    seen = [False] * len(edges)
-    for start in range(GROUND_INDEX, graph.nodes):
-        if not seen[start]:
-            component = _walk(start, edges, seen)
-            yield from _loops(graph, component)
-            yield from _direction(graph, component, start)
-
-
-def _walk(start: int, edges: list[list[tuple[int, int, bool]]], seen: list[bool]) -> _Component:
-    component = _Component([start], {}, [], [])
-    seen[start] = True
-    used: set[int] = set()
-    queue = deque([start])
-    while queue:
-        node = queue.popleft()
-        for other, edge, backwards in edges[node]:
-            if edge in used:
-                continue
-            used.add(edge)
-            if seen[other]:
-                component.closing.append((node, other, edge))
-                continue
-            seen[other] = True
-            component.via[other] = (node, edge)
-            component.nodes.append(other)
-            if backwards:
-                component.turned.append(edge)
-            queue.append(other)
-    return component
-
-
-def _loops(graph: _Graph, component: _Component) -> Iterator[Problem]:
-    """Closed loops, by the hinges on each."""
-    for one, other, closing in component.closing:
-        ring = sorted({closing, *_path(component, one) ^ _path(component, other)})
-        names = ", ".join(f'"{graph.edge_name(edge)}"' for edge in ring[:8])
-        names += f" and {len(ring) - 8} more" if len(ring) > 8 else ""
-        yield (
-            graph.place(closing),
-            f"closes a loop of the hinges {names}; closed loops come in a later release, "
-            "remove one of them for now",
-        )
-
-
-def _path(component: _Component, node: int) -> set[int]:
-    """Edges between a node and the start of its component."""
-    edges = set()
-    while node in component.via:
-        node, edge = component.via[node]
-        edges.add(edge)
-    return edges
-
-
-def _direction(graph: _Graph, component: _Component, start: int) -> Iterator[Problem]:
-    """Hinges written the wrong way round, or a part that is not held by the ground."""
-    if start == GROUND_INDEX:
-        if not component.closing:
-            for edge in component.turned:
-                inboard = split(graph.inboard[edge])[0]
-                yield (
-                    graph.place(edge),
-                    f'points towards the ground: "{inboard}" is already held by another hinge; '
-                    "swap inboard and outboard",
-                )
-        return
-    names = [graph.name(i) for i in sorted(component.nodes)]
-    more = f" (with {', '.join(names[1:5])}{', ...' if len(names) > 5 else ''})"
-    more = more if names[1:] else ""
-    held = {graph.name(graph.outboard[edge]) for _, edge in component.via.values()}
-    base = next((name for name in names if name not in held), names[0])
-    bodies = len(graph.scene.body)
-    if start >= bodies:
-        yield (
-            ("chain", start - bodies),
-            f'no hinge connects it{more} to the ground; hang it on the ground, inboard = "ground"',
-        )
-        return
-    yield (
-        ("body", start),
-        f'no hinge connects it{more} to the ground; add a hinge of type "free" with '
-        f'inboard = "ground" and outboard = "{base}"',
-    )

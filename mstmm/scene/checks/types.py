@@ -201,3 +201,5 @@ def _all_expressions(
         yield ("event", i, "when"), event.when, None
     for i, spring in enumerate(scene.spring):
         yield ("spring", i, "law", "effort"), spring.law.effort, None
+    for i, coupling in enumerate(scene.coupling):
+        yield ("coupling", i, coupling.key), coupling.row, None

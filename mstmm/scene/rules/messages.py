@@ -19,9 +19,6 @@ MAX_PROBLEMS = 60
 _MAX_OPTIONS = 2000
 #: Keys kept free for coming releases, and what they will hold.
 RESERVED = {
-    "loop": "closed loops",
-    "loops": "closed loops",
-    "closure": "closed loops",
     "thermal": "thermal data",
     "temperature": "thermal data",
     "import": "imports",
@@ -29,10 +26,13 @@ RESERVED = {
     "include": "imports",
 }
 
+#: What else closed loops are called.
+_LOOPS = ("loop", "loops", "closure", "closures", "joint", "joints")
+
 #: The lists of tables of a scene.
 TABLES = (
     "input", "signal", "output", "controller", "body", "hinge", "chain", "beam", "elastic",
-    "load", "event", "spring",
+    "load", "event", "spring", "constraint", "coupling",
 )  # fmt: skip
 
 Problem = tuple[Location, str]
@@ -99,6 +99,8 @@ _OF_CHAINS = {
     "outboard": "a member is held at its origin; leave it out",
     "position": "the chain itself takes the position; leave it out here",
     "release": "members of a chain cannot be released; write this hinge as a [[hinge]]",
+    "cut": "hinges of a chain are never cut; leave it out",
+    "hold": "members of a chain start as they are given; write this hinge as a [[hinge]]",
 }
 
 
@@ -116,6 +118,8 @@ def _unknown_key(key: str, model: type[BaseModel], place: Location) -> str:
         return _OF_CHAINS[key]
     if key in RESERVED:
         return f"{RESERVED[key]} come in a later release; leave {key} out for now"
+    if key in _LOOPS and len(place) == 1:
+        return "unknown key; write [[hinge]]: one that holds a body held already closes a loop"
     keys = [f.alias or name for name, f in model.model_fields.items()]
     if _SYMBOLS.get(key) in keys:
         return f'unknown key; did you mean "{_SYMBOLS[key]}"?'

@@ -222,7 +222,10 @@ def one_expression(expected: str) -> Rule:
     def check(value: Any) -> Expression:
         return quantity(value, expected)
 
-    return Rule(expected, check, _EXPRESSION_SCHEMA, dump_expression)
+    def dump(value: Expression | None) -> str | float | None:
+        return None if value is None else dump_expression(value)
+
+    return Rule(expected, check, _EXPRESSION_SCHEMA, dump)
 
 
 def formula(expected: str) -> Rule:
@@ -237,7 +240,11 @@ def formula(expected: str) -> Rule:
             raise refuse(f"expected {expected}, found {found(result.text)}, which is one number")
         return result
 
-    return Rule(expected, check, {"type": "string"}, lambda value: value.text)
+    return Rule(expected, check, {"type": "string"}, _text_of)
+
+
+def _text_of(value: Expression | None) -> str | None:
+    return None if value is None else value.text
 
 
 def condition(expected: str, time: bool = False) -> Rule:
@@ -254,8 +261,5 @@ def condition(expected: str, time: bool = False) -> Rule:
             raise refuse(f"expected {expected}, found {found(result.text)}, which is no comparison")
         return result
 
-    def dump(value: Expression | None) -> str | None:
-        return None if value is None else value.text
-
     schema = {"type": ["string", "number"] if time else "string"}
-    return Rule(expected, check, schema, dump)
+    return Rule(expected, check, schema, _text_of)

@@ -16,6 +16,7 @@ from ..rules.values import Table
 from .beam import Beam
 from .body import Body
 from .chain import Chain
+from .closures import Constraint, Coupling
 from .constants import constants as named_numbers
 from .elastic import Elastic
 from .hinge import Hinge
@@ -51,6 +52,8 @@ class SceneTables(Table):
     load: tuple[Load, ...] = ()
     event: tuple[Event, ...] = ()
     spring: tuple[Spring, ...] = ()
+    constraint: tuple[Constraint, ...] = ()
+    coupling: tuple[Coupling, ...] = ()
 
     @cached_property
     def bodies(self) -> Bodies:

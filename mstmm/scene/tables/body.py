@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from ...numbers.rotations import IDENTITY, Matrix, Vector, from_orientation
 from ..rules import text as texts
 from ..rules import values as rules
+from ..rules.inertia import without_dust
 from ..rules.values import (
     NAME,
     Location,
@@ -20,7 +21,6 @@ from ..rules.values import (
     found,
     refuse,
 )
-from .inertia import without_dust
 
 
 class End(Table):

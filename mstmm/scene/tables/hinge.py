@@ -32,7 +32,13 @@ class HingeTable(HingeKeys):
 
 
 class Hinge(HingeTable):
-    """A hinge between an inboard end (or the ground) and an outboard body."""
+    """A hinge between an inboard end (or the ground) and an outboard body.
+
+    Where other hinges hold the outboard body too, loops close: one of them is part of the tree and
+    the others are cut, which costs it nothing but work.  `cut` True: cut this one; False: not this
+    one; None: whichever costs less.  In loops start values are wishes; `hold` keeps those of q
+    exactly.
+    """
 
     name: Annotated[str, texts.name("the hinge's name")]
     inboard: Annotated[str, texts.end()]
@@ -42,6 +48,8 @@ class Hinge(HingeTable):
         Expression | None,
         texts.condition('a time in s or a comparison such as "t >= 1"', time=True),
     ] = None
+    cut: Annotated[bool | None, texts.flag()] = None
+    hold: Annotated[bool, texts.flag()] = False
 
     @property
     def inboard_body(self) -> str:
@@ -81,6 +89,11 @@ class Hinge(HingeTable):
                 f'give "{self.inboard_body}" an end there',
             ))  # fmt: skip
         return problems
+
+    @property
+    def holds(self) -> bool:
+        """True when its start values are kept exactly."""
+        return self.hold
 
     @property
     def lets_go(self) -> bool:

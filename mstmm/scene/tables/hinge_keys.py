@@ -87,3 +87,8 @@ class HingeKeys(Table):
     def lets_go(self) -> bool:
         """True when it is released by itself."""
         return False
+
+    @property
+    def holds(self) -> bool:
+        """True when its start values are kept exactly, whatever loops ask for."""
+        return False

@@ -62,6 +62,10 @@ def _settled(
             ("release",),
             "only a driven or fixed hinge can be released; add a drive or leave it out",
         ))  # fmt: skip
+    if hinge.holds and not kind.coordinates:
+        problems.append((("hold",), f"{a_hinge(kind.name)} has nothing to hold; leave it out"))
+    elif hinge.holds and drive is not None and None not in drive:
+        problems.append((("hold",), "the drive says where it starts; leave hold out"))
     if not problems:
         changes["initial"] = _initial(hinge, kind, drive, problems)
     return changes
@@ -232,11 +236,11 @@ def _drive(
                 "feedback",
             ))  # fmt: skip
         elif entry.depends_on_time_only:
-            problems += _unsmooth(entry, place)
+            problems += unsmooth(entry, place)
     return drive
 
 
-def _unsmooth(entry: Expression, place: Location) -> list[tuple[Location, str]]:
+def unsmooth(entry: Expression, place: Location) -> list[tuple[Location, str]]:
     """A drive whose start is not finite or whose derivatives cannot be formed."""
     try:
         start = motion_at(entry, 0.0)

@@ -5,6 +5,7 @@
 
 #include "control.h"
 #include "kernel_calls.h"
+#include "loops.h"
 #include "scene.h"
 #include "sweep_steps.h"
 
@@ -222,20 +223,14 @@ static void remember_twists(mstmm_scene_run *run, const real *y)
 int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y)
 {
     const mstmm_model *model = run->model;
-    for (int k = 0; k < run->n_quaternions; k++) {
-        real *unit = y + run->quaternions[k];
-        real norm = sqrt(unit[0] * unit[0] + unit[1] * unit[1] + unit[2] * unit[2] +
-                         unit[3] * unit[3]);
-        for (int j = 0; j < 4; j++) unit[j] /= norm;
-    }
-    if (model->n_drives) {
-        mstmm_state state = state_of(model, run->workspace, t, run->memory, &run->failure);
-        state.q = y;
-        state.u = y + model->nq;
-        const int code = mstmm_run_given(&state);
+    mstmm_unit_quaternions(run->n_quaternions, run->quaternions, y);
+    const int driven = mstmm_fill_driven(model, run->workspace, t, y, y + model->nq, run->memory,
+                                         &run->failure);
+    if (driven) return driven;
+    if (model->looped) {
+        const int code = mstmm_close_loops(model, run->workspace, t, y, y + model->nq, run->memory,
+                                           run->n_quaternions, run->quaternions, &run->failure);
         if (code) return code;
-        memcpy(y, state.q, (size_t)model->nq * sizeof(real));
-        memcpy(y + model->nq, state.u, (size_t)model->nu * sizeof(real));
     }
     remember_twists(run, y);
     if (run->base) run->base->known = 0;
@@ -306,7 +301,8 @@ static int needs_settling(const mstmm_scene_run *run)
     const mstmm_model *model = run->model;
     for (int k = 0; k < model->n_laws; k++)
         if (model->laws[k].twist >= 0) return 1;
-    return run->n_quaternions > 0 || model->n_drives > 0 || run->n_controllers > 0;
+    return run->n_quaternions > 0 || model->n_drives > 0 || run->n_controllers > 0 ||
+           model->looped;
 }
 
 void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system)

@@ -128,6 +128,52 @@ typedef struct {
     int body, coordinate, speed; /* within the hinge */
 } mstmm_drive;
 
+/* A row whose column goes across the inboard hinge of a body; places behind `loops`. */
+typedef struct {
+    int row;
+    int64_t column, onward, y; /* of its column here and on the parent, of -H^T K */
+    const int64_t *pairs;      /* of the entries of L with those up to this one */
+} mstmm_pending;
+
+/* A row that stays when another is closed. */
+typedef struct {
+    int row;
+    int64_t column, pair; /* of its column on the body, of its entry of L with the other */
+    const int64_t *pairs; /* of those with the ones that stay, up to this one */
+} mstmm_other;
+
+/* A row of a closed loop, in the order in which they are closed. */
+typedef struct {
+    int body; /* where its ends meet; -1: the ground */
+    int n_others;
+    const mstmm_other *others;
+    real floor;    /* largest pivot that is rounding */
+    real mobility; /* of its ends, if they were free: scale of its pivot */
+    real softness; /* 1 / inertia of a rotor on an own speed; 0: the row is met */
+    int release;   /* place in memory that is non-zero once the row is let go; -1: never */
+} mstmm_loop_row;
+
+/* A hinge that closes a loop: its frame C, a body without mass, is to be where an end of B is. */
+typedef struct {
+    int outboard; /* B */
+    int rows[6];  /* of its directions, -1: none */
+    int64_t inner[6], outer[6]; /* their columns on A and on B */
+    real turn[9], end[3];       /* axes of C and its origin in B */
+    int64_t numbers;            /* of its own */
+} mstmm_closure;
+
+/* What a body has to do with closed loops. */
+typedef struct {
+    int first_row, n_rows; /* that close on it */
+    int n_pending;
+    const mstmm_pending *pending;
+    const mstmm_closure *closure; /* the body is the frame C of a hinge that closes a loop */
+} mstmm_looped;
+
+/* What is corrected of closed loops, instead of what accelerates. */
+#define MSTMM_GAP 1
+#define MSTMM_SLIP 2
+
 /* Kinds of hinge that the plain product of classical matrices knows, one kind for a whole chain. */
 #define MSTMM_PRODUCT_PIN 0
 #define MSTMM_PRODUCT_BALL 1
@@ -168,6 +214,11 @@ typedef struct {
     const mstmm_load *loads;
     int n_forces;
     mstmm_force *forces;
+    const mstmm_looped *looped; /* for every body; NULL: no loop is closed */
+    int n_rows, first_ground_row; /* rows from the latter on close at the ground */
+    const mstmm_loop_row *rows;
+    int64_t loops;        /* first number of closed loops in the workspace */
+    int64_t loops_summed; /* so many of them are sums */
     int needs_pose; /* loads or forces that need poses and velocities */
     int64_t workspace; /* numbers of workspace */
     int64_t scratch;   /* first number behind the blocks: state copy, values, tape slots */
@@ -202,6 +253,24 @@ int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, co
  * imposes; zero on the others. */
 int mstmm_solve(const mstmm_model *model, real *workspace, int64_t n, const real *q,
                 const real *memory, const real *columns, real *answers, mstmm_failure *failure);
+/* The least change of speeds, by inertia, that stops the slip of closed loops (MSTMM_SLIP), or of
+ * coordinates along the speeds (`change`, nu) that closes their gaps (MSTMM_GAP).  With `give` rows
+ * yield by that share of their mobility.  `missing` (NULL: not wanted) is how much the rows lack,
+ * n_rows. */
+int mstmm_correction(const mstmm_model *model, real *workspace, int level, real give, real t,
+                     const real *q, const real *u, const real *memory, real *change,
+                     real *missing, mstmm_failure *failure);
+/* Driven coordinates and speeds filled in, in place. */
+int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q, real *u,
+                      const real *memory, mstmm_failure *failure);
+/* q moved by a change along the speeds, in place. */
+int mstmm_moved(const mstmm_model *model, real *workspace, real t, real *q, const real *change,
+                const real *memory, int n_quaternions, const int *quaternions,
+                mstmm_failure *failure);
+/* Gaps closed and slips stopped in place; driven coordinates are filled in. */
+int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q, real *u,
+                      const real *memory, int n_quaternions, const int *quaternions,
+                      mstmm_failure *failure);
 /* Numbers that a flexible body of n modes, and one of its sections, keep in the workspace. */
 int64_t mstmm_modal_numbers(int n);
 int64_t mstmm_section_numbers(int n);
@@ -248,6 +317,8 @@ typedef struct mstmm_state {
     int linked;       /* runs with numbers are swept as links */
     int observed;     /* idle ends are swept too */
     int hinges_known; /* hinges have their motion already */
+    int level;        /* MSTMM_GAP, MSTMM_SLIP; 0: accelerations */
+    real give;        /* see mstmm_correction */
     int residual;     /* drives give accelerations though others are given */
     struct mstmm_state *slope; /* where derivatives along a direction lie; NULL: none are wanted */
     mstmm_tangents *tangents;
@@ -312,6 +383,13 @@ int mstmm_fail(mstmm_state *state, int reason, int element, int code);
 static inline int mstmm_idle(int observed, const mstmm_body *body)
 {
     return body->idle && !observed;
+}
+
+/* Has the sweep from tips to root nothing to do with this body? */
+static inline int mstmm_aside(const mstmm_state *state, int index)
+{
+    const mstmm_model *model = state->model;
+    return model->looped[index].closure || mstmm_idle(state->observed, &model->bodies[index]);
 }
 
 /* The modes that a body or its section belongs to; NULL: none. */

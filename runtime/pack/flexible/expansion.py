@@ -20,6 +20,7 @@ from mstmm.scene.tables.loads import Load
 
 from ...flexible.modal_body import ModalBody
 from ...flexible.modal_port import MassPoint, ModalPort
+from ..loops.opened import Cut
 from .rigidified import Rigidified
 
 HELD, POINT = "held", "point"
@@ -49,6 +50,8 @@ class Expanded:
     held: dict[str, str] = field(default_factory=dict)
     #: What became of the bodies that are rigid in the run, None where there is none.
     rigidified: Rigidified | None = None
+    #: Hinges that close loops, in the order in which those that end at one body are closed.
+    cuts: tuple[Cut, ...] = ()
 
     def is_node(self, name: str) -> bool:
         """Whether a body of the scene of nodes belongs to a flexible body."""

@@ -16,6 +16,7 @@ from ..system import ForceNumbers, LoadNumbers, System
 from .bodies import BodyRecords
 from .laws import LawRecords
 from .links import attach_runs
+from .loops import LoopRecords, attach_loops
 from .memory import Memory
 
 
@@ -36,6 +37,7 @@ class Written:
     scratch: int
     slots: int
     reach: Reach
+    loops: LoopRecords | None
 
 
 def write(system: System, elements: Elements) -> Written:
@@ -69,11 +71,12 @@ def write(system: System, elements: Elements) -> Written:
         _force(record, force, elements, memory)
         record.own = int(own)
     model.forces, model.n_forces = forces, len(system.forces)
-    model.needs_pose = int(bool(system.forces or system.loads or system.dragged))
+    model.needs_pose = int(bool(system.forces or system.loads or system.dragged or system.closures))
     model.inputs = write_inputs(system.inputs, system.held.places, memory)
     model.n_inputs = len(system.inputs)
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
-    scratch = attach_runs(model, system, memory, lib, bodies.end)
+    behind, loops = attach_loops(model, system, memory, lib, bodies.end)
+    scratch = attach_runs(model, system, memory, lib, behind)
     modal = bodies.modal
     return Written(
         model,
@@ -84,6 +87,7 @@ def write(system: System, elements: Elements) -> Written:
         scratch,
         memory.slots,
         reach,
+        loops,
     )
 
 

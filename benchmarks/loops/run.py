@@ -1,0 +1,149 @@
+"""Accelerations of mechanisms with closed loops, side by side.
+
+    python benchmarks/loops/run.py [--quick]
+
+CPU time of one evaluation of many, contenders in alternating rounds: windows of four-bars in a row,
+by the number of windows; Stewart's platform beside MuJoCo's equality constraints (if it is there).
+Building what each needs is not counted.  MuJoCo's rows yield by design; `apart` tells how far its
+accelerations are from those of the rigid platform.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+
+from common import measure  # noqa: E402
+
+import mstmm  # noqa: E402
+
+SIZES = (10, 50, 200, 1000)
+PLATFORM = HERE.parents[1] / "examples" / "stewart_platform" / "scene.toml"
+
+
+def windows(count: int) -> mstmm.Scene:
+    """Cranks of 1 m side by side, joined at their tips by couplers of 1 m."""
+    rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.0, 1 / 12, 1 / 12],
+           "ends": {"tip": [1, 0, 0]}}  # fmt: skip
+    bodies = [rod | {"name": f"crank{k}"} for k in range(count + 1)]
+    bodies += [rod | {"name": f"coupler{k}"} for k in range(count)]
+    hinges: list[dict[str, Any]] = [
+        {"name": f"foot{k}", "type": "pin", "inboard": "ground", "outboard": f"crank{k}",
+         "position": [float(k), 0, 0], "initial": {"q": 0.7}}
+        for k in range(count + 1)
+    ]  # fmt: skip
+    for k in range(count):
+        hinges += [
+            {"name": f"left{k}", "type": "pin", "inboard": f"crank{k}.tip",
+             "outboard": f"coupler{k}", "initial": {"q": -0.7}},
+            {"name": f"right{k}", "type": "pin", "inboard": f"coupler{k}.tip",
+             "outboard": f"crank{k + 1}.tip", "initial": {"q": 0.7}},
+        ]  # fmt: skip
+    return mstmm.Scene(gravity=[0, -9.81, 0], body=bodies, hinge=hinges)
+
+
+def platform() -> mstmm.Scene:
+    """The platform of the examples on springs along its legs, two of them pressed."""
+    data = tomllib.loads(PLATFORM.read_text(encoding="utf-8"))
+    for k, hinge in enumerate(h for h in data["hinge"] if h["type"] == "prismatic"):
+        del hinge["drive"]
+        hinge |= {"initial": {"q": 0.414}, "hold": True}
+        hinge["law"] = {"stiffness": 4e4, "rest": 0.414 + (0.01 if k < 2 else 0.0)}
+    return mstmm.Scene(**data)
+
+
+def evaluations(model: mstmm.Model, count: int) -> Callable[[], np.ndarray]:
+    """Accelerations at the start, `count` times in one call."""
+    q, u = model.initial_state()
+    many_q, many_u = np.tile(q, (count, 1)), np.tile(u, (count, 1))
+    return lambda: model.accelerations(many_q, many_u, threads=1)
+
+
+def slides(model: mstmm.Model) -> np.ndarray:
+    """Accelerations of the six legs at the start."""
+    udot = model.accelerations(*model.initial_state())
+    return np.array([udot[model.layout.hinges[f"slide{k}"].u] for k in range(6)])
+
+
+def per_evaluation(
+    work: dict[str, Callable[[], Any]], count: int, rounds: int
+) -> dict[str, list[float]]:
+    """Microseconds of one of `count` evaluations, by contender."""
+    timed = {name: lambda one=one: measure.once(one) for name, one in work.items()}
+    return {name: [1e6 * s / count for s in found]
+            for name, found in measure.rounds(timed, rounds).items()}  # fmt: skip
+
+
+def measured(quick: bool) -> list[dict[str, Any]]:
+    """Rows of the table."""
+    rounds, results = (2, []) if quick else (15, [])
+    models = {count: mstmm.compile(windows(count), engine="looped") for count in SIZES}
+    calls = {count: max(4, 8000 // count) for count in SIZES}
+    work = {str(count): evaluations(model, calls[count]) for count, model in models.items()}
+    for name, found in per_evaluation(work, 1, rounds).items():
+        bodies = 2 * int(name) + 1
+        times = [us / calls[int(name)] for us in found]
+        results.append({"scene": f"{name} windows", "tool": "mstmm", "us": times,
+                        "ns a body": [1e3 * us / bodies for us in times]})  # fmt: skip
+    model = mstmm.compile(platform(), engine="looped")
+    count, work = 2000, {"mstmm": evaluations(model, 2000)}
+    apart = {"mstmm": 0.0}
+    try:
+        from mujoco_platform import MujocoPlatform
+
+        peer = MujocoPlatform(model)
+        work["MuJoCo"] = lambda: peer.forward(count)
+        apart["MuJoCo"] = measure.disagreement(peer.slides(), slides(model))
+    except ImportError:
+        print("MuJoCo is not here")
+    for name, found in per_evaluation(work, count, rounds).items():
+        results.append({"scene": "platform", "tool": name, "us": found, "apart": apart[name]})
+    return results
+
+
+def table(results: list[dict[str, Any]]) -> str:
+    """Least times, and ratios."""
+    lines = ["# Closed loops", "", "| scene | tool | us an evaluation | ns a body | apart |",
+             "|---|---|---|---|---|"]  # fmt: skip
+    for row in results:
+        body = f"{min(row['ns a body']):.0f}" if "ns a body" in row else ""
+        apart = f"{row['apart']:.1e}" if "apart" in row else ""
+        lines.append(
+            f"| {row['scene']} | {row['tool']} | {min(row['us']):.3g} | {body} | {apart} |"
+        )
+    own = [row for row in results if row["tool"] == "mstmm"]
+    by = {row["scene"]: min(row.get("ns a body", row["us"])) for row in own}
+    ratio = by["1000 windows"] / by["50 windows"]
+    lines += ["", f"A body of 1000 windows / of 50, where 1.2 was asked at most: {ratio:.2f}."]
+    peers = [min(row["us"]) for row in results if row["tool"] == "MuJoCo"]
+    if peers:
+        ratio = by["platform"] / peers[0]
+        lines += [
+            "", f"Platform, mstmm / MuJoCo, where 0.3 was asked at most: {ratio:.2f}. MuJoCo's "
+            "rows yield, as stiff as it lets them be; `apart` is how far its legs are off.",
+        ]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Measures and writes result.json and result.md; with --quick it only prints."""
+    quick = "--quick" in sys.argv
+    results = measured(quick)
+    print(table(results))
+    if not quick:
+        record = {"machine": measure.machine(), "results": results}
+        (HERE / "result.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
+        (HERE / "result.md").write_text(table(results), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

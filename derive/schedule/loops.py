@@ -1,0 +1,194 @@
+"""Closed loops: rows of the hinges that close them, carried as columns through the sweep.
+
+In place of `condense` and `recover` the elimination of a hinge is kept, as for several right-hand
+sides, and the columns of the rows that are open yet follow the load across it.  See
+derive/equations/loops.py.
+"""
+
+from __future__ import annotations
+
+from .motion import HINGE_MOTION
+from .riccati import BODY, FREE, FREE_EFFORTS
+from .steps import (
+    TIPS_TO_ROOT,
+    Add,
+    Call,
+    Copy,
+    Do,
+    Each,
+    EachSpeed,
+    Move,
+    Pass,
+    Spread,
+    call,
+    only,
+)
+
+_MET = {"R_C": "closure.R_C", "r_e": "closure.end"}
+_ROWS = {"J_A": "closure.J_A", "J_B": "closure.J_B", "l": "closure.l"}
+
+
+def _rows(relative: str, when: str) -> Call:
+    return call("loops.rows", when=when, W="closure.W", **_MET, Rc="body.R", r_A="closure.lever",
+                relative=relative, **_ROWS)  # fmt: skip
+
+
+CLOSURES = Pass(
+    "closures", "body", "Rows of a hinge that closes a loop, and the load of its laws.",
+    (
+        Do(whole=HINGE_MOTION, when="own"),
+        call("generic{nu}.complement", fails="hinge", H="hinge.H", W="closure.W"),
+        call("loops.gap", A_C="body.A", x_C="body.x", A_B="outboard.A", x_B="outboard.x",
+             R_e="closure.turn", r_e="closure.end", **BODY, R_C="closure.R_C",
+             r_A="closure.lever", d="closure.d", gap="closure.gap"),
+        call("loops.slip", **_MET, d="closure.d", v_C="body.v", w_C="body.w", v_B="outboard.v",
+             w_B="outboard.w", slip="closure.slip"),
+        _rows("closure.gap", "gaping"),
+        _rows("closure.slip", "slipping"),
+        *only(
+            "!corrected",
+            call("loops.drift", **_MET, d="closure.d", slip="closure.slip",
+                 motion_C="body.motion", motion_B="outboard.motion", drift="local.drift"),
+            _rows("local.drift", ""),
+            EachSpeed(
+                steps=(
+                    call("loops.act", J="closure.J_A[6 * k]", tau="body.tau[k]", e="parent.e"),
+                    call("loops.act", J="closure.J_B[6 * k]", tau="body.tau[k]", e="outboard.e"),
+                ),
+            ),
+        ),
+        Each(
+            of="rows",
+            steps=(
+                Move(to="side.inner", source="closure.J_A[6 * c]", count="6"),
+                Move(to="side.outer", source="closure.J_B[6 * c]", count="6"),
+                Move(to="line.known", source="closure.l[c]", count="1"),
+                # A rotor resists a correction, but asks for none.
+                Copy(to="line.known", when="corrected soft"),
+            ),
+        ),
+    ),
+    skip="!cut",
+)  # fmt: skip
+
+_ROW = {"inverse": "row.inverse", "K": "row.K", "l": "row.known"}
+
+ROW_CLOSED = Pass(
+    "row_closed", "row", "A row closed on the body where its ends meet.",
+    (
+        call("loops.close", **_ROW, L="row.pivot", floor="row.floor", S="meeting.S", e="meeting.e"),
+        Each(
+            of="others",
+            steps=(
+                call("loops.shed", **_ROW, L_p="other.L", K_p="other.K", l_p="other.known"),
+                Each(
+                    of="seconds",
+                    steps=(
+                        call("loops.shed_pair", inverse="row.inverse", L_p="other.L",
+                             L_q="second.L", L_pq="both.L"),
+                    ),
+                ),
+            ),
+        ),
+    ),
+)  # fmt: skip
+
+ROW_FOUND = Pass(
+    "row_found", "row", "The multiplier of a row, from the motion of the body where it closes.",
+    (
+        call("loops.multiplier", **_ROW, delta="meeting.delta", x="row.x"),
+        Each(
+            of="others",
+            steps=(
+                call("loops.multiplier_less", inverse="row.inverse", L_p="other.L",
+                     x_p="other.x", x="row.x"),
+            ),
+        ),
+    ),
+    order=TIPS_TO_ROOT,
+)  # fmt: skip
+
+UNLOADED = Pass(
+    "unloaded", "body", "No load and no effort: the rows alone are to be met.",
+    (Copy(to="body.e"), Copy(to="body.tau")),
+)  # fmt: skip
+
+_ACROSS = {"H": "hinge.H_free", "G": "hinge.G"}
+
+CARRIED = Pass(
+    "carried", "body", "S, e and the columns of open rows carried across the hinge to the parent.",
+    (
+        Each(of="closings", steps=(Do(whole=ROW_CLOSED),)),
+        Do(whole=HINGE_MOTION, when="own"),
+        *FREE,
+        FREE_EFFORTS,
+        call("generic{free}.factor", fails="undetermined", **BODY, H="hinge.H_free",
+             J="hinge.J_free", W="zero", floor="body.floor", S="body.S", F="hinge.F",
+             G="hinge.G", S_I="parent.S"),
+        call("generic{free}.push", **BODY, **_ACROSS, e="body.e", tau="hinge.tau_free",
+             y="hinge.g", e_I="parent.e"),
+        Each(
+            of="pending",
+            steps=(
+                call("generic{free}.push", **BODY, **_ACROSS, e="pending.K", tau="zero",
+                     y="pending.y", e_I="pending.onward"),
+                *only(
+                    "moving",
+                    call("generic{free}.divide", F="hinge.F", y="pending.y", z="local.z"),
+                    call("generic{free}.answered", y="hinge.g", z="local.z", l="pending.known"),
+                    Each(
+                        of="before",
+                        steps=(
+                            call("generic{free}.couple", y="before.y", z="local.z",
+                                 L_ij="pair.L"),
+                        ),
+                    ),
+                ),
+            ),
+        ),
+    ),
+    order=TIPS_TO_ROOT, skip="aside",
+)  # fmt: skip
+
+ANSWERED = Pass(
+    "answered", "body", "Accelerations of a hinge under the multipliers of its open rows.",
+    (
+        Each(
+            of="pending",
+            steps=(
+                call("generic{free}.pull", when="moving", y="pending.y", x="pending.x",
+                     y_0="hinge.g"),
+                call("loops.loaded", when="kept", K="pending.K", x="pending.x", e="body.e"),
+            ),
+        ),
+        call("generic{free}.answer", **BODY, **_ACROSS, F="hinge.F", y="hinge.g",
+             delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
+        Spread(to="body.udot", free="hinge.rates", imposed="body.s"),
+        Each(of="openings", steps=(Do(whole=ROW_FOUND),)),
+        # The elimination lay where H was.
+        Do(whole=HINGE_MOTION, when="imposed balance"),
+    ),
+    skip="aside",
+)  # fmt: skip
+
+CLOSURES_ANSWERED = Pass(
+    "closures_answered", "body", "Accelerations and load of a hinge that closes a loop.",
+    (
+        call("loops.told", **_ROWS, delta_A="parent.delta", delta_B="outboard.delta",
+             c="local.along"),
+        Copy(to="body.udot", source="body.s"),
+        EachSpeed(steps=(Add(to="body.udot[k]", source="local.along[k]"),)),
+        *only(
+            "kept",
+            Copy(to="body.e"),
+            EachSpeed(
+                steps=(call("loops.loaded", K="closure.W[6 * k]", x="body.tau[k]", e="body.e"),),
+            ),
+            Each(
+                of="rows",
+                steps=(call("loops.act", J="closure.W[6 * c]", tau="line.x", e="body.e"),),
+            ),
+        ),
+    ),
+    skip="!cut",
+)  # fmt: skip

@@ -1,0 +1,56 @@
+"""Rows of what closes a loop: cut hinges, constraints, couplings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from ...expression.expression import Name
+from ...graph.mechanism import GROUND, Rows
+from ..rules.values import split
+
+if TYPE_CHECKING:
+    from ..tables.all import SceneTables
+    from ..tables.hinge import HingeTable
+
+
+def rows_of(hinge: HingeTable) -> int:
+    """Rows of a hinge where it is cut: 6 less its coordinates, and one for each coordinate that is
+    driven or carries rotor inertia.  A user's type that nobody has defined yet counts as a pin."""
+    speeds = 1 if hinge.facts is None else len(hinge.facts.speeds)
+    drive, inertia = hinge.drive or (), hinge.law.inertia
+    own = sum(any(drive[k : k + 1]) or any(inertia[k : k + 1]) for k in range(speeds))
+    return 6 - speeds + own
+
+
+def rows_of_closures(scene: SceneTables) -> Iterator[Rows]:
+    """The rows of the scene's constraints, then those of its couplings, between its bodies."""
+    for constraint in scene.constraint:
+        yield _row(scene, (constraint.from_, constraint.to))
+    for coupling in scene.coupling:
+        joined = (
+            scene.hinges.by_name[name] for name in dict.fromkeys(n.hinge for n in coupling.names)
+        )
+        yield _row(scene, [end for hinge in joined for end in (hinge.inboard, hinge.outboard)])
+
+
+def coordinate(scene: SceneTables, name: Name) -> tuple[int, str, int]:
+    """(hinge, "q" or "u", entry) that a name in a coupling stands for: `arm.q`, `arm.q[1]`,
+    `arm.u`, or a coordinate by its own name, `arm.angle`.
+
+    KeyError where the scene has no such hinge, ValueError where the hinge has no such entry.
+    """
+    hinge = scene.hinges.find(name.hinge)
+    if hinge is None:
+        raise KeyError(name.hinge)
+    if name.quantity in ("q", "u"):
+        return hinge, name.quantity, name.index or 0
+    facts = scene.hinges[hinge].facts
+    own = [one.name for one in facts.coordinates] if facts is not None else []
+    return hinge, "q", own.index(name.quantity)
+
+
+def _row(scene: SceneTables, ends: Sequence[str]) -> Rows:
+    """One row between ends of bodies, the ground among them."""
+    bodies = (scene.bodies.find(split(end)[0]) for end in ends)
+    return Rows(tuple(GROUND if body is None else body for body in bodies), 1)

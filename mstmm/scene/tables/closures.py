@@ -1,0 +1,110 @@
+"""[[constraint]] and [[coupling]]: what closes loops besides hinges."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from ...expression.expression import Expression, Name
+from ...numbers.rotations import Vector, unit
+from ..rules import text as texts
+from ..rules import values as rules
+from ..rules.values import GROUND, Table, refuse, split
+
+DISTANCE, PLANE = "distance", "point-on-plane"
+
+
+class Constraint(Table):
+    """One row between the points of two ends.
+
+    "distance": `to` stays `length` (m, more than 0) away from `from`.  "point-on-plane": `to` stays
+    in the plane through `from` with the `normal`, in the axes of the end `from`, or `offset` (m)
+    above it along the normal.  `position` (m) is the place of the end that is on the ground.
+    """
+
+    name: Annotated[str, texts.name("the constraint's name")] = ""
+    type: Annotated[str, texts.choice(DISTANCE, PLANE)]
+    from_: Annotated[str, texts.end()] = Field(alias="from")
+    to: Annotated[str, texts.end()]
+    position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
+    length: Annotated[float | None, rules.number("m", above=0)] = None
+    normal: Annotated[Vector | None, rules.direction()] = None
+    offset: Annotated[float | None, rules.number("m")] = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Constraint:
+        bodies = (split(self.from_)[0], split(self.to)[0])
+        if bodies[0] == bodies[1]:
+            raise refuse(f'both ends are on "{bodies[0]}"; join two bodies', "to")
+        if GROUND not in bodies and self.position != (0.0, 0.0, 0.0):
+            raise refuse(
+                "only a constraint on the ground takes a position; give the body an end there",
+                "position",
+            )
+        for key in ("normal", "offset") if self.type == DISTANCE else ("length",):
+            if getattr(self, key) is not None:
+                raise refuse(f'a "{self.type}" has no {key}; leave it out', key)
+        if self.type == DISTANCE and self.length is None:
+            raise refuse("missing; expected a number in m, more than 0", "length")
+        if self.type == PLANE and self.normal is None:
+            raise refuse(
+                "missing; expected three numbers, the normal in the axes of the end "
+                f'"{self.from_}", such as [0, 1, 0]',
+                "normal",
+            )
+        return self
+
+    @property
+    def unit_normal(self) -> Vector | None:
+        """The normal with length 1, in the axes of the end `from`."""
+        if self.normal is None:
+            return None
+        x, y, z = unit(self.normal)
+        return (x, y, z)
+
+
+class Coupling(Table):
+    """One row between coordinates of hinges: gears, racks, screws, differentials.
+
+    `expression` of the coordinates has the value `equals`, or keeps that of the start where
+    `equals` is left out; `speeds`, linear in speeds of hinges, has the value `equals`, or 0.
+    `equals` is a number or an expression of t.
+    """
+
+    name: Annotated[str, texts.name("the coupling's name")] = ""
+    expression: Annotated[
+        Expression | None,
+        texts.formula('an expression of coordinates such as "sun.q - 3*carrier.q"'),
+    ] = None
+    speeds: Annotated[
+        Expression | None,
+        texts.formula('an expression of speeds such as "0.3*wheel.u - cart.u"'),
+    ] = None
+    equals: Annotated[Expression | None, texts.one_expression("a number or an expression of t")] = (
+        None
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Coupling:
+        if self.expression is None and self.speeds is None:
+            raise refuse("missing; give an expression of coordinates, or speeds", "expression")
+        if self.expression is not None and self.speeds is not None:
+            raise refuse("a coupling has one row: expression or speeds; write two", "speeds")
+        return self
+
+    @property
+    def key(self) -> str:
+        """The key that has its row: "expression" of coordinates or "speeds"."""
+        return "speeds" if self.expression is None else "expression"
+
+    @property
+    def row(self) -> Expression:
+        """The expression that is kept, of coordinates or of speeds."""
+        row: Expression = getattr(self, self.key)
+        return row
+
+    @property
+    def names(self) -> tuple[Name, ...]:
+        """What it couples."""
+        return self.row.names

@@ -1,0 +1,147 @@
+/* Closed loops: sums begun, and states brought back to where the loops are closed. */
+#include <math.h>
+#include <string.h>
+
+#include "loops.h"
+#include "sweep.h"
+#include "sweep_steps.h"
+
+/* Newton's method: from this gap (m, rad) on the next step leaves rounding; so many steps, and the
+ * gap that is still none behind them, where a singular pose makes them slow. */
+#define CLOSE 1e-7
+#define STEPS 10
+#define OPEN 1e-5
+
+static real *row_numbers(const mstmm_state *state, int row)
+{
+    return state->workspace + state->model->loops + MSTMM_ROW * (int64_t)row;
+}
+
+int mstmm_hook_rows_begun(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    memset(state->workspace + model->loops, 0, (size_t)model->loops_summed * sizeof(real));
+    for (int r = 0; r < model->n_rows; r++) {
+        const mstmm_loop_row *row = &model->rows[r];
+        const int let_go = row->release >= 0 && fabs(state->memory[row->release]) > 0;
+        row_numbers(state, r)[MSTMM_ROW_PIVOT] =
+            let_go ? (real)INFINITY : row->softness + state->give * row->mobility;
+    }
+    return 0;
+}
+
+int mstmm_correction(const mstmm_model *model, real *workspace, int level, real give, real t,
+                     const real *q, const real *u, const real *memory, real *change,
+                     real *missing, mstmm_failure *failure)
+{
+    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q, .u = u,
+                         .memory = memory, .udot = change, .observed = 0, .level = level,
+                         .give = give, .failure = failure};
+    memset(change, 0, (size_t)model->nu * sizeof(real));
+    state.given = change; /* nothing is imposed but what does not change */
+    state.qdot = mstmm_spare_qdot(&state);
+    mstmm_ground(&state);
+    const int code = mstmm_run_correction(&state);
+    if (!code && missing) mstmm_missing(&state, missing);
+    return code;
+}
+
+void mstmm_missing(const mstmm_state *state, real *missing)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const mstmm_closure *closure = model->looped[i].closure;
+        if (!closure) continue;
+        const real *known =
+            state->workspace + model->loops + closure->numbers + MSTMM_CLOSURE_L;
+        for (int c = 0; c < 6; c++)
+            if (closure->rows[c] >= 0) missing[closure->rows[c]] = known[c];
+    }
+}
+
+int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q, real *u,
+                      const real *memory, mstmm_failure *failure)
+{
+    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q, .u = u,
+                         .memory = memory, .observed = 1, .failure = failure};
+    if (!model->n_drives) return 0;
+    const int code = mstmm_run_given(&state);
+    if (code) return code;
+    memcpy(q, state.q, (size_t)model->nq * sizeof(real));
+    memcpy(u, state.u, (size_t)model->nu * sizeof(real));
+    return 0;
+}
+
+int mstmm_moved(const mstmm_model *model, real *workspace, real t, real *q, const real *change,
+                const real *memory, int n_quaternions, const int *quaternions,
+                mstmm_failure *failure)
+{
+    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q, .u = change,
+                         .memory = memory, .observed = 1, .failure = failure};
+    real *qdot = mstmm_spare_qdot(&state);
+    state.qdot = qdot;
+    mstmm_ground(&state);
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_hinge_motion(&state, i);
+        if (code) return code;
+    }
+    for (int i = 0; i < model->nq; i++) q[i] += qdot[i];
+    mstmm_unit_quaternions(n_quaternions, quaternions, q);
+    return 0;
+}
+
+void mstmm_unit_quaternions(int count, const int *first, real *q)
+{
+    for (int k = 0; k < count; k++) {
+        real *unit = q + first[k];
+        const real norm = sqrt(unit[0] * unit[0] + unit[1] * unit[1] + unit[2] * unit[2] +
+                               unit[3] * unit[3]);
+        for (int j = 0; j < 4; j++) unit[j] /= norm;
+    }
+}
+
+/* Largest of what the rows lack that have a multiplier, and own speeds of hinges that close; *where
+ * is the frame of its hinge. */
+static real largest(const mstmm_state *state, int *where)
+{
+    const mstmm_model *model = state->model;
+    real found = 0;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const mstmm_closure *closure = model->looped[i].closure;
+        if (!closure) continue;
+        const real *known =
+            state->workspace + model->loops + closure->numbers + MSTMM_CLOSURE_L;
+        for (int c = 0; c < 6; c++) {
+            const int row = closure->rows[c];
+            if (row >= 0 && !(row_numbers(state, row)[MSTMM_ROW_INVERSE] > 0)) continue;
+            if (fabs(known[c]) <= found) continue;
+            found = fabs(known[c]);
+            *where = i;
+        }
+    }
+    return found;
+}
+
+int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q, real *u,
+                      const real *memory, int n_quaternions, const int *quaternions,
+                      mstmm_failure *failure)
+{
+    mstmm_state state = {.model = model, .workspace = workspace, .failure = failure};
+    real *change = mstmm_spare_udot(&state), gap = 1;
+    int where = 0;
+    for (int k = 0; k < STEPS && !(gap < CLOSE); k++) {
+        int code = mstmm_correction(model, workspace, MSTMM_GAP, 0, t, q, u, memory, change, NULL,
+                                    failure);
+        gap = code ? 0 : largest(&state, &where);
+        if (!code)
+            code = mstmm_moved(model, workspace, t, q, change, memory, n_quaternions, quaternions,
+                               failure);
+        if (code) return code;
+    }
+    if (!(gap < OPEN)) return mstmm_fail(&state, MSTMM_FAILED_LOOP, where, 0);
+    const int code =
+        mstmm_correction(model, workspace, MSTMM_SLIP, 0, t, q, u, memory, change, NULL, failure);
+    if (code) return code;
+    for (int i = 0; i < model->nu; i++) u[i] += change[i];
+    return 0;
+}

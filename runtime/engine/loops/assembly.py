@@ -1,0 +1,176 @@
+"""Assembly: the nearest state in which the loops are closed.
+
+Positions by steps that let the rows give way (Levenberg, Quart. Appl. Math. 2 (1944) 164-168):
+with mu times their mobility on the diagonal of L a step is the change of least inertia that closes
+the gaps as far as mu allows, and far from where a loop closes it does not run wild.  Speeds by one
+correction, as slips are linear in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+
+from ...pack.loops.variants import held
+from ...pack.pack import packed_system
+from ..engine import Engine
+from .calls import LoopCalls
+
+#: Longest step of a coordinate (rad, m), and most steps.
+_LONGEST, _STEPS = 0.5, 300
+#: Compliance of the rows: the first, and where there is no use in more or in less.
+_FIRST, _MOST, _LEAST = 1e-2, 1e8, 1e-12
+#: Gap (m, rad) that is closed, and change (rad, m) at which nothing moves any more.
+_CLOSED, _STILL = 1e-10, 1e-9
+#: Other starts where one leads to an open loop, and how far they are from it (rad, m).
+_TRIES, _SHAKEN = 4, 0.1
+#: So much that the own coordinates of closing hinges alone follow.
+_ALONE = 1e14
+
+
+def with_held(engine: Engine, hinges: Collection[str]) -> Engine:
+    """The engine of the same scene with all speeds of some hinges imposed."""
+    packed = engine.packed
+    places = {packed.hinge_position[name] for name in hinges}
+    return Engine(packed_system(held(packed.system, places), packed)) if places else engine
+
+
+class Assembly:
+    """Assembly of one packed scene with some hinges held; `q` (nq,) is near what is asked."""
+
+    def __init__(self, engine: Engine, q: Array, hinges: Collection[str] = ()) -> None:
+        self.held = tuple(hinges)
+        self.calls = LoopCalls(with_held(engine, hinges), q)
+        self._weights = self._weighted()
+        #: 1 for speeds that nobody holds.
+        self.free = self._free_speeds()
+
+    def positions(self, q: Array, much: float = 0.0) -> Array:
+        """q (nq,) with loops closed, or with gaps that no change closes of up to `much` (m, rad).
+
+        Raises SceneError with the least gap and what was held where there is none near.
+        """
+        draw, start = np.random.default_rng(0), q
+        nearest, missing = self._nearest(start)
+        for _ in range(_TRIES):
+            if self._largest(missing) <= max(much, _CLOSED):
+                return nearest
+            # Where all is in line nothing tells which way to bend.
+            shaken = draw.uniform(-_SHAKEN, _SHAKEN, len(self._still)) * self.free
+            trial, after = self._nearest(self.calls.moved(start, shaken))
+            if self._largest(after) < self._largest(missing):
+                nearest, missing = trial, after
+        if self._largest(missing) <= max(much, _CLOSED):
+            return nearest
+        raise SceneError(self._open(missing))
+
+    def _nearest(self, q: Array) -> tuple[Array, Array]:
+        """q of the least gap that steps from q lead to, and what the rows lack there."""
+        q, give = self._own(q), _FIRST
+        rest = self._rest(q)
+        for _ in range(_STEPS):
+            change, missing = self.calls.correction(self.calls.gap, q, self._still, give)
+            if self._largest(missing) < _CLOSED:
+                q = self.calls.moved(q, change)
+                break
+            length = float(np.abs(change).max(initial=0.0))
+            trial = self._own(self.calls.moved(q, change * min(1.0, _LONGEST / (length or 1.0))))
+            after = self._rest(trial)
+            if after < rest:
+                whole = 3.0 if length < _LONGEST else 1.0
+                give = max(give / (10.0 if after < rest / 2.0 else whole), _LEAST)
+                q, rest = trial, after
+            elif give > _MOST or length < _STILL:
+                break
+            else:
+                give *= 10.0
+        return q, self.calls.correction(self.calls.gap, q, self._still, _MOST)[1]
+
+    def speeds(self, q: Array, u: Array) -> Array:
+        """u (nu,) without slips at the closed q.  SceneError where those held do not allow it."""
+        u = u + self.calls.correction(self.calls.slip, q, u)[0]
+        missing = self.calls.correction(self.calls.slip, q, u)[1]
+        largest = self._largest(missing)
+        if largest > 1e-8 * max(1.0, float(np.abs(u).max(initial=0.0))):
+            row = int(np.abs(missing).argmax())
+            raise SceneError(
+                f"scene: the speeds given for {self._names()} contradict each other by "
+                f"{abs(missing[row]):.3g} {self._unit(row)}/s where {self._hinge(row)} closes a "
+                "loop; give fewer of them, or others"
+            )
+        return u
+
+    def _free_speeds(self) -> Array:
+        found, layout = np.ones(self.calls.engine.nu), self.calls.engine.packed.layout
+        for hinge in self.calls.engine.packed.scene.hinge:
+            slots = layout.hinges[hinge.name]
+            drive = hinge.drive or (None,) * slots.nu
+            for k in range(slots.nu):
+                bound = hinge.name in self.held or hinge.is_weld or drive[k] is not None
+                found[slots.u + k] = float(not bound)
+        return found
+
+    @property
+    def _still(self) -> Array:
+        return np.zeros(self.calls.engine.nu)
+
+    def _own(self, q: Array) -> Array:
+        """q with the own coordinates of closing hinges where the bodies put them."""
+        for _ in range(12):
+            change, _ = self.calls.correction(self.calls.gap, q, self._still, _ALONE)
+            length = float(np.abs(change).max(initial=0.0))
+            if not length > _STILL:
+                break
+            q = self.calls.moved(q, change * min(1.0, _LONGEST / length))
+        return q
+
+    def _rest(self, q: Array) -> float:
+        missing = self.calls.correction(self.calls.gap, q, self._still, _ALONE)[1]
+        return float(np.sum(self._weights * missing**2))
+
+    def _largest(self, missing: Array) -> float:
+        return float(np.abs(missing).max(initial=0.0))
+
+    def _weighted(self) -> Array:
+        """The same for all gaps and for all angles: the mean mobility of their kind, so that the
+        least gap is that of the geometry."""
+        calls = self.calls
+        turning = np.zeros(calls.count, bool)
+        for one in calls.records.closures:
+            directions = calls.numbers_of(one, "W")
+            for direction, row in one.rows.items():
+                force, moment = directions[direction, :3], directions[direction, 3:]
+                turning[row] = moment @ moment > force @ force
+        weights, self._turning = np.ones(calls.count), turning
+        for kind in (turning, ~turning):
+            if kind.any():
+                weights[kind] = 1.0 / calls.mobility[kind].mean()
+        for row in range(calls.count):
+            calls.records.scale(row, 1.0 / float(weights[row]))
+        return weights
+
+    # --- words ------------------------------------------------------------------------------------
+
+    def _open(self, missing: Array) -> str:
+        row = int(np.abs(missing).argmax())
+        while_held = f" with {self._names()} held" if self.held else ""
+        return (
+            f"scene: the loop that {self._hinge(row)} closes stays open: the nearest pose leaves "
+            f"{abs(missing[row]):.7g} {self._unit(row)}{while_held}; correct the lengths, or start "
+            "nearer to where it closes"
+        )
+
+    def _names(self) -> str:
+        return ", ".join(f'"{name}"' for name in self.held) or "driven hinges"
+
+    def _hinge(self, row: int) -> str:
+        closures = self.calls.records.closures
+        frame = next(one.frame for one in closures if row in one.rows.values())
+        return f'hinge "{self.calls.engine.hinge_name(frame)}"'
+
+    def _unit(self, row: int) -> str:
+        return "rad" if self._turning[row] else "m"

@@ -1,0 +1,143 @@
+"""Calls of the looped engine about closed loops."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+from ...pack.records.loops import WrittenClosure
+from ..engine import Engine
+
+#: A pivot below this share of the mobility of its row is rounding.
+ROUNDING = 1e-8
+
+
+class LoopCalls:
+    """Gaps and slips of the loops of one packed scene, and what corrects them.
+
+    Every row is given the mobility of its ends at `q` (nq,), if they were free: the scale by which
+    a pivot is judged.
+    """
+
+    def __init__(self, engine: Engine, q: Array) -> None:
+        records = engine.packed.written.loops
+        assert records is not None
+        self.engine, self.records, self.model = engine, records, engine.packed.model
+        self.count = records.count
+        self.memory = engine.start_memory()
+        quaternions = np.append(engine.packed.layout.quaternions, 0).astype(np.int32)
+        self._quaternions = quaternions
+        self.mobility = np.ones(self.count)
+        self.correction(self.gap, q, np.zeros(engine.nu))
+        self.mobility = self._mobilities()
+        for row, mobility in enumerate(self.mobility.tolist()):
+            records.scale(row, mobility)
+            records.judge(row, max(records.floor(row), ROUNDING * mobility))
+
+    @property
+    def gap(self) -> int:
+        return int(self.engine.lib.MSTMM_GAP)
+
+    @property
+    def slip(self) -> int:
+        return int(self.engine.lib.MSTMM_SLIP)
+
+    def correction(
+        self, level: int, q: Array, u: Array, give: float = 0.0, t: float = 0.0
+    ) -> tuple[Array, Array]:
+        """(change along the speeds (nu,), what the rows lack (rows,)); see sweep.h."""
+        engine = self.engine
+        change, missing = np.zeros(engine.nu), np.zeros(max(1, self.count))
+        failure = engine.ffi.new("mstmm_failure *")
+        code = engine.lib.mstmm_correction(
+            self.model, engine.workspace(), level, give, t, engine.pointer(q), engine.pointer(u),
+            engine.pointer(self.memory), engine.pointer(change), engine.pointer(missing), failure,
+        )  # fmt: skip
+        if code:
+            raise engine.failed(failure, t, q, u)
+        return change, missing[: self.count]
+
+    def moved(self, q: Array, change: Array, t: float = 0.0) -> Array:
+        """q (nq,) moved by a change along the speeds (nu,)."""
+        engine, result = self.engine, q.copy()
+        failure = engine.ffi.new("mstmm_failure *")
+        code = engine.lib.mstmm_moved(
+            self.model, engine.workspace(), t, engine.pointer(result), engine.pointer(change),
+            engine.pointer(self.memory), len(self._quaternions) - 1,
+            engine.ffi.from_buffer("int[]", self._quaternions), failure,
+        )  # fmt: skip
+        if code:
+            raise engine.failed(failure, t, q, change)
+        return result
+
+    def driven(self, q: Array, u: Array, t: float = 0.0) -> tuple[Array, Array]:
+        """The state with driven coordinates filled in."""
+        engine, q, u = self.engine, q.copy(), u.copy()
+        failure = engine.ffi.new("mstmm_failure *")
+        code = engine.lib.mstmm_fill_driven(
+            self.model, engine.workspace(), t, engine.pointer(q), engine.pointer(u),
+            engine.pointer(self.memory), failure,
+        )  # fmt: skip
+        if code:
+            raise engine.failed(failure, t, q, u)
+        return q, u
+
+    def inverses(self) -> Array:
+        """1 / pivot of every row in the last correction, 0 for rows without a multiplier."""
+        return self._of_rows("INVERSE")
+
+    def pivots(self) -> Array:
+        """The pivots of the rows in the last correction."""
+        return self._of_rows("PIVOT")
+
+    def _of_rows(self, name: str) -> Array:
+        lib, stride = self.engine.lib, int(self.engine.lib.MSTMM_ROW)
+        first = self.records.place + int(getattr(lib, f"MSTMM_ROW_{name}"))
+        return self.engine.workspace_array()[first : first + stride * self.count : stride].copy()
+
+    def numbers_of(self, one: WrittenClosure, name: str) -> Array:
+        """Numbers of a closure after a correction: W, J_A or J_B, 6 rows of 6."""
+        at = self.records.place + one.numbers
+        at += int(getattr(self.engine.lib, f"MSTMM_CLOSURE_{name}"))
+        return self.engine.workspace_array()[at : at + 36].reshape(6, 6).copy()
+
+    def _mobilities(self) -> Array:
+        """J M^-1 J^T of both ends, bodies taken as free; of what has no mass that of the others."""
+        found, masses = np.zeros(self.count), _Masses(self.engine)
+        for one in self.records.closures:
+            for body, name in ((one.inboard, "J_A"), (one.outboard, "J_B")):
+                if body >= 0:
+                    columns, inverse = self.numbers_of(one, name), masses.inverse(body)
+                    for direction, row in one.rows.items():
+                        column = columns[direction]
+                        found[row] += column @ inverse @ column
+        known = found[found > 0]
+        found[~(found > 0)] = known.mean() if len(known) else 1.0
+        return found
+
+
+class _Masses:
+    """Inverse mass matrices of bodies alone, about their input ends."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine, self.which = engine, engine.packed.system.which
+        self.distinct = list(engine.packed.system.distinct)
+        self.known: dict[int, Array] = {}
+
+    def inverse(self, body: int) -> Array:
+        number = int(self.which[body])
+        if number not in self.known:
+            one, engine = self.distinct[number], self.engine
+            upper = np.zeros(21)
+            call = engine.ffi.cast(
+                "int (*)(const double *, double *)",
+                engine.packed.elements[one.body].functions["inertia"],
+            )
+            call(list(one.body_p), engine.ffi.from_buffer("double[]", upper))
+            matrix = np.zeros((6, 6))
+            matrix[np.triu_indices(6)] = upper
+            whole = matrix + np.triu(matrix, 1).T
+            inverse = np.linalg.pinv(whole, rcond=1e-12, hermitian=True)
+            self.known[number] = np.asarray(inverse, dtype=np.float64)
+        return self.known[number]

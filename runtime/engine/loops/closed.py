@@ -1,0 +1,143 @@
+"""The closed loops of a model: assembled, their rows judged, and told of."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+
+from ...pack.loops.variants import length_of, without
+from ...pack.pack import packed_system
+from ...pack.start import start_values
+from ..engine import Engine
+from .assembly import Assembly
+from .calls import LoopCalls
+from .rank import REPEATED, rank_at
+
+#: Directions of a hinge that closes a loop, as its rows are called.
+_DIRECTIONS = ("x", "y", "z", "mx", "my", "mz")
+#: Gap of a row that repeats others, in parts of the length of the scene, at which a rigid mechanism
+#: locks.
+_LOCKED = 1e-3
+#: Gaps at which it may still be that rows repeat others but for a misfit, likewise.
+_NEARLY = 1e-2
+
+
+@dataclass(frozen=True)
+class Loops:
+    """What closes in a scene.
+
+    Attributes:
+        cut: hinges that close loops; which of a loop's hinges does changes nothing but the work.
+        rows: (hinge, direction) of every row, in the order in which they are closed: "x" to "mz"
+            along and about the outboard axes of the hinge, "u1", ... for its own speeds.
+        rank: how many rows say something of their own.
+        redundant: rows that repeat others, so that the loads along them are not determined.
+        mobility: speeds that are left free.
+        width: most rows that are open across one hinge at a time.
+        singular: whether the start is a singular pose, where fewer rows count than nearby.
+    """
+
+    cut: tuple[str, ...] = ()
+    rows: tuple[tuple[str, str], ...] = ()
+    rank: int = 0
+    redundant: tuple[tuple[str, str], ...] = ()
+    mobility: int = 0
+    width: int = 0
+    singular: bool = False
+
+
+class Closed:
+    """The start of a scene with its loops closed, and what is known of them.
+
+    `engine` is the one to go on with, in which rows that always repeat others are left out.
+    """
+
+    def __init__(self, engine: Engine, free_speeds: int) -> None:
+        packed, self.engine = engine.packed, engine
+        hinges = [hinge for hinge in packed.described.hinge if not hinge.is_weld]
+        holds = [hinge.name for hinge in hinges if hinge.hold]
+        fast = [
+            hinge.name for hinge in hinges
+            if hinge.drive is None and hinge.initial is not None and any(hinge.initial.u or ())
+        ]  # fmt: skip
+        q, u = start_values(packed.scene, packed.layout)
+        calls = LoopCalls(engine, q)
+        q, u = calls.driven(q, u)
+        length = length_of(packed.system)
+        near = Assembly(engine, q, holds).positions(q, _NEARLY * length)
+        self.loops, repeating = self._judged(near, free_speeds)
+        self.start = self.assembled(near, u, holds, fast)
+        self._refuse_locked(calls, repeating, _LOCKED * length)
+
+    def assembled(
+        self, q: Array, u: Array, holds: Collection[str], fast: Collection[str]
+    ) -> tuple[Array, Array]:
+        """The nearest (q, u) with loops closed; positions of `holds` and speeds of `fast` stay.
+
+        Raises SceneError where there is none.
+        """
+        q = Assembly(self.engine, q, holds).positions(q)
+        return q, Assembly(self.engine, q, fast).speeds(q, u)
+
+    def _judged(self, q: Array, free_speeds: int) -> tuple[Loops, dict[int, tuple[str, str]]]:
+        """What closes near q, and the rows that always repeat others."""
+        rank, calls = rank_at(self.engine, q), LoopCalls(self.engine, q)
+        packed, records = self.engine.packed, calls.records
+        names = self._names(calls)
+        met = [row for row in range(calls.count) if not records.yields(row)]
+        rows = len(met) - len(rank.here)
+        if packed.releases:
+            # What repeats others now may be needed once these let go: by every evaluation.
+            for row in rank.going:
+                records.judge(row, REPEATED * float(calls.mobility[row]))
+        elif rank.going:
+            repeated = {
+                (one.frame, direction)
+                for one in records.closures
+                for direction, row in one.rows.items() if row in rank.going
+            }  # fmt: skip
+            self.engine = Engine(packed_system(without(packed.system, repeated), packed))
+            records = LoopCalls(self.engine, q).records
+        told = Loops(
+            tuple(cut.hinge for cut in packed.expanded.cuts), tuple(names), rows,
+            tuple(names[row] for row in sorted(rank.here)),
+            free_speeds - self._shared() - rows, records.width, rank.singular,
+        )  # fmt: skip
+        return told, {row: names[row] for row in sorted(rank.going)}
+
+    def _refuse_locked(
+        self, calls: LoopCalls, repeating: Mapping[int, tuple[str, str]], much: float
+    ) -> None:
+        """SceneError where a row that repeats others leaves a gap that they do not close."""
+        q, u = self.start
+        missing = np.abs(calls.correction(calls.gap, q, np.zeros(len(u)))[1])
+        for row, (hinge, direction) in repeating.items():
+            if missing[row] > much:
+                raise SceneError(
+                    f'scene: direction {direction} of hinge "{hinge}" repeats what other hinges '
+                    f"do, but for a gap of {missing[row]:.3g}: as a rigid mechanism it would lock; "
+                    "make axes parallel and points meet, or use a ball or cylindrical hinge"
+                )
+
+    def _shared(self) -> int:
+        """Speeds of cut hinges that nobody imposes: the tree has them already."""
+        system = self.engine.packed.system
+        frames = [system.body(one.frame) for one in system.closures]
+        return sum(frame.nu - sum(frame.imposed) for frame in frames)
+
+    def _names(self, calls: LoopCalls) -> list[tuple[str, str]]:
+        """(hinge, direction) of every row."""
+        names, system = [("", "")] * calls.count, self.engine.packed.system
+        for one in calls.records.closures:
+            hinge, speeds = calls.engine.hinge_name(one.frame), system.body(one.frame).nu
+            directions = calls.numbers_of(one, "W")
+            for direction, row in one.rows.items():
+                along = int(np.abs(directions[direction]).argmax())
+                word = f"u{direction + 1}" if direction < speeds else _DIRECTIONS[along]
+                names[row] = (hinge, word)
+        return names

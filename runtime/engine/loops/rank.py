@@ -1,0 +1,121 @@
+"""Which rows of closed loops say what others say already.
+
+Decided once, at a state in which the loops are closed, and in a metric of the geometry: with true
+masses a heavy coupler makes honest rows look like rounding.  The level of a row that repeats others
+but for a misfit is the square of the misfit.  A row that repeats others here but not in closed
+states nearby is no repetition but a singular pose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
+
+from ...pack.loops.variants import geometric
+from ...pack.pack import packed_system
+from ..engine import Engine
+from .calls import LoopCalls
+
+#: A pivot below this share of the mobility of its row repeats others: misfits up to 4e-3 rad.
+REPEATED = 1e-6
+#: Closed states nearby: how many, and how far (rad, m).
+_NEIGHBOURS, _AWAY = 3, 3e-2
+#: A row that repeats others here does so there too where its pivot is not this many times larger,
+#: or not larger than rounding, in parts of the mobility.
+_RAISED, _ROUNDING = 1e2, 1e-12
+#: Most steps to such a state, the gap (m, rad) that is none, the compliance of rows at first, and
+#: by the gap that is left.
+_STEPS, _CLOSED, _GIVE, _SHARE = 60, 1e-9, 1e-6, 1e-2
+
+
+@dataclass(frozen=True)
+class Rank:
+    """Rows that repeat others here, those of them that do so in closed states nearby too, and those
+    of these that go: the others take the place of another row of their hinge where that one says
+    nothing, at a pose farther away."""
+
+    here: frozenset[int]
+    always: frozenset[int]
+    going: frozenset[int]
+
+    @property
+    def singular(self) -> bool:
+        """Whether the pose is singular."""
+        return self.here != self.always
+
+
+def rank_at(engine: Engine, q: Array) -> Rank:
+    """Rows that repeat others at a closed state q (nq,) and around it."""
+    packed = engine.packed
+    calls = LoopCalls(Engine(packed_system(geometric(packed.system), packed)), q)
+    level = REPEATED * calls.mobility
+    here = _repeating(calls, q, level)
+    if not here:
+        return Rank(here, here, here)
+    raised = _RAISED * np.abs(calls.pivots()) + _ROUNDING * calls.mobility
+    level[list(here)] = np.minimum(level, raised)[list(here)]
+    always, draw = here, np.random.default_rng(0)
+    for _ in range(_NEIGHBOURS):
+        near = _neighbour(calls, q, draw.uniform(-1.0, 1.0, engine.nu))
+        always = always if near is None else always & _repeating(calls, near, level)
+    gaps = calls.correction(calls.gap, q, np.zeros(engine.nu))[1]
+    if np.abs(gaps).max() > _CLOSED:
+        return Rank(here, always, always)
+    return Rank(here, always, always - _stand_ins(calls, q, always))
+
+
+def _stand_ins(calls: LoopCalls, q: Array, left_out: frozenset[int]) -> frozenset[int]:
+    """Rows that say something once another row of their hinge is left out in their place: they stay
+    where all gaps close, and at each pose the first that say something count.
+
+    Tried for all hinges at a time: what each leaves out first for what it keeps first, and so on.
+    """
+    hinges = [set(one.rows.values()) for one in calls.records.closures]
+    sides = [(sorted(rows & left_out), sorted(rows - left_out)) for rows in hinges]
+    found: set[int] = set()
+    for out, kept in product(range(6), range(6)):
+        pairs = [(o[out], k[kept]) for o, k in sides if out < len(o) and kept < len(k)]
+        if pairs:
+            level = REPEATED * calls.mobility
+            level[list(left_out | {k for _, k in pairs})] = np.inf
+            level[[o for o, _ in pairs]] = REPEATED * calls.mobility[[o for o, _ in pairs]]
+            found |= {o for o, _ in pairs} - _repeating(calls, q, level)
+    return frozenset(found)
+
+
+def _repeating(calls: LoopCalls, q: Array, level: Array) -> frozenset[int]:
+    """Rows whose pivots are below their level, those before them taken as met."""
+    for row, floor in enumerate(level.tolist()):
+        calls.records.judge(row, floor)
+    calls.correction(calls.slip, q, np.zeros(calls.engine.nu))
+    return frozenset(np.flatnonzero(calls.inverses() == 0.0).tolist())
+
+
+def _neighbour(calls: LoopCalls, q: Array, speeds: Array) -> Array | None:
+    """A closed state on the way that speeds without slips lead; None where they lead nowhere.
+
+    All rows are met there, those that repeat others here as well.
+    """
+    for row in range(calls.count):
+        calls.records.judge(row, 0.0)
+    try:
+        tangent = speeds + calls.correction(calls.slip, q, speeds)[0]
+        length = float(np.abs(tangent).max(initial=0.0))
+        if not length > 1e-9:
+            return None
+        near = calls.moved(q, tangent * (_AWAY / length))
+        give = _GIVE
+        for _ in range(_STEPS):
+            change, missing = calls.correction(calls.gap, near, np.zeros_like(speeds), give)
+            rest = float(np.abs(missing).max(initial=0.0))
+            if rest < _CLOSED:
+                return near
+            near, give = calls.moved(near, change), min(_GIVE, _SHARE * rest)
+    except NumericalFailure:
+        pass
+    return None

@@ -1,0 +1,60 @@
+"""A scene with closed loops -> the tree in which every cut hinge ends at a frame of its own.
+
+The frame C of a cut hinge is a body without mass with the ends of the body B that it stands for, so
+that a hinge keeps its kernels, coordinates, law and drive, cut or not.  That C is where B is are
+the rows of the loop.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mstmm.graph.plan import Plan
+from mstmm.scene import Body, Scene
+from mstmm.scene.checks.topology import build
+
+from .unknown import may_close, refuse_unknown
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """A hinge that closes a loop: its frame stands for `body` and has a name of its own."""
+
+    hinge: str
+    frame: str
+    body: str
+
+
+def opened(scene: Scene) -> tuple[Scene, tuple[Cut, ...]]:
+    """The tree, and what is cut in the order in which it closes; a tree is its own.
+
+    Raises SceneError for what closes loops but is no hinge between rigid bodies.
+    """
+    if not may_close(scene):
+        return scene, ()
+    refuse_unknown(scene)
+    plan = build(scene).plan
+    if plan is None:
+        return scene, ()
+    tables, bodies, cuts = list(scene.hinge), list(scene.body), []
+    for number in _in_order(plan):
+        hinge = tables[number]
+        end = f".{hinge.outboard_end}" if hinge.outboard_end else ""
+        cut = Cut(hinge.name, f"{hinge.name}/cut", hinge.outboard_body)
+        held = {"outboard": cut.frame + end, "cut": None}
+        tables[number] = hinge.model_copy(update=held)
+        ends = scene.bodies.by_name[cut.body].ends
+        frame = Body(name="frame", mass=0.0)
+        bodies.append(frame.model_copy(update={"name": cut.frame, "ends": ends}))
+        cuts.append(cut)
+    fields = {name: getattr(scene, name) for name in type(scene).model_fields}
+    fields |= {"body": tuple(bodies), "hinge": tuple(tables)}
+    return Scene.model_construct(**fields), tuple(cuts)
+
+
+def _in_order(plan: Plan) -> list[int]:
+    """The hinges that are cut as they close, behind them those without rows."""
+    with_rows = plan.cut_of
+    order = [with_rows[one.group] for one in plan.closings if one.group < len(with_rows)]
+    known = set(with_rows)
+    return [*order, *(hinge for hinge in plan.cut if hinge not in known)]

@@ -1,0 +1,47 @@
+"""What closes loops and is read, but not compiled yet."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mstmm.errors import SceneError
+from mstmm.graph.plan import Plan
+from mstmm.scene import Scene
+from mstmm.scene.checks.topology import build
+
+if TYPE_CHECKING:
+    from mstmm.scene.tables.all import SceneTables
+
+#: So many hinges of a loop are named.
+_NAMED = 8
+
+
+def may_close(scene: Scene) -> bool:
+    """Whether anything but a tree can be meant: more hinges than bodies, or rows between bodies."""
+    skeleton = scene.skeleton
+    more = len(skeleton.hinge) != len(skeleton.body)
+    return more or bool(scene.constraint or scene.coupling)
+
+
+def refuse_unknown(scene: Scene) -> None:
+    """SceneError for what closes loops and is read and checked, but not compiled yet."""
+    for table in ("constraint", "coupling"):
+        if getattr(scene, table):
+            raise SceneError(
+                f'scene: {table} "{getattr(scene, table)[0].name}" is read and checked, but not '
+                "compiled yet; a hinge that closes the loop is, or put a stiff [[spring]] there"
+            )
+    if (scene.beam or scene.elastic) and may_close(scene):
+        plan = build(scene.skeleton).plan
+        assert plan is not None
+        raise SceneError(
+            f"scene: {named_loop(scene.skeleton, plan)} is closed, which scenes with flexible "
+            "bodies cannot be yet; make the bodies rigid, or close it with a stiff [[spring]]"
+        )
+
+
+def named_loop(scene: SceneTables, plan: Plan) -> str:
+    """The first loop by its hinges."""
+    around = plan.loop(plan.cut[0])
+    names = " - ".join(scene.hinges.name(hinge) for hinge in around[:_NAMED])
+    return f'loop "{names}{" ..." if len(around) > _NAMED else ""}"'

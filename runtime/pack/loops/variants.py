@@ -1,0 +1,73 @@
+"""The same loops in another light: with coordinates held, or with bodies that are all alike."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from ..bodies import RIGID
+from ..system import BodyNumbers, BodyRun, ClosureNumbers, System
+
+#: Radius of gyration of a body in the metric of the geometry, in parts of the length.
+_GYRATION = 1.0 / 3.0
+
+
+def held(system: System, places: Collection[int]) -> System:
+    """With all speeds of the hinges at some places imposed, but for those of chains."""
+    if not places:
+        return system
+    runs = tuple(_run_held(run) if run.place in places else run for run in system.bodies)
+    speeds = {run.place: run.alike[0].nu for run in runs if run.place in places}
+    closures = tuple(
+        _closure_held(one, speeds[one.frame]) if one.frame in places else one
+        for one in system.closures
+    )
+    return replace(system, bodies=runs, closures=closures)
+
+
+def _run_held(run: BodyRun) -> BodyRun:
+    if run.count != 1:
+        return run
+    body = run.alike[0]
+    return replace(run, alike=(replace(body, imposed=(1,) * body.nu, release=-1),))
+
+
+def _closure_held(one: ClosureNumbers, speeds: int) -> ClosureNumbers:
+    others = (k for k in one.directions if k >= speeds)
+    return replace(one, directions=(*range(speeds), *others))
+
+
+def without(system: System, rows: Collection[tuple[int, int]]) -> System:
+    """Without some rows, each given by the place of its closure's frame and its direction."""
+    closures = tuple(
+        replace(one, directions=tuple(k for k in one.directions if (one.frame, k) not in rows))
+        for one in system.closures
+    )
+    return replace(system, closures=closures)
+
+
+def length_of(system: System) -> float:
+    """Mean square distance between hinges, m; 1 where all of them meet in one point."""
+    squares = [sum(x * x for x in body.connection[9:12]) for body in system.distinct]
+    squares += [sum(x * x for x in one.end) for one in system.closures]
+    found = [square for square in squares if square > 0]
+    return float(np.sqrt(np.mean(found))) if found else 1.0
+
+
+def geometric(system: System) -> System:
+    """With mass 1 at the input end of every rigid body, and one radius of gyration for all: what
+    moves is not hidden behind what is heavy."""
+    moment = (_GYRATION * length_of(system)) ** 2
+    numbers = (1.0, 0.0, 0.0, 0.0, moment, 0.0, 0.0, moment, 0.0, moment)
+    frames = {one.frame for one in system.closures}
+
+    def alike(body: BodyNumbers) -> BodyNumbers:
+        return replace(body, body_p=numbers) if body.body[1] == RIGID else body
+
+    runs = tuple(
+        run if run.place in frames else replace(run, alike=tuple(map(alike, run.alike)))
+        for run in system.bodies
+    )
+    return replace(system, bodies=runs)

@@ -1,0 +1,177 @@
+"""Closed loops -> C records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ..loops.rows import GROUND, Ends, RowPlan, planned
+from ..system import ClosureNumbers, System
+from .memory import Memory
+
+
+@dataclass(frozen=True)
+class WrittenClosure:
+    """A hinge that closes a loop: the place of its frame, those of its bodies, where its numbers
+    begin behind those of all loops, and the row of each direction that has one."""
+
+    frame: int
+    inboard: int
+    outboard: int
+    numbers: int
+    rows: dict[int, int]
+
+
+class LoopRecords:
+    """Closed loops in the memory of C; `place` is where their numbers begin in the workspace."""
+
+    def __init__(
+        self, place: int, plan: RowPlan, rows: Any, closures: tuple[WrittenClosure, ...]
+    ) -> None:
+        self.place, self.closures, self._rows = place, closures, rows
+        self.count = len(plan.rows)
+        self.width = max(map(len, plan.pending.values()), default=0)
+
+    def yields(self, row: int) -> bool:
+        """Whether the row is that of a rotor."""
+        return bool(self._rows[row].softness > 0)
+
+    def scale(self, row: int, mobility: float) -> None:
+        """Take this for the mobility of a row where rows give way."""
+        self._rows[row].mobility = mobility
+
+    def judge(self, row: int, floor: float) -> None:
+        """Take pivots of a row up to `floor` for rounding."""
+        self._rows[row].floor = floor
+
+    def floor(self, row: int) -> float:
+        """Up to where pivots of a row are rounding."""
+        return float(self._rows[row].floor)
+
+
+def attach_loops(
+    model: Any, system: System, memory: Memory, lib: Any, place: int
+) -> tuple[int, LoopRecords | None]:
+    """Give the model the rows of its loops and a place for them in the workspace; returns the place
+    behind them, and the records."""
+    if not system.closures:
+        return place, None
+    return _Loops(model, system, memory, lib).write(place)
+
+
+class _Loops:
+    """Numbers of loops lie behind the place that the model names, in this order: rows, a dump for
+    columns on the ground, entries of L, columns, then what is no sum: y of the columns, closures.
+    """
+
+    def __init__(self, model: Any, system: System, memory: Memory, lib: Any) -> None:
+        self.model, self.system, self.memory, self.lib = model, system, memory, lib
+        self.parents = [int(parent) for parent in system.parents]
+        self.ends = [
+            Ends(self.parents[one.frame], one.outboard, len(one.directions))
+            for one in system.closures
+        ]
+        self.plan: RowPlan = planned(self.parents, self.ends)
+        self.row_numbers = int(lib.MSTMM_ROW)
+        count = len(self.plan.rows)
+        self.dump = count * self.row_numbers
+        self.entries = {pair: self.dump + 6 + k for k, pair in enumerate(self.plan.pairs)}
+        start = self.dump + 6 + len(self.entries)
+        self.columns: dict[tuple[int, int], int] = {}
+        for body, rows in self.plan.pending.items():
+            for row in rows:
+                self.columns[body, row] = start
+                start += 6
+        self.summed = self.end = start
+
+    def write(self, place: int) -> tuple[int, LoopRecords]:
+        model, memory = self.model, self.memory
+        looped = memory.new("mstmm_looped[]", self.system.count)
+        for body, rows in self.plan.pending.items():
+            looped[body].n_pending = len(rows)
+            looped[body].pending = self._pending(body, rows)
+        records = memory.new("mstmm_loop_row[]", max(1, len(self.plan.rows)))
+        model.first_ground_row = len(self.plan.rows)
+        for number, row in enumerate(self.plan.rows):
+            records[number].body = row.body
+            records[number].release = -1
+            records[number].n_others = len(row.others)
+            records[number].others = self._others(row.body, row.others, number)
+            if row.body == GROUND:
+                model.first_ground_row = min(model.first_ground_row, number)
+            else:
+                at = looped[row.body]
+                at.first_row = number if not at.n_rows else at.first_row
+                at.n_rows += 1
+        written = []
+        for group, closure in enumerate(self.system.closures):
+            looped[closure.frame].closure, told = self._closure(group, closure, records)
+            written.append(told)
+        model.looped, model.rows, model.n_rows = looped, records, len(self.plan.rows)
+        model.loops, model.loops_summed = place, self.summed
+        return place + self.end, LoopRecords(place, self.plan, records, tuple(written))
+
+    def _take(self, count: int) -> int:
+        first = self.end
+        self.end += count
+        return first
+
+    def _column(self, body: int, row: int) -> int:
+        """Place of a row's column on a body: where it closes it is the row's own."""
+        return self.columns.get((body, row), row * self.row_numbers)
+
+    def _entry(self, one: int, other: int) -> int:
+        """Place of an entry of L."""
+        if one == other:
+            return one * self.row_numbers + int(self.lib.MSTMM_ROW_PIVOT)
+        return self.entries[min(one, other), max(one, other)]
+
+    def _places(self, places: list[int]) -> Any:
+        return self.memory.new("int64_t[]", places or [0])
+
+    def _pending(self, body: int, rows: list[int]) -> Any:
+        records = self.memory.new("mstmm_pending[]", len(rows))
+        speeds = self.system.body(body).nu
+        for k, row in enumerate(rows):
+            records[k].row = row
+            records[k].column = self.columns[body, row]
+            records[k].onward = self._column(self.parents[body], row)
+            records[k].y = self._take(speeds)
+            records[k].pairs = self._places([self._entry(row, other) for other in rows[: k + 1]])
+        return records
+
+    def _others(self, body: int, others: tuple[int, ...], number: int) -> Any:
+        records = self.memory.new("mstmm_other[]", max(1, len(others)))
+        for k, other in enumerate(others):
+            records[k].row = other
+            records[k].column = self._column(body, other)
+            records[k].pair = self._entry(number, other)
+            records[k].pairs = self._places([self._entry(other, x) for x in others[: k + 1]])
+        return records
+
+    def _closure(
+        self, group: int, closure: ClosureNumbers, rows: Any
+    ) -> tuple[Any, WrittenClosure]:
+        record = self.memory.new("mstmm_closure *")
+        record.outboard = closure.outboard
+        record.turn, record.end = list(closure.turn), list(closure.end)
+        record.numbers = self._take(int(self.lib.MSTMM_CLOSURE))
+        record.rows = [-1] * 6
+        body, own = self.system.body(closure.frame), dict[int, int]()
+        inboard = self.parents[closure.frame]
+        for k, direction in enumerate(closure.directions):
+            row = self.plan.first[group] + k
+            record.rows[direction] = own[direction] = row
+            sides = (inboard, closure.outboard)
+            inner, outer = (
+                self.dump if side == GROUND else self._column(side, row) for side in sides
+            )
+            record.inner[direction], record.outer[direction] = inner, outer
+            if direction >= body.nu:
+                continue
+            if body.imposed[direction]:
+                rows[row].release = body.release
+            else:
+                rows[row].softness = 1.0 / body.rotor[direction]
+        told = WrittenClosure(closure.frame, inboard, closure.outboard, record.numbers, own)
+        return record, told

@@ -1,0 +1,73 @@
+"""Closed mechanisms that others have published, against closed forms and printed numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mstmm
+
+from .scenes import andrews, four_bars
+
+#: Crank angle of the N-four-bar after 10 s: I theta'' = -W cos theta, solved to 15 digits.
+ANGLES = {2: -30.179800860191, 40: -30.026637417191}
+
+#: Andrews' squeezer at 0.03 s: IVP test set (andrews.f, by PSIDE at 1e-14), and its own precision.
+PRINTED = {
+    "beta": 15.81077119629904, "Theta": -15.75637105984298, "gamma": 0.04082224013073101,
+    "Phi": -0.5347301163226948, "delta": 0.5244099658805304, "Omega": 0.5347301163226948,
+    "eps": 1.048080741042263,
+}  # fmt: skip
+PRINTED_SPEEDS = {
+    "beta": 1139.920302151208, "Theta": -1424.379294994111, "gamma": 11.03291221937134,
+    "Phi": 19.29337464421385, "delta": 0.5735699284790808, "eps": 0.3231791658026955,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("count", "rtol", "bound"), [(2, 1e-6, 1e-3), (2, 1e-9, 1e-6), (40, 1e-6, 1e-3)]
+)
+def test_four_bars_pass_their_singular_pose(count: int, rtol: float, bound: float) -> None:
+    """Flat on the ground the windows could fold; the cranks stay side by side."""
+    model = mstmm.compile(mstmm.Scene(**four_bars(count)))
+    result = model.simulate(10.0, "dop853", rtol=rtol, atol=1e-3 * rtol, output_times=[0.0, 10.0])
+    assert result.success, result.message
+    cranks = result.q[-1, : count + 1]
+    assert abs(cranks[0] - ANGLES[count]) < bound
+    assert np.ptp(cranks) < 1e-12
+    assert result.statistics is not None
+    assert result.statistics.evaluations < 1500 * (2 if rtol < 1e-6 else 1)
+
+
+def test_four_bars_at_the_start() -> None:
+    """theta'' = -W cos(theta) / I with I = (N + 1) / 3 + N and W = g ((N + 1) / 2 + N)."""
+    for count in (1, 3, 30):
+        for angle in (0.4, 1.3, 2.5):
+            model = mstmm.compile(mstmm.Scene(**four_bars(count, angle)))
+            inertia = (count + 1) / 3 + count
+            weight = 9.81 * ((count + 1) / 2 + count)
+            q, u = model.initial_state()
+            udot = model.accelerations(q, u)
+            wanted = -weight * np.cos(angle) / inertia
+            assert np.abs(udot[: count + 1] - wanted).max() < 1e-11
+
+
+def test_andrews_squeezer_at_the_start() -> None:
+    model = mstmm.compile(mstmm.Scene(**andrews()))
+    udot = model.accelerations(*model.initial_state())
+    assert abs(udot[0] - 14222.4439199541) < 1e-6
+    assert abs(udot[1] + 10666.8329399656) < 1e-6
+    assert np.abs(udot[2:7]).max() < 1e-8
+    assert (model.loops.rank, model.loops.mobility) == (6, 1)
+
+
+def test_andrews_squeezer() -> None:
+    """The printed beta and Theta are off by 1.1e-9 and 1.4e-9 themselves."""
+    model = mstmm.compile(mstmm.Scene(**andrews()))
+    result = model.simulate(0.03, "dop853", rtol=1e-10, atol=1e-13, output_times=[0.0, 0.03])
+    assert result.success, result.message
+    for name, wanted in PRINTED.items():
+        assert abs(result.q[-1, model.layout.hinges[name].q] - wanted) < 3e-9, name
+    for name, wanted in PRINTED_SPEEDS.items():
+        found = result.u[-1, model.layout.hinges[name].u]
+        assert abs(found - wanted) < 1e-6 * abs(wanted), name

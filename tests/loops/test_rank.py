@@ -1,0 +1,116 @@
+"""Rows that repeat others, and what a model tells of its loops."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mstmm
+
+from .scenes import Scene, four_bars, rod
+from .test_four_bar import linkage
+
+#: A rotation that leaves no axis along a coordinate.
+SKEW = [0.31, -0.62, 0.44]
+
+
+def oblique(scene: Scene) -> Scene:
+    """A planar mechanism on the ground in an oblique plane."""
+    matrix = _rotation(*SKEW)
+    for hinge in scene["hinge"]:
+        if hinge["inboard"] == "ground":
+            hinge["orientation"] = SKEW
+            hinge["position"] = [float(x) for x in matrix @ hinge.get("position", [0, 0, 0])]
+    scene["gravity"] = [float(x) for x in matrix @ scene["gravity"]]
+    return scene
+
+
+def _rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
+    cx, cy, cz = np.cos([roll, pitch, yaw])
+    sx, sy, sz = np.sin([roll, pitch, yaw])
+    x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return z @ y @ x
+
+
+def loops_of(scene: Scene) -> mstmm.runtime.engine.loops.closed.Loops:
+    return mstmm.compile(mstmm.Scene(**scene)).loops
+
+
+@pytest.mark.parametrize(("count", "rows"), [(1, 5), (5, 25)])
+def test_pins_of_a_plane_in_space(count: int, rows: int) -> None:
+    """Of five rows a pin of a planar loop has two of its own, in any plane."""
+    for scene in (four_bars(count, 1.1), oblique(four_bars(count, 1.1))):
+        loops = loops_of(scene)
+        assert len(loops.rows) == rows
+        assert loops.rank == 2 * count
+        assert len(loops.redundant) == 3 * count
+        assert {word for _, word in loops.redundant} == {"z", "mx", "my"}
+        assert loops.mobility == 1 and not loops.singular and loops.width <= 4
+
+
+def test_an_oblique_plane_changes_no_motion() -> None:
+    found = []
+    for scene in (linkage("closing_pin"), oblique(linkage("closing_pin"))):
+        model = mstmm.compile(mstmm.Scene(**scene))
+        found.append(model.accelerations(*model.initial_state()))
+    assert np.abs(found[0] - found[1]).max() < 1e-11
+
+
+def test_a_ball_cut_leaves_one_row_too_many() -> None:
+    scene = linkage(None, laws=False)
+    scene["hinge"][3]["type"] = "ball"
+    scene["hinge"][3].pop("initial")
+    loops = loops_of(scene)
+    assert (len(loops.rows), loops.rank) == (3, 2)
+    assert loops.redundant == (("closing_pin", "z"),)
+
+
+def test_a_third_crank_repeats_a_row_of_its_own() -> None:
+    """Redundant across loops alone: each loop has two rows that count, together three."""
+    scene = four_bars(1, 1.1)
+    scene["body"].append(rod("third"))
+    scene["body"][2]["ends"]["middle"] = [0.5, 0, 0]
+    scene["hinge"] += [
+        {"name": "foot", "type": "pin", "inboard": "ground", "outboard": "third",
+         "position": [0.5, 0, 0], "initial": {"q": 1.1, "u": -1.0}},
+        {"name": "top", "type": "pin", "inboard": "coupler0.middle", "outboard": "third.tip",
+         "initial": {"q": 1.1, "u": -1.0}},
+    ]  # fmt: skip
+    loops = loops_of(scene)
+    assert (len(loops.rows), loops.rank, loops.mobility) == (10, 3, 1)
+    assert not loops.singular
+
+
+@pytest.mark.parametrize("count", [1, 2, 6])
+def test_flat_windows_are_a_singular_start(count: int) -> None:
+    """Flat on the ground a row of each loop says nothing; a little way off it does, so it stays."""
+    model = mstmm.compile(mstmm.Scene(**four_bars(count, 0.0)))
+    assert model.loops.singular
+    assert model.loops.rank < 2 * count
+    assert int(model.packed.model.n_rows) == 2 * count
+    result = model.simulate(0.5, rtol=1e-8)
+    assert result.success, result.message
+
+
+def test_masses_do_not_decide() -> None:
+    for mass in (1e-4, 1e6):
+        scene = linkage("closing_pin", laws=False)
+        scene["body"][1]["mass"] = mass
+        scene["body"][1]["inertia"] = [0.0, mass / 10, mass / 10]
+        assert loops_of(scene).rank == 2
+
+
+def test_an_axis_a_little_off_does_not_lock() -> None:
+    """Tilted by 1e-4 rad the pin still repeats what the others do."""
+    scene = linkage("closing_pin", laws=False)
+    scene["hinge"][3]["orientation"] = [1e-4, 0.0, 0.0]
+    loops = loops_of(scene)
+    assert (loops.rank, loops.mobility) == (2, 1)
+
+
+def test_a_tree_closes_nothing() -> None:
+    scene = linkage(None, laws=False)
+    del scene["hinge"][3]
+    assert loops_of(scene) == mstmm.runtime.engine.loops.closed.Loops()

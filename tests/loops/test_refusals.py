@@ -1,0 +1,92 @@
+"""What cannot follow closed loops yet says so, and names the loop; what can does its work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mstmm
+
+from .test_four_bar import linkage
+
+LOOP = 'loop "closing_pin - '
+
+
+@pytest.fixture(scope="module")
+def model() -> mstmm.Model:
+    return mstmm.compile(mstmm.Scene(**linkage("closing_pin", laws=False)))
+
+
+ASKED: dict[str, Callable[[mstmm.Model], Any]] = {
+    "solve": lambda m: m.solve(m.initial_state()[0], np.ones(m.nu)),
+    "mass matrix": lambda m: m.mass_matrix(m.initial_state()[0]),
+    "inverse dynamics": lambda m: m.inverse_dynamics(*m.initial_state(), np.zeros(m.nu)),
+    "equilibrium": lambda m: m.equilibrium(),
+    "linearize": lambda m: m.linearize(),
+    "modes": lambda m: m.modes(),
+    "frequency response": lambda m: m.frequency_response([1.0]),
+    "derivatives": lambda m: m.derivatives(*m.initial_state()),
+    "advise": lambda m: mstmm.advise(m, 0.1),
+    "chart": lambda m: mstmm.chart(m, 0.1),
+    **{
+        method: lambda m, method=method: m.simulate(0.1, method)  # type: ignore[misc]
+        for method in ("rodas5p", "esdirk436", "exprb32", "scipy-DOP853", "sundials-BDF")
+    },
+    **{
+        method: lambda m, method=method: m.simulate(0.1, method, step=1e-3)  # type: ignore[misc]
+        for method in ("genalpha", "dttmm-classical")
+    },
+    "least squares": lambda m: mstmm.compile(m.scene, sweep="qr"),
+    "product": lambda m: mstmm.compile(m.scene, sweep="product"),
+}
+
+
+@pytest.mark.parametrize("asked", ASKED)
+def test_refused(asked: str, model: mstmm.Model) -> None:
+    with pytest.raises(mstmm.SceneError) as caught:
+        ASKED[asked](model)
+    assert LOOP in str(caught.value) and "; " in str(caught.value)
+
+
+def test_no_fused_code(model: mstmm.Model) -> None:
+    assert model.engine_choice.startswith("looped: closed loops")
+    with pytest.raises(mstmm.SceneError, match="no fused code: closed loops"):
+        mstmm.compile(model.scene, engine="fused")
+
+
+def test_flexible_bodies() -> None:
+    scene = linkage("closing_pin", laws=False)
+    scene["body"].pop(1)
+    numbers = {"mass_per_length": 1.0, "bending_stiffness": 50.0}
+    scene["beam"] = [{"name": "coupler", "length": 1.1, **numbers}]
+    with pytest.raises(mstmm.SceneError, match=f"{LOOP}.* flexible bodies"):
+        mstmm.compile(mstmm.Scene(**scene))
+
+
+def test_constraints_and_couplings() -> None:
+    scene = linkage(None, laws=False)
+    del scene["hinge"][3]
+    distance = {"type": "distance", "from": "coupler.tip", "to": "rocker.tip", "length": 0.3}
+    coupling = {"expression": "crank_pin.q - 2*rocker_pin.q"}
+    for table, row in (("constraint", distance), ("coupling", coupling)):
+        with pytest.raises(mstmm.SceneError, match=f"{table} .* not compiled yet"):
+            mstmm.compile(mstmm.Scene(**scene, **{table: [row]}))
+
+
+@pytest.mark.parametrize("method", ["dopri5", "dop853", "pirk13", "auto"])
+def test_methods_that_close_loops(method: str, model: mstmm.Model) -> None:
+    result = model.simulate(0.5, method, rtol=1e-8)
+    assert result.success, result.message
+    reference = model.simulate(0.5, "dop853", rtol=1e-11)
+    assert np.abs(result.q[-1] - reference.q[-1]).max() < 1e-6
+
+
+def test_batches(model: mstmm.Model) -> None:
+    q, u = model.initial_state()
+    batch = model.simulate_batch((np.array([q, q]), np.array([u, 2 * u])), t_end=0.3)
+    assert batch.success.all()
+    alone = model.simulate(0.3, initial=(q, 2 * u), output_times=[0.0, 0.3])
+    assert np.abs(batch.q[1, -1] - alone.q[-1]).max() < 1e-12
