@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -23,7 +24,13 @@ def test_c_has_the_numbers_of_the_table(tmp_path: Path) -> None:
 
 def test_every_reason_has_a_sentence_of_its_own() -> None:
     path = ROOT / "examples" / "branched_tree" / "scene.toml"
-    looped = mstmm.compile(mstmm.load_scene(path)).looped
+    tables = tomllib.loads(path.read_text())
+    tables["input"] = [{"name": "motor", "unit": "N*m", "value": 0.0}]
+    tables["controller"] = [{
+        "name": "regulator", "D": [[1.0]], "sample_time": 0.1, "inputs": ["shoulder.angle"],
+        "outputs": ["motor"],
+    }]  # fmt: skip
+    looped = mstmm.compile(mstmm.Scene(**tables)).looped
     said = {
         looped.failure_text(SimpleNamespace(reason=int(r), element=0, code=1), 0.25) for r in Failed
     }
