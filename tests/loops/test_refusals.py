@@ -10,6 +10,7 @@ import pytest
 
 import mstmm
 
+from .linkages import cranks
 from .test_four_bar import linkage
 
 LOOP = 'loop "closing_pin - '
@@ -49,6 +50,14 @@ def test_refused(asked: str, model: mstmm.Model) -> None:
     with pytest.raises(mstmm.SceneError) as caught:
         ASKED[asked](model)
     assert LOOP in str(caught.value) and "; " in str(caught.value)
+
+
+def test_a_structure() -> None:
+    """The third crank stands off the line of the other two: the coupler cannot follow all."""
+    scene = cranks()
+    scene["hinge"][2]["position"] = [1.5, 0.2, 0.0]
+    with pytest.raises(mstmm.SceneError, match=r'no freedom is left once "top.*a structure; take'):
+        mstmm.compile(mstmm.Scene(**scene))
 
 
 def test_no_fused_code(model: mstmm.Model) -> None:

@@ -25,6 +25,8 @@ _DIRECTIONS = ("x", "y", "z", "mx", "my", "mz")
 _LOCKED = 1e-3
 #: Gaps at which it may still be that rows repeat others but for a misfit, likewise.
 _NEARLY = 1e-2
+#: So many hinges are named.
+_NAMED = 8
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,7 @@ class Closed:
         length = length_of(packed.system)
         near = Assembly(engine, q, holds).positions(q, _NEARLY * length)
         self.loops, repeating = self._judged(near, free_speeds)
+        self._refuse_structure()
         self.start = self.assembled(near, u, holds, fast)
         self._refuse_locked(calls, repeating, _LOCKED * length)
 
@@ -109,6 +112,18 @@ class Closed:
             free_speeds - self._shared() - rows, records.width, rank.singular,
         )  # fmt: skip
         return told, {row: names[row] for row in sorted(rank.going)}
+
+    def _refuse_structure(self) -> None:
+        """SceneError where nothing can move, and nobody drives it."""
+        packed = self.engine.packed
+        if self.loops.mobility > 0 or packed.system.driven or packed.releases:
+            return
+        cut = ", ".join(f'"{name}"' for name in self.loops.cut[:_NAMED])
+        raise SceneError(
+            f"scene: no freedom is left once {cut}{' ...' if len(self.loops.cut) > _NAMED else ''} "
+            f"close: {self.loops.rank} rows hold all speeds, a structure; take a hinge with more "
+            "coordinates, or a [[spring]] in place of one of them"
+        )
 
     def _refuse_locked(
         self, calls: LoopCalls, repeating: Mapping[int, tuple[str, str]], much: float
