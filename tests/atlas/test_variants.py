@@ -21,6 +21,7 @@ from mstmm.atlas.scenes import (
     spinning_top,
 )
 from mstmm.atlas.variants import (
+    baumgarte,
     held_places,
     inertial_axes,
     plain_charts,
@@ -169,3 +170,25 @@ def test_only_the_norm_makes_steps_short() -> None:
     assert ByWay(arm, "rodas4p2").needed(0.5, 1e-4, 1e-6, 100) < 20
     with pytest.raises(mstmm.NumericalFailure, match="more than 1000 steps"):
         Steps(arm, "rodas4p2").needed(0.5, 1e-4, 1e-6, 1000)
+
+
+# --- closed loops -------------------------------------------------------------------------------
+
+
+def test_baumgarte_closes_a_gap_that_is_left_to_itself_otherwise() -> None:
+    """By fourth order of the step, until the rate is too high for it."""
+    names = ("crank", "coupler", "rocker")
+    hinges = [
+        {"name": "foot", "type": "pin", "inboard": "ground", "outboard": "crank", "hold": True,
+         "initial": {"q": [1.0], "u": [2.0]}},
+        {"name": "knee", "type": "pin", "inboard": "crank.tip", "outboard": "coupler",
+         "initial": {"q": [-1.0]}},
+        {"name": "heel", "type": "pin", "inboard": "ground", "outboard": "rocker",
+         "position": [1, 0.2, 0], "initial": {"q": [1.2]}},
+        {"name": "top", "type": "pin", "inboard": "coupler.tip", "outboard": "rocker.tip"},
+    ]  # fmt: skip
+    linkage = model({"gravity": [0, -9.81, 0], "body": [*map(rod, names)], "hinge": hinges})
+    left, held = (baumgarte.gap_of(linkage, 0.01, 100, rate) for rate in (0.0, 10.0))
+    assert held < 0.3 * left < 1e-3
+    assert baumgarte.gap_of(linkage, 0.005, 200, 0.0) == pytest.approx(left / 16, rel=0.5)
+    assert math.isnan(baumgarte.gap_of(linkage, 0.01, 100, 400.0))
