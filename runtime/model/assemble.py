@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
@@ -12,17 +12,23 @@ from ..engine.compiled import Compiled
 from ..engine.loops.calls import LoopCalls
 
 
-def assemble(compiled: Compiled, q: Array, u: Array, hold: Sequence[str]) -> tuple[Array, Array]:
-    """See `Model.assemble`."""
+def assemble(
+    compiled: Compiled, q: Array, u: Array, hold: Sequence[str], fast: Collection[str] | None
+) -> tuple[Array, Array]:
+    """See `Model.assemble`; speeds of the hinges `fast` stay, of all that have some if None."""
     hinges = compiled.layout.hinges
+    if isinstance(hold, str) or not isinstance(hold, Collection):
+        raise SceneError(f"hold = {hold!r:.60}: expected a list of names of hinges")
     for name in hold:
+        if not isinstance(name, str):
+            raise SceneError(f"hold = {hold!r:.60}: expected names of hinges")
         if name not in hinges:
             raise SceneError(f'hold: there is no hinge "{name}"{near(name, list(hinges))}')
     if compiled.closed is None:
         return q.copy(), u.copy()
     q, u = LoopCalls(compiled.looped, q).driven(q, u)
-    fast = [
+    moving = [
         hinge.name for hinge in compiled.packed.described.hinge
         if not hinge.is_weld and hinge.drive is None and u[hinges[hinge.name].u_slice].any()
     ]  # fmt: skip
-    return compiled.closed.assembled(q, u, hold, fast)
+    return compiled.closed.assembled(q, u, hold, moving if fast is None else fast)

@@ -90,10 +90,11 @@ class Model(Compiled):
         """
         from .assemble import assemble
 
-        start = self.initial_state()
-        wish_q = start[0] if q is None else one("q", q, self.nq, "assemble takes one state")
-        wish_u = start[1] if u is None else one("u", u, self.nu, "assemble takes one state")
-        return assemble(self, wish_q, wish_u, hold)
+        start, only = self.initial_state(), "assemble takes one state"
+        wish_q = start[0] if q is None else one("q", q, self.nq, only)
+        wish_u = start[1] if u is None else one("u", u, self.nu, only)
+        fast = self.closed.fast if u is None and self.closed is not None else None
+        return assemble(self, wish_q, wish_u, hold, fast)
 
     def refuse_undetermined_start(self) -> None:
         """SceneError naming the hinges if the masses leave a motion of the start undetermined."""

@@ -11,7 +11,7 @@ from reference.jets import Array
 
 import mstmm
 
-from .linkages import CRANK, FEET, OBLIQUE, ROCKER, bricard, four_bar, legs
+from .linkages import CRANK, FEET, OBLIQUE, ROCKER, bricard, cranks, four_bar, legs
 from .scenes import andrews, four_bars
 
 
@@ -86,3 +86,63 @@ def test_the_least_gap_is_that_of_the_geometry(cut: str, mass: float) -> None:
     told = re.search(r"leaves ([0-9.e-]+) m", str(caught.value))
     assert told and abs(float(told[1]) - least) < 1e-6
     assert '"foot" held' in str(caught.value)
+
+
+@pytest.mark.parametrize("cut", ["foot", "knee", "tip", "end"])
+def test_a_hinge_that_is_held_keeps_its_place_cut_or_not(cut: str) -> None:
+    """The crank's foot, whichever hinge is cut; its speed as well."""
+    scene = four_bar(crank=0.7, cut=cut)
+    foot = next(hinge for hinge in scene["hinge"] if hinge["name"] == "foot")
+    foot |= {"hold": True, "initial": {"q": [0.8], "u": [2.0]}}
+    model = mstmm.compile(mstmm.Scene(**scene))
+    (q, u), slots = model.initial_state(), model.layout.hinges["foot"]
+    assert abs(q[slots.q]) == 0.8 and abs(u[slots.u]) == 2.0
+    moved = np.array(q)
+    moved[slots.q] += 0.3
+    again = model.assemble(moved, hold=["foot"])
+    assert again[0][slots.q] == moved[slots.q] and abs(again[1][slots.u]) == 2.0
+    assert gap(model, scene, *again) < 1e-9
+
+
+@pytest.mark.parametrize("hold", ["foot", 3, None, [3]])
+def test_hold_is_a_list_of_names(hold: Any) -> None:
+    model = mstmm.compile(mstmm.Scene(**four_bar()))
+    with pytest.raises(mstmm.SceneError, match=r"expected (a list of )?names of hinges"):
+        model.assemble(hold=hold)
+
+
+def test_speeds_that_a_cut_hinge_cannot_have_are_refused() -> None:
+    """It would slide along its axis, out of the plane."""
+    scene = four_bar(cut="tip", tip={"type": "cylindrical", "initial": {"u": [1.0, 0.0]}})
+    with pytest.raises(mstmm.SceneError, match='given for "tip" contradict each other by 1 m/s'):
+        mstmm.compile(mstmm.Scene(**scene))
+
+
+@pytest.mark.parametrize("misfit", [1e-6, 1e-5, 1e-4])
+def test_rows_that_repeat_others_may_be_off_by_a_little(misfit: float) -> None:
+    """A foot beside the plane of the others by less than a thousandth of the lengths; at rounding
+    of data nobody is troubled, and the motion is that of the plane."""
+    ends = []
+    for beside in (0.0, misfit):
+        scene = four_bar(crank=0.7, speed=2.0)
+        end = next(hinge for hinge in scene["hinge"] if hinge["name"] == "end")
+        end["position"] = [*np.add(end["position"], [0, 0, beside])]
+        run = mstmm.compile(mstmm.Scene(**scene)).simulate(1.0, rtol=1e-10, output_times=[1.0])
+        assert run.success, run.message
+        ends.append(run.q[-1])
+    assert np.abs(ends[1] - ends[0]).max() < 1e-6
+
+
+def test_drives_that_part_open_the_loop_and_are_told() -> None:
+    """Two cranks of a parallelogram turn alike at first; one of them repeats the other."""
+    scene = cranks()
+    scene["body"] = [body for body in scene["body"] if body["name"] != "crank1"]
+    scene["hinge"] = [hinge for hinge in scene["hinge"] if not hinge["name"].endswith("1")]
+    for hinge, more in zip(scene["hinge"][:2], ("", " + 0.05*t^3"), strict=True):
+        del hinge["initial"]
+        hinge["drive"] = f"0.8 + t{more}"
+    run = mstmm.compile(mstmm.Scene(**scene)).simulate(1.0)
+    assert not run.success
+    assert re.search('hinge "top2" at t = 0.[1-4].*the loop that it closes is open', run.message)
+    tip, end = run.position("crank2.tip")[-1], run.position("coupler.e2")[-1]
+    assert np.linalg.norm(tip - end) < 2e-3

@@ -17,15 +17,19 @@ static real *row_numbers(const mstmm_state *state, int row)
     return state->workspace + state->model->loops + MSTMM_ROW * (int64_t)row;
 }
 
+static int let_go(const mstmm_state *state, const mstmm_loop_row *row)
+{
+    return row->release >= 0 && fabs(state->memory[row->release]) > 0;
+}
+
 int mstmm_hook_rows_begun(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     memset(state->workspace + model->loops, 0, (size_t)model->loops_summed * sizeof(real));
     for (int r = 0; r < model->n_rows; r++) {
         const mstmm_loop_row *row = &model->rows[r];
-        const int let_go = row->release >= 0 && fabs(state->memory[row->release]) > 0;
         row_numbers(state, r)[MSTMM_ROW_PIVOT] =
-            let_go ? (real)INFINITY : row->softness + state->give * row->mobility;
+            let_go(state, row) ? (real)INFINITY : row->softness + state->give * row->mobility;
     }
     return 0;
 }
@@ -100,9 +104,10 @@ void mstmm_unit_quaternions(int count, const int *first, real *q)
     }
 }
 
-/* Largest of what the rows lack that have a multiplier, and own speeds of hinges that close; *where
- * is the frame of its hinge. */
-static real largest(const mstmm_state *state, int *where)
+/* Largest of what the rows lack that have a multiplier, and own speeds of hinges that close; where
+ * `repeated`, of what the others lack: they say what some of these say, and follow by themselves.
+ * *where is the frame of its hinge. */
+static real largest(const mstmm_state *state, int repeated, int *where)
 {
     const mstmm_model *model = state->model;
     real found = 0;
@@ -113,8 +118,10 @@ static real largest(const mstmm_state *state, int *where)
             state->workspace + model->loops + closure->numbers + MSTMM_CLOSURE_L;
         for (int c = 0; c < 6; c++) {
             const int row = closure->rows[c];
-            if (row >= 0 && !(row_numbers(state, row)[MSTMM_ROW_INVERSE] > 0)) continue;
-            if (fabs(known[c]) <= found) continue;
+            if (row >= 0 && let_go(state, &model->rows[row])) continue;
+            const int counts = row >= 0 ? row_numbers(state, row)[MSTMM_ROW_INVERSE] > 0
+                                        : c < model->bodies[i].nu;
+            if (counts == repeated || fabs(known[c]) <= found) continue;
             found = fabs(known[c]);
             *where = i;
         }
@@ -126,19 +133,21 @@ int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q
                       const real *memory, int n_quaternions, const int *quaternions,
                       mstmm_failure *failure)
 {
-    mstmm_state state = {.model = model, .workspace = workspace, .failure = failure};
+    mstmm_state state = {.model = model, .workspace = workspace, .memory = memory,
+                         .failure = failure};
     real *change = mstmm_spare_udot(&state), gap = 1;
     int where = 0;
     for (int k = 0; k < STEPS && !(gap < CLOSE); k++) {
         int code = mstmm_correction(model, workspace, MSTMM_GAP, 0, t, q, u, memory, change, NULL,
                                     failure);
-        gap = code ? 0 : largest(&state, &where);
+        gap = code ? 0 : largest(&state, 0, &where);
         if (!code)
             code = mstmm_moved(model, workspace, t, q, change, memory, n_quaternions, quaternions,
                                failure);
         if (code) return code;
     }
-    if (!(gap < OPEN)) return mstmm_fail(&state, MSTMM_FAILED_LOOP, where, 0);
+    if (!(gap < OPEN) || !(largest(&state, 1, &where) < model->loops_apart))
+        return mstmm_fail(&state, MSTMM_FAILED_LOOP, where, 0);
     const int code =
         mstmm_correction(model, workspace, MSTMM_SLIP, 0, t, q, u, memory, change, NULL, failure);
     if (code) return code;

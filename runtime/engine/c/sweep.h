@@ -219,6 +219,7 @@ typedef struct {
     const mstmm_loop_row *rows;
     int64_t loops;        /* first number of closed loops in the workspace */
     int64_t loops_summed; /* so many of them are sums */
+    real loops_apart;     /* gap (m, rad) at which rows that repeat others do so no longer */
     int needs_pose; /* loads or forces that need poses and velocities */
     int64_t workspace; /* numbers of workspace */
     int64_t scratch;   /* first number behind the blocks: state copy, values, tape slots */

@@ -73,7 +73,7 @@ class Assembly:
         q, give = self._own(q), _FIRST
         rest = self._rest(q)
         for _ in range(_STEPS):
-            change, missing = self.calls.correction(self.calls.gap, q, self._still, give)
+            change, missing = self._correction(q, give)
             if self._largest(missing) < _CLOSED:
                 q = self.calls.moved(q, change)
                 break
@@ -92,7 +92,7 @@ class Assembly:
 
     def speeds(self, q: Array, u: Array) -> Array:
         """u (nu,) without slips at the closed q.  SceneError where those held do not allow it."""
-        u = u + self.calls.correction(self.calls.slip, q, u)[0]
+        u = u + self.free * self.calls.correction(self.calls.slip, q, u)[0]
         missing = self.calls.correction(self.calls.slip, q, u)[1]
         largest = self._largest(missing)
         if largest > 1e-8 * max(1.0, float(np.abs(u).max(initial=0.0))):
@@ -118,10 +118,15 @@ class Assembly:
     def _still(self) -> Array:
         return np.zeros(self.calls.engine.nu)
 
+    def _correction(self, q: Array, give: float) -> tuple[Array, Array]:
+        """What closes the gaps, and these; what is held stays, though its rows may yield."""
+        change, missing = self.calls.correction(self.calls.gap, q, self._still, give)
+        return self.free * change, missing
+
     def _own(self, q: Array) -> Array:
         """q with the own coordinates of closing hinges where the bodies put them."""
         for _ in range(12):
-            change, _ = self.calls.correction(self.calls.gap, q, self._still, _ALONE)
+            change, _ = self._correction(q, _ALONE)
             length = float(np.abs(change).max(initial=0.0))
             if not length > _STILL:
                 break

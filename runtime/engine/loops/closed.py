@@ -10,7 +10,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
-from ...pack.loops.variants import length_of, without
+from ...pack.loops.variants import LOCKED, length_of, without
 from ...pack.pack import packed_system
 from ...pack.start import start_values
 from ..engine import Engine
@@ -20,10 +20,8 @@ from .rank import REPEATED, rank_at
 
 #: Directions of a hinge that closes a loop, as its rows are called.
 _DIRECTIONS = ("x", "y", "z", "mx", "my", "mz")
-#: Gap of a row that repeats others, in parts of the length of the scene, at which a rigid mechanism
-#: locks.
-_LOCKED = 1e-3
-#: Gaps at which it may still be that rows repeat others but for a misfit, likewise.
+#: Gaps at which it may still be that rows repeat others but for a misfit, in parts of the length of
+#: the scene.
 _NEARLY = 1e-2
 #: So many hinges are named.
 _NAMED = 8
@@ -63,7 +61,8 @@ class Closed:
         packed, self.engine = engine.packed, engine
         hinges = [hinge for hinge in packed.described.hinge if not hinge.is_weld]
         holds = [hinge.name for hinge in hinges if hinge.hold]
-        fast = [
+        #: Hinges whose start speeds are kept.
+        self.fast = [
             hinge.name for hinge in hinges
             if hinge.drive is None and hinge.initial is not None and any(hinge.initial.u or ())
         ]  # fmt: skip
@@ -74,8 +73,8 @@ class Closed:
         near = Assembly(engine, q, holds).positions(q, _NEARLY * length)
         self.loops, repeating = self._judged(near, free_speeds)
         self._refuse_structure()
-        self.start = self.assembled(near, u, holds, fast)
-        self._refuse_locked(calls, repeating, _LOCKED * length)
+        self.start = self.assembled(near, u, holds, self.fast)
+        self._refuse_locked(calls, repeating, LOCKED * length)
 
     def assembled(
         self, q: Array, u: Array, holds: Collection[str], fast: Collection[str]
@@ -119,10 +118,10 @@ class Closed:
         if self.loops.mobility > 0 or packed.system.driven or packed.releases:
             return
         cut = ", ".join(f'"{name}"' for name in self.loops.cut[:_NAMED])
+        more = " ..." if len(self.loops.cut) > _NAMED else ""
         raise SceneError(
-            f"scene: no freedom is left once {cut}{' ...' if len(self.loops.cut) > _NAMED else ''} "
-            f"close: {self.loops.rank} rows hold all speeds, a structure; take a hinge with more "
-            "coordinates, or a [[spring]] in place of one of them"
+            f"scene: no freedom is left with the loops closed that end at {cut}{more}: a "
+            "structure; take a hinge with more coordinates, or a [[spring]] in place of one of them"
         )
 
     def _refuse_locked(

@@ -10,6 +10,9 @@ import numpy as np
 from ..bodies import RIGID
 from ..system import BodyNumbers, BodyRun, ClosureNumbers, System
 
+#: Gap of a row that repeats others, in parts of the length of the scene, at which a rigid mechanism
+#: locks.
+LOCKED = 1e-3
 #: Radius of gyration of a body in the metric of the geometry, in parts of the length.
 _GYRATION = 1.0 / 3.0
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..loops.rows import GROUND, Ends, RowPlan, planned
+from ..loops.variants import LOCKED, length_of
 from ..system import ClosureNumbers, System
 from .memory import Memory
 
@@ -109,6 +110,7 @@ class _Loops:
             written.append(told)
         model.looped, model.rows, model.n_rows = looped, records, len(self.plan.rows)
         model.loops, model.loops_summed = place, self.summed
+        model.loops_apart = LOCKED * length_of(self.system)
         return place + self.end, LoopRecords(place, self.plan, records, tuple(written))
 
     def _take(self, count: int) -> int:
