@@ -98,7 +98,7 @@ class Session:
             try:
                 for name in inputs:
                     given[places[name]] = inputs[name]
-            except (KeyError, TypeError, ValueError, OverflowError):
+            except (KeyError, IndexError, TypeError, ValueError, OverflowError):
                 raise self._refused_input(inputs) from None
         try:
             status = self._advance(self._record, dt, SLICE)
@@ -267,10 +267,11 @@ def refuse_method(settings: Settings) -> None:
 
 
 def settable(model: Compiled) -> tuple[str, ...]:
-    """The inputs that may be set while a model moves: those that nothing is driven by and that
-    no controller sets."""
+    """The inputs that may be set while a model moves: those that nothing is driven by, that no
+    controller sets, and that do not go by time."""
     driving = {name for one in acting(model.scene) if one.drive for name in one.inputs}
-    taken = {*driving, *model.scene.controlled}
+    moving = {name for name, number in model.packed.channels.items() if not number.stands}
+    taken = {*driving, *model.scene.controlled, *moving}
     return tuple(one.name for one in model.scene.input if one.name not in taken)
 
 
@@ -284,4 +285,9 @@ def not_settable(model: Compiled, name: str, names: Sequence[str]) -> str:
                 f'inputs["{name}"]: the {one.what} follows this input, and a drive that jumps is a '
                 "blow; give it with its rates or as a signal before the session, by with_inputs"
             )
+    if any(one.name == name for one in model.scene.input):
+        return (
+            f'inputs["{name}"]: this input goes by time, by a signal or by its rates; give it a number '
+            "before the session, by with_inputs, to set it"
+        )
     return f'inputs["{name}"]: there is no such input in the scene{near(name, names)}'

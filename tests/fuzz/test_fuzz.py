@@ -24,7 +24,7 @@ def test_no_mutant_does_worse_than_a_refusal_or_a_run() -> None:
     campaign.run(first=43, count=40, jobs=2)
     assert not campaign.failures, campaign.table()
     refused = campaign.outcomes[REFUSED]
-    assert 10 <= refused <= 30  # the others run, some until patience ends, by how fast they are
+    assert 10 <= refused <= 34  # the others run, some until patience ends, by how fast they are
 
 
 @pytest.fixture(scope="module")

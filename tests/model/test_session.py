@@ -251,3 +251,25 @@ def test_a_session_begins_where_it_is_told() -> None:
     np.testing.assert_array_equal(stepped.q, run.q[-1])
     with pytest.raises(SceneError, match="make a session for each"):
         model.session(np.tile(q, (2, 1)))
+
+
+@pytest.mark.parametrize("given", [{"value": "ramp"}, {"value": 1.0, "rates": [2.0, 3.0]}])
+def test_inputs_over_time_go_on(given: dict[str, Any]) -> None:
+    """What a signal or rates say of an input holds in a session too, and nobody sets it."""
+    rail = {
+        "name": "rail", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
+        "outboard": "block", "law": {"effort": "push"},
+    }  # fmt: skip
+    model = mstmm.compile(mstmm.Scene(
+        gravity=[0, 0, 0], body=[body("block")], hinge=[rail], input=[{"name": "push"} | given],
+        signal=[{"name": "ramp", "times": [0, 1], "values": [1, 5]}],
+    ))  # fmt: skip
+    run = model.session(method="dop853")
+    run.advance(0.4)
+    run.advance(0.55)
+    assert run.q == pytest.approx(model.simulate(0.95).q[-1], rel=1e-9)
+    with pytest.raises(SceneError, match="by a signal or by its rates"):
+        run.advance(0.1, {"push": 2.0})
+    numbers = model.with_inputs({"push": 2.0}).session(method="dop853")
+    numbers.advance(0.5, {"push": 4.0})
+    assert numbers.u == pytest.approx([2.0 / body("block")["mass"]], rel=1e-12)
