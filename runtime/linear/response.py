@@ -23,7 +23,13 @@ from mstmm.errors import NumericalFailure, SceneError
 from ..engine.response import Response
 from . import files
 from .channels import Channel, channel, columns, some_names
-from .harmonic.exact import Chosen, ExactBeams, exact_beams, refuse_inner
+from .harmonic.exact import (
+    Chosen,
+    ExactBeams,
+    exact_beams,
+    refuse_distributed,
+    refuse_inner,
+)
 from .harmonic.losses import Losses, stiffer
 from .harmonic.prescribed import Ratios, modal_damping
 from .harmonic.refused import given, refuse_drives, refuse_in_motion, refuse_ratios
@@ -166,7 +172,14 @@ def frequency_response(
         linear = beams.linear
         if outputs is None and not linear.model.scene.output:
             outputs = [name for name in linear.coordinates if not beams.named(name)]
+            if not outputs:
+                raise SceneError(
+                    "exact: all coordinates are shapes of beams; name outputs, such as "
+                    f'"{beams.names[0]}.tip.y"'
+                )
     pushes = _pushes(linear, inputs)
+    if beams is not None:
+        refuse_distributed(beams, pushes)
     refuse_drives(pushes, beams is not None or given(structural))
     shown = outputs_of(linear, None if outputs is None else some_names("outputs", outputs))
     values = _Sweep(linear, pushes, shown, structural, modal, beams).values(frequencies)

@@ -189,3 +189,22 @@ def test_formulas_have_no_column_of_a_drive() -> None:
     linear = shaker().linearize(inputs=["base.displacement_acceleration"])
     with pytest.raises(SceneError, match=r"motion of the drive of base\.displacement"):
         linear.symbolic(keep=["mass.mass"])
+
+
+def test_an_input_in_an_output_counts_at_once_where_a_drive_follows_it() -> None:
+    """x = z (k + i omega c) / (k + i omega c - omega^2) of the mass; the output adds 2 z."""
+    rail = {"type": "prismatic", "axis": [1, 0, 0]}
+    model = mstmm.compile(mstmm.Scene(
+        gravity=[0, 0, 0],
+        body=[{"name": name, "mass": 1.0, "inertia": [1, 1, 1]} for name in ("plate", "mass")],
+        hinge=[
+            rail | {"name": "shaker", "inboard": "ground", "outboard": "plate", "drive": "z"},
+            rail | {"name": "mount", "inboard": "plate", "outboard": "mass",
+                    "law": {"stiffness": 4.0, "damping": 0.1}},
+        ],
+        input=[{"name": "z", "unit": "m", "rates": [0, 0]}],
+        output=[{"name": "both", "of": "mass.x + 2*z"}, {"name": "own", "of": "z"}],
+    ))  # fmt: skip
+    found = model.frequency_response([1.0], ["z"]).values[0, :, 0]
+    spring = 4.0 + 0.1j
+    assert np.abs(found - [spring / (spring - 1.0) + 2.0, 1.0]).max() < 1e-13

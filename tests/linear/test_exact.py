@@ -245,6 +245,10 @@ STAY = {"name": "stay", "from": "ground", "to": "boom.mid", "position": [1, -1, 
         "law": {"stiffness": 9.0, "rest": 1.0}}  # fmt: skip
 
 
+WIND = {"name": "wind", "unit": "N/m"}
+BLOWN = {"on": "boom", "force_per_length": [0, "wind", 0]}
+
+
 @pytest.mark.parametrize(
     ("beam", "more", "arguments", "expected"),
     [
@@ -261,14 +265,18 @@ STAY = {"name": "stay", "from": "ground", "to": "boom.mid", "position": [1, -1, 
         ({}, {"load": [LOAD | {"force": [0, 2, 0]}]}, {}, "bent at rest"),
         ({}, {"load": [LOAD | {"force": [-3, 0, 0]}]}, {}, "pulled or pressed at rest"),
         ({}, {}, {"modal": 0.1}, "ratios are those of natural motions by shapes"),
+        ({}, {}, {"inputs": ["ground.acceleration.y"]}, 'pushes all along beam "boom"'),
+        ({}, {"input": [WIND], "load": [BLOWN]}, {"inputs": ["wind"]}, '"wind" pushes all along'),
+        ({}, {}, {"outputs": None}, "all coordinates are shapes of beams; name outputs"),
     ],
 )
 def test_what_the_solution_does_not_have_is_named(
     beam: dict[str, Any], more: dict[str, Any], arguments: dict[str, Any], expected: str
 ) -> None:
     model = boom(beam, {}, **more)
+    usual = {"inputs": ["boom.tip.fy"], "outputs": ["boom.tip.y"]}
     with pytest.raises(SceneError, match=expected):
-        model.frequency_response([1.0], ["boom.tip.fy"], **{"exact": True, **arguments})
+        model.frequency_response([1.0], **{"exact": True, **usual, **arguments})
 
 
 def test_motions_that_cannot_be_counted() -> None:
@@ -278,7 +286,8 @@ def test_motions_that_cannot_be_counted() -> None:
     across = {"name": "across", "from": "block", "to": "boom.tip",
               "law": {"stiffness": 9.0, "rest": 1.0}}  # fmt: skip
     joined = boom({}, {}, body=[block], outboard=[rail], spring=[across])
-    assert joined.frequency_response([1.0], exact=True).values.shape == (1, 1, 3)
+    pushed = joined.frequency_response([1.0], ["boom.tip.fy", "rail.effort"], exact=True)
+    assert pushed.values.shape == (1, 1, 2)
     with pytest.raises(SceneError, match="reach across the tree"):
         joined.exact_modes(2)
     still = boom({})

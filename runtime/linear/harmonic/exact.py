@@ -28,7 +28,7 @@ from ...flexible.beam.harmonic import BENDING, HarmonicBeam, harmonic_beam
 from ...flexible.beam.holding import Surroundings, holding
 from ...flexible.kernel_inputs import in_frame
 from ...pack.parameters import data_of, made_of
-from ..channels import channel
+from ..channels import GROUND, Channel, channel
 from ..matrices import State
 from ..standing import standing
 from .losses import Losses, by_name
@@ -246,6 +246,21 @@ def _stiffness(linear: Equations, x: Array) -> Array:
     tangent.residual(state.t, state.q, state.u, state.a)
     still = np.zeros(len(x))
     return tangent.slope(0.0, moved, still, still)
+
+
+def refuse_distributed(beams: ExactBeams, pushes: Sequence[Channel]) -> None:
+    """SceneError for pushes along exact beams: their stiffness is that between loads at ends."""
+    scene = beams.linear.model.scene
+    loaded = any(
+        load.force_per_length is not None and split(load.on)[0] in beams.names
+        for load in scene.load
+    )
+    for push in pushes:
+        if push.name in GROUND or (push.input >= 0 and loaded):
+            raise SceneError(
+                f'"{push.name}" pushes all along beam "{beams.names[0]}", and exact beams know '
+                "pushes at ends alone; name other inputs, such as forces on ends, or take shapes"
+            )
 
 
 def refuse_inner(beams: ExactBeams, names: Sequence[str]) -> None:

@@ -131,7 +131,7 @@ def rows_of(linear: Equations, outputs: Sequence[Seen], pushes: Sequence[Channel
         for place, number in part.speeds:
             row[place] += part.factor * number
     through = np.zeros((len(outputs), len(pushes)))
-    places = {one.name: j for j, one in enumerate(pushes) if one.input >= 0}
+    places = {one.name: j for j, one in enumerate(pushes)}
     for k, one in enumerate(outputs):
         for name, slope in one.through:
             if name in places:
