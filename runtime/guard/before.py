@@ -12,7 +12,7 @@ from mstmm.risk import Risk
 
 from ..run.notes import foreseen
 from ..run.stability import StepCheck, check_step
-from . import fast, heavy, locked, shapes, spun
+from . import branches, fast, heavy, locked, shapes, spun
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
@@ -26,7 +26,7 @@ Guard = Callable[["Compiled", "Settings", Array, Array], Iterable[Risk]]
 _GUARDS: tuple[tuple[Callable[[Compiled], bool], Guard], ...] = (
     (heavy.concerns, heavy.lost_digits), (locked.concerns, locked.near_lock),
     (spun.concerns, spun.linear_bodies), (shapes.concerns, shapes.too_few),
-    (fast.concerns, fast.many_steps),
+    (fast.concerns, fast.many_steps), (branches.concerns, branches.at_a_branch),
 )  # fmt: skip
 
 #: The guards that the scene of a model gives reason for, found before its first run.

@@ -287,7 +287,7 @@ def not_settable(model: Compiled, name: str, names: Sequence[str]) -> str:
             )
     if any(one.name == name for one in model.scene.input):
         return (
-            f'inputs["{name}"]: this input goes by time, by a signal or by its rates; give it a number '
-            "before the session, by with_inputs, to set it"
+            f'inputs["{name}"]: this input goes by time, by a signal or by its rates; give it a '
+            "number before the session, by with_inputs, to set it"
         )
     return f'inputs["{name}"]: there is no such input in the scene{near(name, names)}'

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.errors import NumericalFailure, SceneError
+from mstmm.errors import ExpressionError, NumericalFailure, SceneError
 from mstmm.expression.expression import Expression, Name, parse
 from mstmm.expression.inputs import input_at
 from mstmm.ir import Port
@@ -201,7 +201,7 @@ def _of_output(engine: Engine, output: Output) -> list[Expression]:
                 parse(output.of.text + label) for label in labels
             ]  # fmt: skip
             Measured(engine, found)
-        except SceneError:
+        except (SceneError, ExpressionError):  # a component of a sum is no expression
             continue
         return found
     return []

@@ -146,3 +146,26 @@ def test_a_pulse_that_fixed_steps_pass_over(step: float | None, told: bool) -> N
     method = "dop853" if step is None else "rk4"
     found = seen(scene, method=method, step=step)
     assert [risk.name for risk in found] == (["narrow-load"] if told else [])
+
+
+# --- loops ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("speeds, told", [((8, 0, 0, 0), True), ((8, -8, 8, 8), False)])
+def test_a_start_from_which_a_mechanism_can_go_on_two_ways(
+    speeds: tuple[float, ...], told: bool
+) -> None:
+    """A parallelogram with all rods in line: it may stay one, or cross."""
+    hinges: list[dict[str, Any]] = [
+        {"name": "foot", "inboard": "ground", "outboard": "crank"},
+        {"name": "knee", "inboard": "crank.tip", "outboard": "coupler"},
+        {"name": "end", "inboard": "ground", "outboard": "rocker", "position": [1, 0, 0]},
+        {"name": "top", "inboard": "coupler.tip", "outboard": "rocker.tip"},
+    ]
+    given = [
+        hinge | {"type": "pin", "initial": {"u": [speed]}}
+        for hinge, speed in zip(hinges, speeds, strict=True)
+    ]
+    bodies = [rod(name) for name in ("crank", "coupler", "rocker")]
+    found = seen(mstmm.Scene(gravity=(0, -9.81, 0), body=bodies, hinge=given))
+    assert [risk.name for risk in found] == (["branching-start"] if told else [])

@@ -273,3 +273,17 @@ def test_inputs_over_time_go_on(given: dict[str, Any]) -> None:
     numbers = model.with_inputs({"push": 2.0}).session(method="dop853")
     numbers.advance(0.5, {"push": 4.0})
     assert numbers.u == pytest.approx([2.0 / body("block")["mass"]], rel=1e-12)
+
+
+@pytest.mark.parametrize("of", ["strut.length + 0", "strut.effort*2", "2 + strut.length"])
+def test_outputs_that_c_does_not_give_are_those_of_results(of: str) -> None:
+    block = body("block") | {"ends": {"tip": [1, 0, 0]}}
+    model = mstmm.compile(mstmm.Scene(
+        gravity=[0, 0, 0], body=[block],
+        hinge=[{"name": "pin", "type": "pin", "inboard": "ground", "outboard": "block"}],
+        spring=[{"name": "strut", "from": "ground", "position": [1, 1, 0], "to": "block.tip",
+                 "law": {"stiffness": 2.0, "rest": 0.5}}],
+        output=[{"name": "asked", "of": of}],
+    ))  # fmt: skip
+    found = model.session(method="rk4", step=0.01).outputs()["asked"]
+    assert found == model.simulate(0.0, "rk4", 0.01).quantity("asked").values[0]
