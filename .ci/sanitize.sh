@@ -10,7 +10,7 @@ sanitize=(-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame
 sources=(generated/*.c runtime/*/c/*.c)
 
 echo "--- warnings as errors: clang"
-clang "${strict[@]}" -fsyntax-only "${sources[@]}"
+printf '%s\0' "${sources[@]}" | xargs -0 -n 8 -P "$(nproc)" clang "${strict[@]}" -fsyntax-only
 
 echo "--- warnings as errors: gcc; every kernel, sanitized"
 mkdir "$scratch/objects"
@@ -30,10 +30,20 @@ export CC="$scratch/cc" PYTHONPATH="$scratch/checkout" ASAN_OPTIONS=detect_leaks
 cd "$scratch/checkout"
 "$VENV/bin/python" setup.py -q build_ext --inplace
 # libstdc++ as well: extensions of other packages throw C++ exceptions
-LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libstdc++.so.6)" "$VENV/bin/python" -m pytest -q -p no:cacheprovider \
-    tests/bridge/test_kernels.py tests/classical tests/integrate tests/breaks tests/run tests/result tests/model tests/loops \
-    tests/linear/test_response.py tests/linear/test_modes.py tests/linear/test_damping.py tests/linear/test_exact.py tests/engine/test_jacobian.py tests/engine/test_tangent.py tests/engine/test_culprit.py tests/flexible/test_engines.py
+sanitized() {
+    LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libstdc++.so.6)" "$VENV/bin/python" -m "$@"
+}
+# in two halves, side by side
+sanitized pytest -q -p no:cacheprovider tests/run tests/result tests/loops tests/flexible/test_engines.py \
+    tests/linear/test_response.py tests/linear/test_modes.py tests/linear/test_damping.py tests/linear/test_exact.py \
+    >"$scratch/half" 2>&1 & half=$!
+failed=0
+sanitized pytest -q -p no:cacheprovider tests/bridge/test_kernels.py tests/classical tests/integrate tests/breaks tests/model \
+    tests/engine/test_jacobian.py tests/engine/test_tangent.py tests/engine/test_culprit.py || failed=1
+wait "$half" || failed=1
+cat "$scratch/half"
+[ "$failed" -eq 0 ]
 
 echo "--- changed scenes, sanitized"
-LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libstdc++.so.6)" "$VENV/bin/python" -m tests.fuzz \
+sanitized tests.fuzz \
     --count 15 --seed 9 --first 43 --memory 0 --cpu 120 --keep "$scratch/found"
