@@ -34,6 +34,7 @@ def at_once(scene: Scene, inputs: Mapping[str, GivenInput]) -> dict[str, float |
     for name, given in by_name("inputs", inputs).items():
         if name not in known:
             raise _unknown(name, scene)
+        _refuse_controlled(name, scene)
         unknown = isinstance(given, str) and given not in signals
         if name in driving or unknown or _over_time(given):
             return None
@@ -51,6 +52,7 @@ def with_inputs(scene: Scene, inputs: Mapping[str, GivenInput]) -> Scene:
     for name, given in by_name("inputs", inputs).items():
         if name not in tables:
             raise _unknown(name, scene)
+        _refuse_controlled(name, scene)
         signal = _signal(name, given)
         if signal is None:
             tables[name]["value"] = given if isinstance(given, str) else real(_at(name), given)
@@ -62,6 +64,14 @@ def with_inputs(scene: Scene, inputs: Mapping[str, GivenInput]) -> Scene:
         tables[name]["value"] = signal["name"]
         tables[name].pop("rates", None)
     return made_of(data, scene, "scene with these inputs")
+
+
+def _refuse_controlled(name: str, scene: Scene) -> None:
+    if name in scene.controlled:
+        raise SceneError(
+            f'{_at(name)}: controller "{scene.controlled[name]}" sets this input; add another to '
+            "the expression that reads it"
+        )
 
 
 def _unknown(name: str, scene: Scene) -> SceneError:

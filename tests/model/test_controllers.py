@@ -237,3 +237,11 @@ def test_inputs_are_set_by_one_controller_and_drive_nothing() -> None:
 def test_an_input_is_not_named_like_a_hinge() -> None:
     with pytest.raises(SceneError, match='"slide" is also the name of a hinge; rename one'):
         scene(input=[{"name": "push"}, {"name": "slide"}])
+
+
+@pytest.mark.parametrize("given", [1.0, ([0, 1], [2.0, 3.0])])
+def test_an_input_that_a_controller_sets_is_set_by_nobody_else(given: Any) -> None:
+    with pytest.raises(SceneError, match='controller "regulator" sets this input'):
+        model("looped").simulate(0.1, inputs={"push": given})
+    with pytest.raises(SceneError, match='controller "regulator" sets this input'):
+        model("looped").with_inputs({"push": given})
