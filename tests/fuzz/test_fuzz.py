@@ -24,7 +24,8 @@ def test_no_mutant_does_worse_than_a_refusal_or_a_run() -> None:
     campaign.run(first=43, count=40, jobs=2)
     assert not campaign.failures, campaign.table()
     refused = campaign.outcomes[REFUSED]
-    assert 10 <= refused <= 34  # the others run, some until patience ends, by how fast they are
+    # Mutants that are all refused try no run, mutants that all run try no message.
+    assert min(refused, 40 - refused) >= 5, campaign.table()
 
 
 @pytest.fixture(scope="module")
