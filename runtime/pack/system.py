@@ -240,7 +240,7 @@ class System:
     whose numbers expressions read, of which some may be `held`; `by_time` says whether an
     effort or load names the time, or an input that does not stand still.  `moving` are the numbers
     in expressions that carry derivatives, by their places in the port "moving".  `closures` are the
-    hinges that close loops, in the order in which those that end at one body are closed.
+    hinges that close loops.
     """
 
     nq: int

@@ -50,7 +50,7 @@ class Expanded:
     held: dict[str, str] = field(default_factory=dict)
     #: What became of the bodies that are rigid in the run, None where there is none.
     rigidified: Rigidified | None = None
-    #: Hinges that close loops, in the order in which those that end at one body are closed.
+    #: What closes loops.
     cuts: tuple[Cut, ...] = ()
 
     def is_node(self, name: str) -> bool:

@@ -12,10 +12,7 @@ if TYPE_CHECKING:
 
 
 def closures_of(frames: Frames, runs: Sequence[BodyRun]) -> Iterator[ClosureNumbers]:
-    """Closures in the order in which those that end at one body are closed.
-
-    The hinge's own speeds have rows where something imposes them or a rotor hangs on them.
-    """
+    """The hinge's own speeds have rows where something imposes them or a rotor hangs on them."""
     if not frames.expanded.cuts:
         return
     alone = {run.place: run.alike[0] for run in runs}

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mstmm.graph.plan import Plan
 from mstmm.scene import Body, Scene
 from mstmm.scene.checks.topology import build
 
@@ -26,7 +25,7 @@ class Cut:
 
 
 def opened(scene: Scene) -> tuple[Scene, tuple[Cut, ...]]:
-    """The tree, and what is cut in the order in which it closes; a tree is its own.
+    """The tree, and what is cut in the order of the hinges; a tree is its own.
 
     Raises SceneError for what closes loops but is no hinge between rigid bodies.
     """
@@ -37,7 +36,7 @@ def opened(scene: Scene) -> tuple[Scene, tuple[Cut, ...]]:
     if plan is None:
         return scene, ()
     tables, bodies, cuts = list(scene.hinge), list(scene.body), []
-    for number in _in_order(plan):
+    for number in plan.cut:
         hinge = tables[number]
         end = f".{hinge.outboard_end}" if hinge.outboard_end else ""
         cut = Cut(hinge.name, f"{hinge.name}/cut", hinge.outboard_body)
@@ -50,11 +49,3 @@ def opened(scene: Scene) -> tuple[Scene, tuple[Cut, ...]]:
     fields = {name: getattr(scene, name) for name in type(scene).model_fields}
     fields |= {"body": tuple(bodies), "hinge": tuple(tables)}
     return Scene.model_construct(**fields), tuple(cuts)
-
-
-def _in_order(plan: Plan) -> list[int]:
-    """The hinges that are cut as they close, behind them those without rows."""
-    with_rows = plan.cut_of
-    order = [with_rows[one.group] for one in plan.closings if one.group < len(with_rows)]
-    known = set(with_rows)
-    return [*order, *(hinge for hinge in plan.cut if hinge not in known)]

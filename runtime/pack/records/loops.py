@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..loops.rows import GROUND, Ends, RowPlan, planned
+from mstmm.graph.mechanism import GROUND, Rows
+
+from ..loops.rows import RowPlan, planned
 from ..loops.variants import LOCKED, length_of
 from ..system import ClosureNumbers, System
 from .memory import Memory
@@ -68,11 +70,11 @@ class _Loops:
     def __init__(self, model: Any, system: System, memory: Memory, lib: Any) -> None:
         self.model, self.system, self.memory, self.lib = model, system, memory, lib
         self.parents = [int(parent) for parent in system.parents]
-        self.ends = [
-            Ends(self.parents[one.frame], one.outboard, len(one.directions))
+        groups = [
+            Rows((self.parents[one.frame], one.outboard), len(one.directions))
             for one in system.closures
         ]
-        self.plan: RowPlan = planned(self.parents, self.ends)
+        self.plan: RowPlan = planned(self.parents, groups)
         self.row_numbers = int(lib.MSTMM_ROW)
         count = len(self.plan.rows)
         self.dump = count * self.row_numbers
@@ -162,7 +164,7 @@ class _Loops:
         body, own = self.system.body(closure.frame), dict[int, int]()
         inboard = self.parents[closure.frame]
         for k, direction in enumerate(closure.directions):
-            row = self.plan.first[group] + k
+            row = self.plan.of[group][k]
             record.rows[direction] = own[direction] = row
             sides = (inboard, closure.outboard)
             inner, outer = (
