@@ -1277,6 +1277,8 @@ int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restr
     const real *restrict l, const real *restrict delta, real *restrict x);
 int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *restrict L_p,
     const real *restrict x_p, real *restrict x);
+int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
+    const real *restrict x, real *restrict l);
 int mstmm_sweep_loops_loaded(const real *restrict K, const real *restrict x, real *restrict e);
 
 extern const mstmm_element mstmm_sweep_modal;

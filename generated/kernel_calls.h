@@ -1714,6 +1714,19 @@ static inline int mstmm_loops_multiplier_less_by(struct mstmm_loops_multiplier_l
 }
 #define mstmm_loops_multiplier_less(...) mstmm_loops_multiplier_less_by((struct mstmm_loops_multiplier_less){__VA_ARGS__})
 
+struct mstmm_loops_yielded {
+    const real *softness;
+    const real *s;
+    const real *x;
+    real *l;
+};
+static inline int mstmm_loops_yielded_by(struct mstmm_loops_yielded to)
+{
+    return mstmm_sweep_loops_yielded(
+        to.softness, to.s, to.x, to.l);
+}
+#define mstmm_loops_yielded(...) mstmm_loops_yielded_by((struct mstmm_loops_yielded){__VA_ARGS__})
+
 struct mstmm_loops_loaded {
     const real *K;
     const real *x;

@@ -57,7 +57,8 @@
 #define MSTMM_ROW_PIVOT 7
 #define MSTMM_ROW_INVERSE 8
 #define MSTMM_ROW_X 9
-#define MSTMM_ROW 10
+#define MSTMM_ROW_TOLD 10
+#define MSTMM_ROW 11
 /* cdef end */
 
 /* Arrays of a flexible body of n modes, and of one of its sections. */

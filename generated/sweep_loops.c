@@ -35,6 +35,8 @@ int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restr
     const real *restrict l, const real *restrict delta, real *restrict x);
 int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *restrict L_p,
     const real *restrict x_p, real *restrict x);
+int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
+    const real *restrict x, real *restrict l);
 int mstmm_sweep_loops_loaded(const real *restrict K, const real *restrict x, real *restrict e);
 
 /* gap of a hinge that closes a loop
@@ -1761,6 +1763,39 @@ static const mstmm_port mstmm_sweep_loops_multiplier_less_outputs[] = {
     {"x", 1, "", 1, 0},
 };
 
+/* the row of a rotor with a multiplier
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  softness[1] 1 / J of the rotor on the row
+ * in  s[1] acceleration of the speed that it turns with
+ * in  x[1] (N, N*m) multiplier
+ * out l[1] known part of the row, added to what is there
+ */
+int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
+    const real *restrict x, real *restrict l)
+{
+    const real t0 = softness[0] * x[0];
+    const real t1 = s[0] - t0;
+    l[0] += t1;
+    return 0;
+}
+
+static int mstmm_sweep_loops_yielded_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_yielded(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_yielded_inputs[] = {
+    {"softness", 1, "", 0, 0},
+    {"s", 1, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_yielded_outputs[] = {
+    {"l", 1, "", 1, 0},
+};
+
 /* load of a multiplier
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
@@ -1934,6 +1969,18 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "yielded",
+        .function = (void (*)(void))mstmm_sweep_loops_yielded,
+        .call = mstmm_sweep_loops_yielded_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_yielded_inputs,
+        .outputs = mstmm_sweep_loops_yielded_outputs,
+        .ir_hash = "baaae1f5fc4da35685307e2a7b399631d64e8f5994e34c7bf54b7d71f1494e5d",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "loaded",
         .function = (void (*)(void))mstmm_sweep_loops_loaded,
         .call = mstmm_sweep_loops_loaded_call,
@@ -1951,7 +1998,7 @@ const mstmm_element mstmm_sweep_loops = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "loops",
-    .hash = "cddcdf2186d1b2f4990951bb6d1767c36fbe9568dc65d6f1e0052cd7545c8804",
+    .hash = "bc2683371360dee8d00dc1ea649afef00c7cb01a43bc0c8d65c598c187824f6e",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1961,6 +2008,6 @@ const mstmm_element mstmm_sweep_loops = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 12,
+    .n_kernels = 13,
     .kernels = mstmm_sweep_loops_kernels,
 };

@@ -556,6 +556,35 @@ static int mstmm_at_laws(mstmm_state *state, int index)
     return 0;
 }
 
+/* Efforts without what rotors take of the accelerations in the answer. */
+static int mstmm_at_restated(mstmm_state *state, int index)
+{
+    real lack[1];
+    real rotor[1];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    if (looped->closure) return 0;
+    for (int k = 0; k < body->nu; k++) {
+        mstmm_frames_driven_effort(
+            .felt = mstmm_zeros, .J = body->rotor + k,
+            .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + k,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .tau_d = lack);
+        (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] = 0;
+        (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] -= lack[0];
+    }
+    for (int k = 0; k < body->nu; k++) {
+        if (!body->imposed_mask[k]) continue;
+        mstmm_frames_driven_effort(
+            .felt = mstmm_zeros, .J = body->rotor + k,
+            .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + k, .tau = mstmm_zeros,
+            .tau_d = rotor);
+        (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] += rotor[0];
+    }
+    return 0;
+}
+
 /* Strain energy and damping of flexible bodies. */
 static int mstmm_at_strain(mstmm_state *state, int index)
 {
@@ -973,6 +1002,7 @@ static int mstmm_at_closures(mstmm_state *state, int index)
     real drift[6];
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
     const int nu = body->nu;
     const mstmm_looped *looped = &state->model->looped[index];
     const mstmm_closure *closure = looped->closure;
@@ -1016,7 +1046,6 @@ static int mstmm_at_closures(mstmm_state *state, int index)
             .l = closed + MSTMM_CLOSURE_L);
     }
     if (!state->level) {
-        real *parent = mstmm_block(state->model, state->workspace, body->parent);
         mstmm_loops_drift(
             .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
             .d = closed + MSTMM_CLOSURE_D, .slip = closed + MSTMM_CLOSURE_SLIP,
@@ -1046,6 +1075,25 @@ static int mstmm_at_closures(mstmm_state *state, int index)
         memcpy(loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN, closed + MSTMM_CLOSURE_L + c, (size_t)(1) * sizeof(real));
         if (state->level && (state->model->rows[closure->rows[c]].softness > 0)) {
             (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN)[0] = 0;
+        }
+        if (state->refined) {
+            mstmm_loops_loaded(
+                .K = closed + MSTMM_CLOSURE_J_A + 6 * c,
+                .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_TOLD,
+                .e = parent + MSTMM_BLOCK_E);
+        }
+        if (state->refined) {
+            mstmm_loops_loaded(
+                .K = closed + MSTMM_CLOSURE_J_B + 6 * c,
+                .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_TOLD,
+                .e = outboard + MSTMM_BLOCK_E);
+        }
+        if (state->refined && (state->model->rows[closure->rows[c]].softness > 0)) {
+            mstmm_loops_yielded(
+                .softness = &state->model->rows[closure->rows[c]].softness,
+                .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + c,
+                .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_TOLD,
+                .l = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN);
         }
     }
     return 0;
@@ -1206,9 +1254,17 @@ static int mstmm_at_answered(mstmm_state *state, int index)
         .delta_I = parent + MSTMM_BLOCK_DELTA,
         .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_RATES),
         .delta = block + MSTMM_BLOCK_DELTA);
-    for (int j = 0, k = 0; j < nu; j++)
-        (state->udot + body->u)[j] = k < speeds && columns[k] == j ? (mstmm_of_speeds(block, nu, MSTMM_SPEED_RATES))[k++]
-                     : (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j];
+    if (!state->refined) {
+        for (int j = 0, k = 0; j < nu; j++)
+            (state->udot + body->u)[j] = k < speeds && columns[k] == j ? (mstmm_of_speeds(block, nu, MSTMM_SPEED_RATES))[k++]
+                         : (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j];
+    } else {
+        for (int j = 0, k = 0; j < nu; j++)
+            (state->udot + body->u)[j] = k < speeds && columns[k] == j ? (mstmm_of_speeds(block, nu, MSTMM_SPEED_RATES))[k++]
+                         : 0;
+        for (int j = 0; j < nu; j++)
+            (state->udot + body->u)[j] += (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j];
+    }
     for (int r = looped->first_row + looped->n_rows - 1; r >= looped->first_row; r--) {
         code = mstmm_at_row_found(state, r);
         if (code) return code;
@@ -1252,6 +1308,9 @@ static int mstmm_at_closures_answered(mstmm_state *state, int index)
         }
         for (int c = 0; c < 6; c++) {
             if (closure->rows[c] < 0) continue;
+            if (state->refined) {
+                (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X)[0] += (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_TOLD)[0];
+            }
             mstmm_loops_act(
                 .J = closed + MSTMM_CLOSURE_W + 6 * c,
                 .tau = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
@@ -4386,6 +4445,25 @@ static int mstmm_pass_laws(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_restated(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
+}
+static int mstmm_pass_restated(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_restated(state, i, MSTMM_TILE);
+        const int code = mstmm_at_restated(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 static int mstmm_pass_strain(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -5761,6 +5839,10 @@ int mstmm_run_accelerations(mstmm_state *state)
     if (code) return code;
     code = mstmm_pass_laws(state);
     if (code) return code;
+    if (state->refined) {
+        code = mstmm_pass_restated(state);
+        if (code) return code;
+    }
     if (state->balance && model->n_flexible) {
         code = mstmm_pass_strain(state);
         if (code) return code;

@@ -298,6 +298,20 @@ def multiplier_less() -> Derivation:
     )  # fmt: skip
 
 
+def yielded() -> Derivation:
+    """l += s - x / J: what an acceleration and a multiplier that are known leave of a rotor's row,
+    s = x / J."""
+    soft = Quantity(symbol("softness", 1), "", "1 / J of the rotor on the row")
+    given = Quantity(symbol("s", 1), "", "acceleration of the speed that it turns with")
+    known = _more("l", 1, "known part of the row")
+    value = given.symbol[0, 0] - soft.symbol[0, 0] * MULTIPLIER.symbol[0, 0]
+    return Derivation(
+        "loops", "the row of a rotor with a multiplier", (soft, given, MULTIPLIER), (known,),
+        (Equation("l += s - x / J", known.symbol, sp.ImmutableDenseMatrix([value])),),
+        sources=SOURCES,
+    )  # fmt: skip
+
+
 def loaded() -> Derivation:
     """e += K x: the load with multipliers that are known."""
     load = _more("e", 6, "e of the body")
@@ -369,7 +383,8 @@ def pull(nu: int) -> Derivation:
 
 #: Steps that have no size of a hinge.
 STEPS = (
-    gap, slip, drift, rows, told, act, close, shed, shed_pair, multiplier, multiplier_less, loaded,
+    gap, slip, drift, rows, told, act, close, shed, shed_pair, multiplier, multiplier_less, yielded,
+    loaded,
 )  # fmt: skip
 #: Steps for hinges that have speeds.
 OF_SPEEDS = (divide, couple, answered, pull)

@@ -136,7 +136,7 @@ class Replay(Slots):
     def _scene_has(self, trait: str) -> bool:
         s = self.state.structure
         known = {
-            "linked": False, "product": False, "qr": False, "looped": False,
+            "linked": False, "product": False, "qr": False, "looped": False, "refined": False,
             "balance": True, "efforts": True,
             "inverse": self.inverse,
             "driving": True,

@@ -23,6 +23,7 @@ _TRAITS = {
     "looped": "model->looped", "cut": "looped->closure",
     "aside": "mstmm_aside(state, index)", "corrected": "state->level",
     "soft": "(state->model->rows[closure->rows[c]].softness > 0)",
+    "refined": "state->refined",
     "gaping": "state->level == MSTMM_GAP", "slipping": "state->level == MSTMM_SLIP",
     "united": "state->tangents->unit",
     "effort": "force->effort", "qr": "model->qr", "rigid": "body->kernels->rigid",

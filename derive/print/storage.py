@@ -68,7 +68,8 @@ CLOSURE = {
     "closure.d": 3, "closure.lever": 3, "closure.gap": 6, "closure.slip": 6,
 }  # fmt: skip
 #: Numbers of a row: slot -> how many.
-ROW = {"row.K": 6, "row.known": 1, "row.pivot": 1, "row.inverse": 1, "row.x": 1}
+ROW = {"row.K": 6, "row.known": 1, "row.pivot": 1, "row.inverse": 1, "row.x": 1,
+       "row.told": 1}  # fmt: skip
 #: Slots that lie where another does, which is not wanted any more by then.
 SHARED = {
     "hinge.F": "hinge.H", "modes.felt": "modes.right", "bend.place_right": "bend.right",
@@ -133,6 +134,7 @@ _PLACES = {
     "body.rho": "state->tangents->rho + body->q",
     "body.change": "state->tangents->change + body->q",
     "closure.turn": "closure->turn", "closure.end": "closure->end", "row.floor": "&row->floor",
+    "line.softness": "&state->model->rows[closure->rows[c]].softness",
     "side.inner": "loops + closure->inner[c]", "side.outer": "loops + closure->outer[c]",
     "pending.K": "loops + pending->column", "pending.onward": "loops + pending->onward",
     "pending.y": "loops + pending->y", "before.y": "loops + looped->pending[b].y",
@@ -260,8 +262,9 @@ def _place_of_derivative(slot: str) -> Place | None:
 
 #: Numbers of the row at hand in a loop over rows: slot -> its number.
 _OF_ROWS = {
-    "line.known": "closure->rows[c]", "line.x": "closure->rows[c]", "other.known": "other->row",
-    "other.x": "other->row", "pending.known": "pending->row", "pending.x": "pending->row",
+    "line.known": "closure->rows[c]", "line.x": "closure->rows[c]",
+    "line.told": "closure->rows[c]", "other.known": "other->row", "other.x": "other->row",
+    "pending.known": "pending->row", "pending.x": "pending->row",
 }  # fmt: skip
 
 

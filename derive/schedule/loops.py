@@ -65,6 +65,13 @@ CLOSURES = Pass(
                 Move(to="line.known", source="closure.l[c]", count="1"),
                 # A rotor resists a correction, but asks for none.
                 Copy(to="line.known", when="corrected soft"),
+                *only(
+                    "refined",
+                    call("loops.loaded", K="closure.J_A[6 * c]", x="line.told", e="parent.e"),
+                    call("loops.loaded", K="closure.J_B[6 * c]", x="line.told", e="outboard.e"),
+                    call("loops.yielded", when="soft", softness="line.softness", s="body.s[c]",
+                         x="line.told", l="line.known"),
+                ),
             ),
         ),
     ),
@@ -106,6 +113,30 @@ ROW_FOUND = Pass(
         ),
     ),
     order=TIPS_TO_ROOT,
+)  # fmt: skip
+
+RESTATED = Pass(
+    "restated", "body", "Efforts without what rotors take of the accelerations in the answer.",
+    (
+        EachSpeed(
+            steps=(
+                call("frames.driven_effort", felt="zero", J="body.rotor[k]", udot="body.s[k]",
+                     tau="body.tau[k]", tau_d="local.lack"),
+                Copy(to="body.tau[k]"),
+                Add(to="body.tau[k]", source="local.lack", times=-1),
+            ),
+        ),
+        # Nobody asks them of speeds that are imposed.
+        EachSpeed(
+            steps=(
+                call("frames.driven_effort", felt="zero", J="body.rotor[k]", udot="body.s[k]",
+                     tau="zero", tau_d="local.rotor"),
+                Add(to="body.tau[k]", source="local.rotor"),
+            ),
+            imposed=True,
+        ),
+    ),
+    skip="cut",
 )  # fmt: skip
 
 UNLOADED = Pass(
@@ -163,7 +194,12 @@ ANSWERED = Pass(
         ),
         call("generic{free}.answer", **BODY, **_ACROSS, F="hinge.F", y="hinge.g",
              delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
-        Spread(to="body.udot", free="hinge.rates", imposed="body.s"),
+        Spread(to="body.udot", free="hinge.rates", imposed="body.s", when="!refined"),
+        *only(
+            "refined",
+            Spread(to="body.udot", free="hinge.rates"),
+            Add(to="body.udot", source="body.s"),
+        ),
         Each(of="openings", steps=(Do(whole=ROW_FOUND),)),
         # The elimination lay where H was.
         Do(whole=HINGE_MOTION, when="imposed balance"),
@@ -186,7 +222,10 @@ CLOSURES_ANSWERED = Pass(
             ),
             Each(
                 of="rows",
-                steps=(call("loops.act", J="closure.W[6 * c]", tau="line.x", e="body.e"),),
+                steps=(
+                    Add(to="line.x", source="line.told", when="refined"),
+                    call("loops.act", J="closure.W[6 * c]", tau="line.x", e="body.e"),
+                ),
             ),
         ),
     ),

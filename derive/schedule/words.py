@@ -155,11 +155,14 @@ side.inner | 6 | column of the row at hand, on the side of A
 side.outer | 6 | column of the row at hand, on the side of B
 line.known | 1 | known part of the row at hand
 line.x | 1 | its multiplier
+line.told | 1 | its multiplier in the answer before
+line.softness | 1 | 1 / inertia of the rotor on it
 row.K | 6 | column on the body where the row closes
 row.known | 1 | known part
 row.pivot | 1 | its own entry of L
 row.inverse | 1 | 1 / L, zero for a row that nothing moves
 row.x | 1 | multiplier
+row.told | 1 | multiplier in the answer before
 row.floor | 1 | largest pivot that is rounding
 other.K | 6 | column of a row that stays
 other.known | 1 | its known part
@@ -336,6 +339,7 @@ TRAITS: dict[str, str] = {
     "aside": "the hinge closes a loop, or the body is idle",
     "corrected": "a gap or a slip is to be corrected",
     "soft": "the row is that of a rotor",
+    "refined": "what an answer before leaves over is answered, and added to it",
     "gaping": "a gap",
     "slipping": "a slip",
     "qr": "the sweep is that of least squares",

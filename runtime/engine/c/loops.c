@@ -11,6 +11,9 @@
 #define CLOSE 1e-7
 #define STEPS 10
 #define OPEN 1e-5
+/* Where digits are lost: that gap, and so many corrections of the speeds. */
+#define CLOSE_REFINED 1e-12
+#define SLIPS_REFINED 3
 
 static real *row_numbers(const mstmm_state *state, int row)
 {
@@ -25,13 +28,32 @@ static int let_go(const mstmm_state *state, const mstmm_loop_row *row)
 int mstmm_hook_rows_begun(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
-    memset(state->workspace + model->loops, 0, (size_t)model->loops_summed * sizeof(real));
+    real *sums = row_numbers(state, model->n_rows);
+    memset(sums, 0, (size_t)(state->workspace + model->loops + model->loops_summed - sums)
+                        * sizeof(real));
     for (int r = 0; r < model->n_rows; r++) {
         const mstmm_loop_row *row = &model->rows[r];
-        row_numbers(state, r)[MSTMM_ROW_PIVOT] =
+        real *numbers = row_numbers(state, r), told = state->refined ? numbers[MSTMM_ROW_X] : 0;
+        memset(numbers, 0, MSTMM_ROW * sizeof(real));
+        numbers[MSTMM_ROW_TOLD] = told;
+        numbers[MSTMM_ROW_PIVOT] =
             let_go(state, row) ? (real)INFINITY : row->softness + state->give * row->mobility;
     }
     return 0;
+}
+
+int mstmm_refine(mstmm_state *state, const real *q, const real *u)
+{
+    const mstmm_model *model = state->model;
+    real *answer = state->workspace + model->answer;
+    memcpy(answer, state->udot, (size_t)model->nu * sizeof(real));
+    state->q = q;
+    state->u = u;
+    state->given = answer;
+    state->residual = state->refined = 1;
+    if (state->balance) state->balance->power = state->balance->potential = 0;
+    mstmm_ground(state);
+    return mstmm_run_accelerations(state);
 }
 
 int mstmm_correction(const mstmm_model *model, real *workspace, int level, real give, real t,
@@ -136,8 +158,9 @@ int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q
     mstmm_state state = {.model = model, .workspace = workspace, .memory = memory,
                          .failure = failure};
     real *change = mstmm_spare_udot(&state), gap = 1;
+    const real close = model->refines ? CLOSE_REFINED : CLOSE;
     int where = 0;
-    for (int k = 0; k < STEPS && !(gap < CLOSE); k++) {
+    for (int k = 0; k < STEPS && !(gap < close); k++) {
         int code = mstmm_correction(model, workspace, MSTMM_GAP, 0, t, q, u, memory, change, NULL,
                                     failure);
         gap = code ? 0 : largest(&state, 0, &where);
@@ -148,9 +171,11 @@ int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q
     }
     if (!(gap < OPEN) || !(largest(&state, 1, &where) < model->loops_apart))
         return mstmm_fail(&state, MSTMM_FAILED_LOOP, where, 0);
-    const int code =
-        mstmm_correction(model, workspace, MSTMM_SLIP, 0, t, q, u, memory, change, NULL, failure);
-    if (code) return code;
-    for (int i = 0; i < model->nu; i++) u[i] += change[i];
+    for (int k = 0; k < (model->refines ? SLIPS_REFINED : 1); k++) {
+        const int code = mstmm_correction(model, workspace, MSTMM_SLIP, 0, t, q, u, memory, change,
+                                          NULL, failure);
+        if (code) return code;
+        for (int i = 0; i < model->nu; i++) u[i] += change[i];
+    }
     return 0;
 }

@@ -4,6 +4,8 @@
 
 #include "sweep.h"
 
+/* Answers once more what the accelerations just found leave over, and adds that to them. */
+int mstmm_refine(mstmm_state *state, const real *q, const real *u);
 /* How much the rows lack in the sweep that was made last, by row. */
 void mstmm_missing(const mstmm_state *state, real *missing);
 /* Quaternions in q, by the first entry of each, brought back to length 1. */

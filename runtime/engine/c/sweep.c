@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "hinge.h"
+#include "loops.h"
 #include "sweep.h"
 #include "sweep_steps.h"
 
@@ -78,10 +79,11 @@ int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const
                          .balance = balance, .failure = failure,
                          .linked = !(model->needs_pose || model->product || model->qr),
                          .observed = 0,
-                         .hinges_known = 0, .level = 0, .give = 0};
+                         .hinges_known = 0, .level = 0, .give = 0, .refined = 0};
     if (balance) balance->power = balance->potential = 0;
     mstmm_ground(&state);
-    return mstmm_run_accelerations(&state);
+    const int code = mstmm_run_accelerations(&state);
+    return code || !model->refines ? code : mstmm_refine(&state, q, u);
 }
 
 int mstmm_accelerations_kept(const mstmm_model *model, real *workspace, real t, const real *q,
@@ -94,7 +96,8 @@ int mstmm_accelerations_kept(const mstmm_model *model, real *workspace, real t, 
                          .failure = failure};
     if (balance) balance->power = balance->potential = 0;
     mstmm_ground(&state);
-    return mstmm_run_accelerations(&state);
+    const int code = mstmm_run_accelerations(&state);
+    return code || !model->refines ? code : mstmm_refine(&state, q, u);
 }
 
 int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, const real *q,

@@ -219,6 +219,8 @@ typedef struct {
     const mstmm_loop_row *rows;
     int64_t loops;        /* first number of closed loops in the workspace */
     int64_t loops_summed; /* so many of them are sums */
+    int64_t answer;       /* and of nu numbers: an answer that is refined */
+    int refines;          /* digits are lost behind heavy bodies: accelerations are refined once */
     real loops_apart;     /* gap (m, rad) at which rows that repeat others do so no longer */
     int needs_pose; /* loads or forces that need poses and velocities */
     int64_t workspace; /* numbers of workspace */
@@ -320,6 +322,7 @@ typedef struct mstmm_state {
     int hinges_known; /* hinges have their motion already */
     int level;        /* MSTMM_GAP, MSTMM_SLIP; 0: accelerations */
     real give;        /* see mstmm_correction */
+    int refined;      /* `given` is an answer, its multipliers are kept: what is left is answered */
     int residual;     /* drives give accelerations though others are given */
     struct mstmm_state *slope; /* where derivatives along a direction lie; NULL: none are wanted */
     mstmm_tangents *tangents;

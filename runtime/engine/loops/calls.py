@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mstmm.arrays import Array
@@ -9,8 +11,11 @@ from mstmm.arrays import Array
 from ...pack.records.loops import WrittenClosure
 from ..engine import Engine
 
-#: A pivot below this share of the mobility of its row is rounding.
-ROUNDING = 1e-8
+#: A pivot below this share of its usual size is rounding, which is the mobility of its row but for
+#: rows that only heavy bodies answer.
+ROUNDING, _ANSWERED = 1e-8, 1e-3
+#: Shares of the mobility below which no usual size is one, and no pivot whatever its usual size.
+_NOISE, _LEAST = 1e-12, 1e-15
 
 
 class LoopCalls:
@@ -33,7 +38,7 @@ class LoopCalls:
         self.mobility = self._mobilities()
         for row, mobility in enumerate(self.mobility.tolist()):
             records.scale(row, mobility)
-            records.judge(row, max(records.floor(row), ROUNDING * mobility))
+            records.judge(row, records.floor(row) or ROUNDING * mobility)
 
     @property
     def gap(self) -> int:
@@ -90,6 +95,21 @@ class LoopCalls:
     def pivots(self) -> Array:
         """The pivots of the rows in the last correction."""
         return self._of_rows("PIVOT")
+
+    def judge_by(self, states: Sequence[Array]) -> None:
+        """Take the largest pivots at these closed states (nq,) for the usual ones, where they are
+        far below the mobilities: honest rows, behind which heavy bodies hang."""
+        floors = [self.records.floor(row) for row in range(self.count)]
+        for row in range(self.count):
+            self.records.judge(row, _NOISE * float(self.mobility[row]))
+        usual = np.zeros(self.count)
+        for q in states:
+            self.correction(self.slip, q, np.zeros(self.engine.nu))
+            usual = np.maximum(usual, np.where(self.inverses() > 0, self.pivots(), 0.0))
+        for row, (pivot, mobility) in enumerate(zip(usual, self.mobility, strict=True)):
+            heavy = 0.0 < pivot < _ANSWERED * mobility and not self.records.yields(row)
+            floor = max(ROUNDING * pivot, _LEAST * mobility) if heavy else floors[row]
+            self.records.judge(row, min(floor, floors[row]))
 
     def _of_rows(self, name: str) -> Array:
         lib, stride = self.engine.lib, int(self.engine.lib.MSTMM_ROW)

@@ -17,6 +17,7 @@ from ..engine import Engine
 from .assembly import Assembly
 from .calls import LoopCalls
 from .rank import REPEATED, rank_at
+from .refinement import loses_digits
 
 #: Directions of a hinge that closes a loop, as its rows are called.
 _DIRECTIONS = ("x", "y", "z", "mx", "my", "mz")
@@ -74,6 +75,7 @@ class Closed:
         self.loops, repeating = self._judged(near, free_speeds)
         self._refuse_structure()
         self.start = self.assembled(near, u, holds, self.fast)
+        self.engine.packed.model.refines = int(loses_digits(self.engine, *self.start))
         self._refuse_locked(calls, repeating, LOCKED * length)
 
     def assembled(
@@ -104,7 +106,9 @@ class Closed:
                 for direction, row in one.rows.items() if row in rank.going
             }  # fmt: skip
             self.engine = Engine(packed_system(without(packed.system, repeated), packed))
-            records = LoopCalls(self.engine, q).records
+            calls = LoopCalls(self.engine, q)
+            records = calls.records
+        calls.judge_by(rank.states)
         told = Loops(
             tuple(cut.hinge for cut in packed.expanded.cuts), tuple(names), rows,
             tuple(names[row] for row in sorted(rank.here)),

@@ -37,11 +37,12 @@ _STEPS, _CLOSED, _GIVE, _SHARE = 60, 1e-9, 1e-6, 1e-2
 class Rank:
     """Rows that repeat others here, those of them that do so in closed states nearby too, and those
     of these that go: the others take the place of another row of their hinge where that one says
-    nothing, at a pose farther away."""
+    nothing, at a pose farther away.  `states` are those that were looked at, this one first."""
 
     here: frozenset[int]
     always: frozenset[int]
     going: frozenset[int]
+    states: tuple[Array, ...]
 
     @property
     def singular(self) -> bool:
@@ -56,17 +57,19 @@ def rank_at(engine: Engine, q: Array) -> Rank:
     level = REPEATED * calls.mobility
     here = _repeating(calls, q, level)
     if not here:
-        return Rank(here, here, here)
+        return Rank(here, here, here, (q,))
     raised = _RAISED * np.abs(calls.pivots()) + _ROUNDING * calls.mobility
     level[list(here)] = np.minimum(level, raised)[list(here)]
-    always, draw = here, np.random.default_rng(0)
+    always, draw, states = here, np.random.default_rng(0), [q]
     for _ in range(_NEIGHBOURS):
         near = _neighbour(calls, q, draw.uniform(-1.0, 1.0, engine.nu))
-        always = always if near is None else always & _repeating(calls, near, level)
+        if near is not None:
+            always &= _repeating(calls, near, level)
+            states.append(near)
     gaps = calls.correction(calls.gap, q, np.zeros(engine.nu))[1]
     if np.abs(gaps).max() > _CLOSED:
-        return Rank(here, always, always)
-    return Rank(here, always, always - _stand_ins(calls, q, always))
+        return Rank(here, always, always, tuple(states))
+    return Rank(here, always, always - _stand_ins(calls, q, always), tuple(states))
 
 
 def _stand_ins(calls: LoopCalls, q: Array, left_out: frozenset[int]) -> frozenset[int]:

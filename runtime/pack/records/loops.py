@@ -47,6 +47,12 @@ class LoopRecords:
         """Take pivots of a row up to `floor` for rounding."""
         self._rows[row].floor = floor
 
+    def judge_as(self, other: LoopRecords) -> None:
+        """Judge pivots of the rows that another plan of the same loops has as it does."""
+        for mine, theirs in zip(self.closures, other.closures, strict=True):
+            for direction in mine.rows.keys() & theirs.rows.keys():
+                self.judge(mine.rows[direction], other.floor(theirs.rows[direction]))
+
     def floor(self, row: int) -> float:
         """Up to where pivots of a row are rounding."""
         return float(self._rows[row].floor)
@@ -112,6 +118,7 @@ class _Loops:
             written.append(told)
         model.looped, model.rows, model.n_rows = looped, records, len(self.plan.rows)
         model.loops, model.loops_summed = place, self.summed
+        model.answer = place + self._take(self.system.nu)
         model.loops_apart = LOCKED * length_of(self.system)
         return place + self.end, LoopRecords(place, self.plan, records, tuple(written))
 
