@@ -86,3 +86,27 @@ def andrews() -> Scene:
         "spring": [{"from": "ground", "position": [0.014, 0.072, 0], "to": "K3.D",
                     "law": {"stiffness": 4530.0, "rest": 0.07785}}],
     }  # fmt: skip
+
+
+def scissors(units: int, angle: float = 0.4) -> Scene:
+    """A scissor mast: rods cross in their middles and stand on the tips of those below; the second
+    foot is on a slide."""
+    bodies: list[Scene] = [{"name": "shoe", "mass": 1.0}]
+    hinges: list[Scene] = [
+        {"name": "slide", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
+         "outboard": "shoe", "initial": {"q": math.cos(angle)}, "hold": True},
+    ]  # fmt: skip
+    for k in range(units):
+        for side in "ab":
+            bodies.append(rod(f"{side}{k}"))
+            bodies[-1]["ends"]["mid"] = [0.5, 0, 0]
+        feet = (f"b{k - 1}.tip", f"a{k - 1}.tip") if k else ("ground", "shoe")
+        starts = (2 * angle - math.pi, math.pi - 2 * angle) if k else (angle, math.pi - angle)
+        hinges += [
+            {"name": f"foot_{side}{k}", "type": "pin", "inboard": foot, "outboard": f"{side}{k}",
+             "initial": {"q": start}}
+            for side, foot, start in zip("ab", feet, starts, strict=True)
+        ]  # fmt: skip
+        hinges.append({"name": f"cross{k}", "type": "pin", "inboard": f"a{k}.mid",
+                       "outboard": f"b{k}.mid", "initial": {"q": math.pi - 2 * angle}})  # fmt: skip
+    return {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges}

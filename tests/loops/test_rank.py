@@ -7,7 +7,7 @@ import pytest
 
 import mstmm
 
-from .scenes import Scene, four_bars, rod
+from .scenes import Scene, four_bars, rod, scissors
 from .test_four_bar import linkage
 
 #: A rotation that leaves no axis along a coordinate.
@@ -100,6 +100,13 @@ def test_masses_do_not_decide() -> None:
         scene["body"][1]["mass"] = mass
         scene["body"][1]["inertia"] = [0.0, mass / 10, mass / 10]
         assert loops_of(scene).rank == 2
+
+
+def test_what_hangs_on_a_loop_does_not_decide() -> None:
+    """The loops at the foot of a scissor mast carry all that is above them."""
+    loops = loops_of(scissors(120))
+    assert (len(loops.rows), loops.rank, loops.mobility) == (600, 240, 1)
+    assert not loops.singular and loops.width <= 4
 
 
 def test_an_axis_a_little_off_does_not_lock() -> None:

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.ir.structure import Key
 
 from ...pack.records.loops import WrittenClosure
+from ...pack.system import Numbers
 from ..engine import Engine
 
 #: A pivot below this share of its usual size is rounding, which is the mobility of its row but for
@@ -22,10 +24,10 @@ class LoopCalls:
     """Gaps and slips of the loops of one packed scene, and what corrects them.
 
     Every row is given the mobility of its ends at `q` (nq,), if they were free: the scale by which
-    a pivot is judged.
+    a pivot is judged.  `mobility` (rows,) is given where these ends have no mass.
     """
 
-    def __init__(self, engine: Engine, q: Array) -> None:
+    def __init__(self, engine: Engine, q: Array, mobility: Array | None = None) -> None:
         records = engine.packed.written.loops
         assert records is not None
         self.engine, self.records, self.model = engine, records, engine.packed.model
@@ -35,10 +37,10 @@ class LoopCalls:
         self._quaternions = quaternions
         self.mobility = np.ones(self.count)
         self.correction(self.gap, q, np.zeros(engine.nu))
-        self.mobility = self._mobilities()
-        for row, mobility in enumerate(self.mobility.tolist()):
-            records.scale(row, mobility)
-            records.judge(row, records.floor(row) or ROUNDING * mobility)
+        self.mobility = self._mobilities() if mobility is None else mobility
+        for row, scale in enumerate(self.mobility.tolist()):
+            records.scale(row, scale)
+            records.judge(row, records.floor(row) or ROUNDING * scale)
 
     @property
     def gap(self) -> int:
@@ -138,26 +140,27 @@ class LoopCalls:
 
 
 class _Masses:
-    """Inverse mass matrices of bodies alone, about their input ends."""
+    """Inverse mass matrices of bodies alone, about their input ends, once for all alike."""
 
     def __init__(self, engine: Engine) -> None:
         self.engine, self.which = engine, engine.packed.system.which
         self.distinct = list(engine.packed.system.distinct)
-        self.known: dict[int, Array] = {}
+        self.known: dict[tuple[Key, Numbers], Array] = {}
 
     def inverse(self, body: int) -> Array:
-        number = int(self.which[body])
-        if number not in self.known:
-            one, engine = self.distinct[number], self.engine
-            upper = np.zeros(21)
-            call = engine.ffi.cast(
-                "int (*)(const double *, double *)",
-                engine.packed.elements[one.body].functions["inertia"],
-            )
-            call(list(one.body_p), engine.ffi.from_buffer("double[]", upper))
-            matrix = np.zeros((6, 6))
-            matrix[np.triu_indices(6)] = upper
-            whole = matrix + np.triu(matrix, 1).T
-            inverse = np.linalg.pinv(whole, rcond=1e-12, hermitian=True)
-            self.known[number] = np.asarray(inverse, dtype=np.float64)
-        return self.known[number]
+        one = self.distinct[int(self.which[body])]
+        kind = one.body, one.body_p
+        if kind not in self.known:
+            self.known[kind] = self._inverted(*kind)
+        return self.known[kind]
+
+    def _inverted(self, body: Key, numbers: Numbers) -> Array:
+        upper, engine = np.zeros(21), self.engine
+        function = engine.packed.elements[body].functions["inertia"]
+        call = engine.ffi.cast("int (*)(const double *, double *)", function)
+        call(list(numbers), engine.ffi.from_buffer("double[]", upper))
+        matrix = np.zeros((6, 6))
+        matrix[np.triu_indices(6)] = upper
+        whole = matrix + np.triu(matrix, 1).T
+        inverse = np.linalg.pinv(whole, rcond=1e-12, hermitian=True)
+        return np.asarray(inverse, dtype=np.float64)

@@ -1,9 +1,10 @@
 """Which rows of closed loops say what others say already.
 
-Decided once, at a state in which the loops are closed, and in a metric of the geometry: with true
-masses a heavy coupler makes honest rows look like rounding.  The level of a row that repeats others
-but for a misfit is the square of the misfit.  A row that repeats others here but not in closed
-states nearby is no repetition but a singular pose.
+Decided once, at a state in which the loops are closed, and in a metric of the hinges: with true
+masses a heavy coupler makes honest rows look like rounding, and with any masses of bodies what
+hangs on the hinges of a loop does, as the rest of a long mast.  The level of a row that repeats
+others but for a misfit is the square of the misfit.  A row that repeats others here but not in
+closed states nearby is no repetition but a singular pose.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
-from ...pack.loops.variants import geometric
+from ...pack.loops.variants import by_hinges, geometric
 from ...pack.pack import packed_system
 from ..engine import Engine
 from .calls import LoopCalls
@@ -52,8 +53,7 @@ class Rank:
 
 def rank_at(engine: Engine, q: Array) -> Rank:
     """Rows that repeat others at a closed state q (nq,) and around it."""
-    packed = engine.packed
-    calls = LoopCalls(Engine(packed_system(geometric(packed.system), packed)), q)
+    calls = _calls(engine, q)
     level = REPEATED * calls.mobility
     here = _repeating(calls, q, level)
     if not here:
@@ -70,6 +70,17 @@ def rank_at(engine: Engine, q: Array) -> Rank:
     if np.abs(gaps).max() > _CLOSED:
         return Rank(here, always, always, tuple(states))
     return Rank(here, always, always - _stand_ins(calls, q, always), tuple(states))
+
+
+def _calls(engine: Engine, q: Array) -> LoopCalls:
+    """Of the scene in the metric of its hinges, with the mobilities of bodies all alike."""
+    packed = engine.packed
+    mobility = LoopCalls(Engine(packed_system(geometric(packed.system), packed)), q).mobility
+    slides = {
+        packed.hinge_position[hinge.name]: hinge.facts.slides
+        for hinge in packed.scene.hinge if hinge.facts is not None
+    }  # fmt: skip
+    return LoopCalls(Engine(packed_system(by_hinges(packed.system, slides), packed)), q, mobility)
 
 
 def _stand_ins(calls: LoopCalls, q: Array, left_out: frozenset[int]) -> frozenset[int]:

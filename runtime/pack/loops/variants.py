@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -62,15 +62,35 @@ def length_of(system: System) -> float:
 def geometric(system: System) -> System:
     """With mass 1 at the input end of every rigid body, and one radius of gyration for all: what
     moves is not hidden behind what is heavy."""
-    moment = (_GYRATION * length_of(system)) ** 2
+    moment = _moment(system)
     numbers = (1.0, 0.0, 0.0, 0.0, moment, 0.0, 0.0, moment, 0.0, moment)
+    return _with_bodies(system, lambda _, body: replace(body, body_p=numbers))
+
+
+def by_hinges(system: System, slides: Mapping[int, Collection[int]]) -> System:
+    """As `geometric`, with the inertia in the hinges and none in the bodies: what a row asks of the
+    hinges of its loop is not hidden behind all that hangs on them.  `slides` are the speeds that
+    move points, by the place of the hinge."""
+    moment = _moment(system)
+
+    def changed(place: int, body: BodyNumbers) -> BodyNumbers:
+        rotor = tuple(1.0 if k in slides.get(place, ()) else moment for k in range(body.nu))
+        return replace(body, body_p=(0.0,) * 10, rotor=rotor)
+
+    return _with_bodies(system, changed)
+
+
+def _moment(system: System) -> float:
+    return (_GYRATION * length_of(system)) ** 2
+
+
+def _with_bodies(system: System, changed: Callable[[int, BodyNumbers], BodyNumbers]) -> System:
+    """With rigid bodies changed, each given with its place, but for the frames of closures."""
     frames = {one.frame for one in system.closures}
 
-    def alike(body: BodyNumbers) -> BodyNumbers:
-        return replace(body, body_p=numbers) if body.body[1] == RIGID else body
+    def made(run: BodyRun) -> BodyRun:
+        alike = (changed(run.place, b) if b.body[1] == RIGID else b for b in run.alike)
+        return replace(run, alike=tuple(alike))
 
-    runs = tuple(
-        run if run.place in frames else replace(run, alike=tuple(map(alike, run.alike)))
-        for run in system.bodies
-    )
+    runs = tuple(run if run.place in frames else made(run) for run in system.bodies)
     return replace(system, bodies=runs)
