@@ -72,7 +72,7 @@ int mstmm_force_spring_wrench(const real *restrict p, const real *restrict t,
     const real t21 = t14 + t20;
     const real t22 = t8 + t21;
     const real t23 = 1e-24 < t22;
-    if (!(t23 != 0)) return 2; /* the direction of the force is undefined */
+    if (!(t23 != 0)) return 2; /* the force is undefined there */
     const real t24 = sqrt(t22);
     const real t25 = 1.0 / t24;
     const real t26 = t24 - p[1];
@@ -164,30 +164,21 @@ int mstmm_force_spring_wrench(const real *restrict p, const real *restrict t,
     const real t106 = p[0] * t105;
     const real t107 = 0.5 * t106;
     V[0] = t107;
-    const real t108 = t49 * t27;
-    const real t109 = t7 * t108;
-    const real t110 = t25 * t109;
-    const real t111 = t76 * t27;
-    const real t112 = t19 * t111;
+    const real t108 = t7 * t27;
+    const real t109 = t25 * t108;
+    const real t110 = t92 + t109;
+    const real t111 = t49 * t110;
+    const real t112 = t13 * t27;
     const real t113 = t25 * t112;
-    const real t114 = t65 * t27;
-    const real t115 = t13 * t114;
-    const real t116 = t25 * t115;
-    const real t117 = t49 * t83;
-    const real t118 = t7 * t117;
-    const real t119 = t25 * t118;
-    const real t120 = t65 * t83;
-    const real t121 = t13 * t120;
-    const real t122 = t25 * t121;
-    const real t123 = t76 * t83;
-    const real t124 = t19 * t123;
-    const real t125 = t25 * t124;
-    const real t126 = t122 + t125;
-    const real t127 = t119 + t126;
-    const real t128 = t116 + t127;
-    const real t129 = t113 + t128;
-    const real t130 = t110 + t129;
-    P[0] = t130;
+    const real t114 = t85 + t113;
+    const real t115 = t65 * t114;
+    const real t116 = t19 * t27;
+    const real t117 = t25 * t116;
+    const real t118 = t88 + t117;
+    const real t119 = t76 * t118;
+    const real t120 = t115 + t119;
+    const real t121 = t111 + t120;
+    P[0] = t121;
     return 0;
 }
 
@@ -219,7 +210,7 @@ static const mstmm_port mstmm_force_spring_wrench_outputs[] = {
 };
 
 static const mstmm_guard mstmm_force_spring_wrench_guards[] = {
-    {2, "the direction of the force is undefined"},
+    {2, "the force is undefined there"},
 };
 
 /* wrench and its derivative along a direction
@@ -628,7 +619,7 @@ static const mstmm_kernel mstmm_force_spring_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_force_spring_wrench_inputs,
         .outputs = mstmm_force_spring_wrench_outputs,
-        .ir_hash = "e57df33489c9346418098807251e05a30fe93dd001adf74b38527c80945c098f",
+        .ir_hash = "1026c3dd5a364a96ba12ae455ebb6f04e75bbaef9c70e386ae781a6f82c32ee6",
         .n_guards = 1,
         .guards = mstmm_force_spring_wrench_guards,
     },
@@ -650,7 +641,7 @@ const mstmm_element mstmm_force_spring = {
     .abi = MSTMM_ABI,
     .kind = "force",
     .name = "spring",
-    .hash = "d4d1dbccb56f5d2d68b8419df5355abc8ac607d327730e7a537db4ca1144c3a2",
+    .hash = "79eb96ffac206ede5287b34f4047ad51e7a95aeb443f77663c4026593aeef381",
     .nq = 0,
     .nu = 0,
     .np = 3,

@@ -20,7 +20,7 @@ from mstmm.ir.spec import Param
 from ..catalogue.registry import Element, builtin_elements, kind_of
 from ..equations.hinge import HingeMotion, motion_of, speeds_of
 from ..language import returned as stated
-from ..language.element import Body, ForceElement, Hinge, Symbols
+from ..language.element import Body, ForceElement, Hinge, Symbols, rotation_about
 from ..language.switches import slope
 from .evaluate_equations import Undefined, evaluate_matrix
 from .smoothness import refuse_jumps
@@ -413,24 +413,47 @@ def check_force(force: ForceElement) -> None:
     effort, t = sp.Symbol("effort", real=True), sp.Symbol("t", real=True)
     what = "wrench(x, v, rotation, w, p, effort, t)"
     push, turn = stated.pair(where, what, force.wrench, x, v, rotation, w, p, effort, t)
-    energy = stated.scalar(where, "potential(x, p)", force.potential, x, p)
+    energy = _energy(where, force, x, rotation, p)
     known = _dimensions(p, force.parameters)
     for symbols, unit in ((x, "m"), (v, "m/s"), (w, "rad/s"), (rotation, "")):
         known |= {s: dimension(unit) for s in symbols}
     known |= {effort: dimension("N"), t: dimension("s")}
     _refuse_strange(where, what, sp.Matrix.vstack(push, turn), set(known))
-    _refuse_strange(where, "potential(x, p)", energy, {*x, *p})
-    numbers = random.Random(20262)
-    drawn = [{s: numbers.uniform(-1, 1) for s in x} for _ in range(2)]
+    numbers, angle = random.Random(20262), sp.Symbol("angle", real=True)
+    drawn = [{s: numbers.uniform(-1, 1) for s in (*x, angle)} for _ in range(2)]
     for point in drawn:
         point |= {s: _draw(one, numbers) for s, one in zip(p, force.parameters, strict=True)}
     refuse_jumps(
-        where, {"potential(x, p)": sp.Matrix([energy])}, dict.fromkeys(x, (-2.0, 2.0)), drawn,
+        where, {"potential(x, p)": sp.Matrix([energy.xreplace(_turned(rotation, angle))])},
+        dict.fromkeys((*x, angle), (-2.0, 2.0)), drawn,
         "energy would appear from nothing; let the branches meet with equal values",
     )  # fmt: skip
     _expect(where, "the force of wrench", push, "N", known)
     _expect(where, "the moment of wrench", turn, "N*m", known)
     _expect(where, "potential", sp.Matrix([energy]), "J", known)
+
+
+def _energy(
+    where: str, force: ForceElement, x: sp.Matrix, rotation: sp.Matrix, p: Symbols
+) -> sp.Expr:
+    """The potential as a function of x and, where a deflection is stated, of the rotation."""
+    said = "deflection(x, rotation, p)"
+    bent = stated.optional(where, said, force.deflection, x, rotation, p)
+    if bent is None:
+        energy = stated.scalar(where, "potential(x, p)", force.potential, x, p)
+        _refuse_strange(where, "potential(x, p)", energy, {*x, *p})
+        return energy
+    if bent.cols != 1:
+        raise ElementError(f"{where}: {said} must be n x 1, found {bent.rows} x {bent.cols}")
+    energy = stated.scalar(where, "potential(deflection, p)", force.potential, bent, p)
+    _refuse_strange(where, "potential(deflection, p)", energy, {*x, *rotation, *p})
+    return energy
+
+
+def _turned(rotation: sp.Matrix, angle: sp.Symbol) -> dict[sp.Symbol, sp.Expr]:
+    """Entries of a rotation by an angle about an axis that is none of the coordinates'."""
+    axis = (sp.Rational(3, 13), sp.Rational(4, 13), sp.Rational(12, 13))
+    return dict(zip(rotation, rotation_about(axis, angle), strict=True))
 
 
 __all__ = ["check", "check_body", "check_force", "check_hinge"]

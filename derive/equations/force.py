@@ -7,6 +7,7 @@ import sympy as sp
 from ..language.derivation import Derivation, Equation, Quantity, tilde, vector
 from ..language.element import ForceElement, Symbols, described
 from ..language.switches import slope
+from ..language.turning import turning_rate
 
 #: Failure code of a force element whose direction is undefined (`defined_when`).
 UNDEFINED = 2
@@ -49,15 +50,19 @@ def wrench(element: ForceElement) -> Derivation:
     effort, t = sp.Symbol("effort", real=True), sp.Symbol("t", real=True)
     equations, arrays = relative_motion()
     x, v, rotation, w = (_explicit(a) for a in arrays)
-    names = sp.Matrix(sp.symbols("X_1 X_2 X_3", real=True))
-    energy = sp.sympify(element.potential(names, p))
-    gradient = [slope(energy, n).xreplace(dict(zip(names, x, strict=True))) for n in names]
     force, moment = element.wrench(x, v, rotation, w, p, effort, t)
-    force, moment = sp.Matrix(force), sp.Matrix(moment)
-    lost = force.dot(v) + moment.dot(w) + sum(g * r for g, r in zip(gradient, v, strict=True))
+    beyond, rates = sp.Matrix([*force, *moment]), sp.Matrix([*v, *w])
+    deflection, steps = element.deflection(x, rotation, p), list[Equation]()
+    if deflection is None:
+        energy, push = _gradient(element, x, p)
+        load, lost = beyond, (beyond - sp.Matrix([*push, 0, 0, 0])).dot(rates)
+    else:
+        bent = _explicit(vector("bent", len(deflection)))
+        energy, push = _gradient(element, bent, p)
+        steps, pull = _deflected(deflection, x, rotation, push)
+        load, lost = beyond + pull, beyond.dot(rates)
     replace = {s: parameters[i, 0] for i, s in enumerate(p)}
     replace |= {effort: vector("effort", 1)[0, 0], t: vector("t", 1)[0, 0]}
-    replace |= dict(zip(names, x, strict=True))
 
     def final(value: sp.Matrix) -> sp.ImmutableDenseMatrix:
         return sp.ImmutableDenseMatrix(value.xreplace(replace))
@@ -91,8 +96,9 @@ def wrench(element: ForceElement) -> Derivation:
         outputs,
         (
             *equations,
-            Equation("force, F axes", local, final(force)),
-            Equation("moment, F axes", turning, final(moment)),
+            *(Equation(step.name, step.left, final(step.right)) for step in steps),
+            Equation("force, F axes", local, final(load[:3, :])),
+            Equation("moment, F axes", turning, final(load[3:, :])),
             Equation("force", outputs[0].symbol, a_f * local),
             Equation("moment", outputs[1].symbol, a_f * turning),
             Equation("stored energy", outputs[2].symbol, final(sp.Matrix([energy]))),
@@ -102,12 +108,42 @@ def wrench(element: ForceElement) -> Derivation:
     )
 
 
+def _gradient(
+    element: ForceElement, deflection: sp.Matrix, p: Symbols
+) -> tuple[sp.Expr, sp.Matrix]:
+    """The potential of a deflection, and minus its slopes."""
+    names = sp.Matrix([sp.Dummy(real=True) for _ in deflection])
+    there = dict(zip(names, deflection, strict=True))
+    energy = sp.sympify(element.potential(names, p))
+    push = sp.Matrix([-slope(energy, name).xreplace(there) for name in names])
+    return energy.xreplace(there), push
+
+
+def _deflected(
+    deflection: sp.Matrix, x: sp.Matrix, rotation: sp.Matrix, push: sp.Matrix
+) -> tuple[list[Equation], sp.Matrix]:
+    """Deflection, how it goes with rates of x and turns of T, and the load of a push along it."""
+    n, units = len(deflection), sp.eye(3)
+    names = [sp.Dummy(real=True) for _ in x]
+    there = dict(zip(names, x, strict=True))
+    of_names = deflection.xreplace(dict(zip(x, names, strict=True)))
+    along = [slope(of_names, name).xreplace(there) for name in names]
+    turns = [turning_rate(deflection, rotation, units[:, k]) for k in range(3)]
+    ways, pushed = sp.MatrixSymbol("E", n, 6), vector("push", n)
+    steps = [
+        Equation("deflection", vector("bent", n), deflection),
+        Equation("deflection by rates and turns", ways, sp.Matrix.hstack(*along, *turns)),
+        Equation("push along the deflection", pushed, push),
+    ]
+    return steps, _explicit(ways).T * _explicit(pushed)
+
+
 def wrench_guards(element: ForceElement) -> tuple[tuple[sp.Basic, int, str], ...]:
     """The element's own condition, over the arrays of the kernel."""
     p = Symbols("p", tuple(x.name for x in element.parameters))
     _, arrays = relative_motion()
-    condition = element.defined_when(_explicit(arrays[0]), p)
+    condition = element.defined_within(_explicit(arrays[0]), _explicit(arrays[2]), p)
     if condition is None:
         return ()
     replace = {s: vector("p", len(p))[i, 0] for i, s in enumerate(p)}
-    return ((condition.xreplace(replace), UNDEFINED, "the direction of the force is undefined"),)
+    return ((condition.xreplace(replace), UNDEFINED, "the force is undefined there"),)

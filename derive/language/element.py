@@ -132,7 +132,8 @@ class ForceElement:
     relative motion in F axes: position x of T from F, its rate v as seen from F, rotation R (T to
     F axes), relative angular velocity w.  The F end receives the opposite, shifted by x.
     `potential`, if there is one, is a function of x alone; what the wrench does beyond it counts as
-    work.
+    work.  Where `deflection` is stated, `potential` is a function of that instead: its load follows
+    from it, and `wrench` gives what acts besides.
     """
 
     name: ClassVar[str]
@@ -154,12 +155,20 @@ class ForceElement:
         raise NotImplementedError
 
     def potential(self, x: sp.Matrix, p: Symbols) -> sp.Expr:
-        """Potential energy as a function of x, J."""
+        """Potential energy as a function of x, or of the deflection where that is stated, J."""
         return sp.Integer(0)
+
+    def deflection(self, x: sp.Matrix, rotation: sp.Matrix, p: Symbols) -> sp.Matrix | None:
+        """Functions (n x 1) of x and the rotation on which the potential depends."""
+        return None
 
     def defined_when(self, x: sp.Matrix, p: Symbols) -> sp.Basic | None:
         """Condition under which the wrench is defined; the run stops where it fails."""
         return None
+
+    def defined_within(self, x: sp.Matrix, rotation: sp.Matrix, p: Symbols) -> sp.Basic | None:
+        """The same by x and the rotation."""
+        return self.defined_when(x, p)
 
 
 def rotation_about(axis: int | tuple[sp.Expr, sp.Expr, sp.Expr], angle: sp.Expr) -> sp.Matrix:

@@ -98,7 +98,8 @@ def _scene(path: str) -> Report:
     sizes = {
         "bodies": len(scene.bodies), "beams": len(scene.beam), "elastic": len(scene.elastic),
         "hinges": len(scene.hinges), "coordinates": model.nq, "speeds": model.nu,
-        "springs": len(scene.spring), "loads": len(scene.load), "events": len(scene.event),
+        "springs": len(scene.spring), "bushings": len(scene.bushing), "loads": len(scene.load),
+        "events": len(scene.event),
     }  # fmt: skip
     notes = [f"{name}: {note}" for name, body in model.flexible.items() for note in body.notes]
     warnings = [*scene.warnings, *(w for body in model.flexible.values() for w in body.warnings)]
@@ -109,8 +110,8 @@ def _scene(path: str) -> Report:
 
 _ONE = {
     "bodies": "body", "beams": "beam", "elastic": "elastic body", "hinges": "hinge",
-    "coordinates": "coordinate", "speeds": "speed", "springs": "spring", "loads": "load",
-    "events": "event",
+    "coordinates": "coordinate", "speeds": "speed", "springs": "spring", "bushings": "bushing",
+    "loads": "load", "events": "event",
 }  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from .scene import Scene
 from .tables.beam import Beam
 from .tables.beam_keys import Modes, Section, Shapes
 from .tables.body import Body, End
+from .tables.bushing import Bushing
 from .tables.chain import Chain
 from .tables.closures import Constraint, Coupling
 from .tables.elastic import Elastic
@@ -21,8 +22,8 @@ from .tables.loads import Event, Load, Spring
 from .tables.outside.inputs import Input, Output, Signal
 
 __all__ = [
-    "Arrays", "Beam", "Body", "Box", "Chain", "Constraint", "Coupling", "Damping", "Elastic",
-    "ElasticEnd", "End", "Event", "Friction", "Hinge", "Initial", "Input", "Law", "LawEntry",
-    "Limits", "Load", "Modes", "Output", "Scene", "Section", "Shapes", "Signal", "Spring",
-    "SpringLaw", "Start", "load_scene", "read", "split",
+    "Arrays", "Beam", "Body", "Box", "Bushing", "Chain", "Constraint", "Coupling", "Damping",
+    "Elastic", "ElasticEnd", "End", "Event", "Friction", "Hinge", "Initial", "Input", "Law",
+    "LawEntry", "Limits", "Load", "Modes", "Output", "Scene", "Section", "Shapes", "Signal",
+    "Spring", "SpringLaw", "Start", "load_scene", "read", "split",
 ]  # fmt: skip

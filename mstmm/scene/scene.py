@@ -102,7 +102,7 @@ class Scene(SceneTables):
 
     @model_validator(mode="after")
     def _settle(self) -> Scene:
-        for table in ("load", "event", "spring", "constraint", "coupling"):
+        for table in ("load", "event", "spring", "bushing", "constraint", "coupling"):
             object.__setattr__(self, table, _named(table, getattr(self, table)))
         for table, elements in _at_roots(self).items():
             object.__setattr__(self, table, elements)
@@ -141,7 +141,7 @@ def _named(table: str, elements: tuple[Any, ...]) -> tuple[Any, ...]:
 #: The keys that refer to a body or an end of one.
 _REFERENCES = {
     "hinge": ("inboard", "outboard"), "chain": ("inboard",), "load": ("on",),
-    "spring": ("from_", "to"), "constraint": ("from_", "to"),
+    "spring": ("from_", "to"), "bushing": ("from_", "to"), "constraint": ("from_", "to"),
 }  # fmt: skip
 
 

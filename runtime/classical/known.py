@@ -56,6 +56,7 @@ def _refuse_loads(packed: Packed) -> None:
     scene = packed.described
     for table, elements, why in (
         ("load", scene.load, _LOADS), ("spring", scene.spring, _LOADS),
+        ("bushing", scene.bushing, _LOADS),
         ("event", scene.event, "its steps neither find events nor act on them"),
     ):  # fmt: skip
         for element in elements:

@@ -13,6 +13,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.border.failures import Failed
 from mstmm.ir.statements import NEGATIVE
+from mstmm.scene import Bushing, Spring
 
 from ..pack.packed import Packed
 
@@ -175,6 +176,17 @@ class Calls:
         packed = self.packed
         return packed.scene.bodies.name(packed.topology.at(position)[0])
 
+    def _undefined_force(self, element: Spring | Bushing, at: str) -> str:
+        if isinstance(element, Bushing):
+            return (
+                f'bushing "{element.name}" {at}: its ends are turned by more than 170 degrees from '
+                "rest, beyond its law; make it stiffer, or put a hinge with a law in its place"
+            )
+        return (
+            f'spring "{element.name}" {at}: its direction is undefined because its ends coincide; '
+            "move one of them, or put an elastic hinge or a bushing in its place"
+        )
+
     def failure_text(self, failure: Any, t: float) -> str:
         """A failure of the engine as a sentence: element, cause, time, one way out."""
         at = f"at t = {t:.9g} s"
@@ -195,11 +207,7 @@ class Calls:
                 "that motion, or take a ball hinge for three angles"
             )
         if reason == Failed.FORCE:
-            name = self.packed.scene.spring[element].name
-            return (
-                f'spring "{name}" {at}: its direction is undefined because its ends coincide; move '
-                "one of them, or put an elastic hinge in its place"
-            )
+            return self._undefined_force(self.packed.scene.forces[element], at)
         if reason == Failed.HINGE:
             return f'hinge "{self.hinge_name(element)}" {at}: its definition fails in this state'
         if reason == Failed.SECTION:

@@ -56,7 +56,7 @@ def strain(linear: Equations, shapes: NDArray[Any]) -> dict[str, Array]:
     )
     own = np.real(np.conj(shapes) * (whole - lawless + _by_shapes(linear, shapes)))
     names = [name.rpartition(".")[0] for name in linear.coordinates]
-    if not linear.model.scene.spring:
+    if not linear.model.scene.forces:
         return _parts(names, own)
     sprung = np.real(np.conj(shapes) * (lawless - held)).sum(axis=0)
     return _parts([*names, "springs"], np.vstack([own, sprung]))

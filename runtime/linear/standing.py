@@ -19,6 +19,7 @@ from ..kernels.tape import TapeKernel
 from ..pack.pack import packed_system
 from ..pack.system import ForceNumbers, LoadNumbers, System
 from ..pack.values import constant_kernel
+from ..result.bushings import deflection_of
 from .matrices import State
 
 INERTIAL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -33,7 +34,7 @@ def with_held_springs(engine: Engine, state: State) -> Engine:
     """The same with springs that keep their tension and no laws of hinges: their efforts act along
     the hinges' own speeds, so that standing ones change nothing.
 
-    A force element of a user's own type is left out with all that it does.
+    A bushing or a force element of a user's own type is left out with all that it does.
     """
     system = engine.packed.system
     springs = (force for force in system.forces if force.element == ("force", "spring"))
@@ -115,6 +116,12 @@ def spring_length(engine: Engine, spring: ForceNumbers, state: State) -> tuple[f
     apart, moving = seen[1, 0:3] - seen[0, 0:3], seen[1, 3:6] - seen[0, 3:6]
     length = float(np.linalg.norm(apart))
     return length, float(apart @ moving) / length
+
+
+def bushing_deflection(engine: Engine, bushing: ForceNumbers, state: State) -> Array:
+    """(6,) deflection of a bushing at a state, in its own axes."""
+    rest, end = _seen(engine, [Probe(*one) for one in bushing.ends], state)
+    return deflection_of((rest[None], end[None]))[0]
 
 
 def _seen(engine: Engine, probes: list[Probe], state: State) -> Array:

@@ -12,14 +12,15 @@ from mstmm.ir import Port
 from mstmm.scene import Scene, split
 from mstmm.scene.checks.topology import Topology, build
 from mstmm.scene.tables.hinge import HingeTable
-from mstmm.scene.tables.loads import Load, Spring
+from mstmm.scene.tables.loads import Load
 
 from ..breaks.acting import acting
 from ..flexible.modal_body import ModalBody
 from ..kernels.records import Lookup
 from .bodies import Bodies
-from .elements import Elements, Known, declared_numbers
+from .elements import Elements, Known
 from .flexible.expansion import Expanded, expand
+from .forces.all import forces_of
 from .frames import Frames
 from .laws import laws_of
 from .letting_go import releasable
@@ -27,8 +28,8 @@ from .loops.closures import closures_of
 from .loops.opened import opened
 from .loops.unknown import refuse_unknown
 from .slots import layout_of
-from .system import ForceNumbers, Held, LoadNumbers, Numbers, System
-from .values import MOVING, Moving, Values, drive_kernel, effort_kernel
+from .system import Held, LoadNumbers, Numbers, System
+from .values import MOVING, Values, drive_kernel
 
 
 def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) -> Expanded:
@@ -85,7 +86,7 @@ def system_of(
     held = _held(scene, laws[-1].next_twist if laws else len(releases))
     system = System(
         layout.nq, layout.nu, held.first + len(held.start), nodes.gravity, runs,
-        laws, loads, tuple(_force(frames, spring, ports) for spring in nodes.spring),
+        laws, loads, forces_of(frames, nodes, ports),
         values.kernel() if len(values) else None,
         drive_kernel([drive for _, _, drive in driven], layout, ports) if driven else None,
         tuple((place, k) for place, k, _ in driven), tuple(scene.channels.values()),
@@ -151,19 +152,3 @@ def _section_axes(frames: Frames, reference: str) -> Numbers:
     node = frames.expanded.nodes.get(reference)
     passage = frames.expanded.passages.get(node or "")
     return () if passage is None else tuple(passage.port.rotation.T.ravel().tolist())
-
-
-def _force(frames: Frames, spring: Spring, moving: Moving) -> ForceNumbers:
-    element = frames.elements.get("force", spring.type, spring.name)
-    one, other = (
-        (body, axes, spring.position if body < 0 else offset)
-        for body, axes, offset in map(frames.end, (spring.from_, spring.to))
-    )
-    law, effort = spring.law, None
-    if spring.type == "spring":
-        p: Numbers = (law.stiffness, law.rest, law.damping)
-        if not law.effort.is_zero:
-            effort = effort_kernel(law.effort, frames.layout, moving)
-    else:
-        p = declared_numbers(element.declared, spring.parameters, f'spring "{spring.name}"')
-    return ForceNumbers(("force", spring.type), (one, other), p, effort)

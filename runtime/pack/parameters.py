@@ -23,7 +23,9 @@ from mstmm.scene.rules.values import Refused
 from mstmm.scene.rules.written import known
 from mstmm.scene.tables.constants import evaluated
 
-TABLES = ("input", "body", "beam", "elastic", "hinge", "chain", "load", "event", "spring")
+TABLES = (
+    "input", "body", "beam", "elastic", "hinge", "chain", "load", "event", "spring", "bushing",
+)  # fmt: skip
 _INDEX = re.compile(r"(.*)\[(\d+)\]")
 
 

@@ -24,6 +24,8 @@ from mstmm.numbers.pieces import Pieces
 from .layout import Group
 
 Numbers = tuple[float, ...]
+#: Force elements whose laws do not go by time.
+_BUILT_IN: tuple[Key, ...] = (("force", "spring"), ("force", "bushing6"))
 #: Places among the values of the scene's expressions, -1 for the constant zero.
 Places = tuple[int, ...]
 
@@ -283,7 +285,7 @@ class System:
     @property
     def steady(self) -> bool:
         """Whether nothing goes by time: neither drive nor expression, nor an element that may."""
-        own = any(force.element != ("force", "spring") for force in self.forces)
+        own = any(force.element not in _BUILT_IN for force in self.forces)
         return not (self.driven or self.timed or own)
 
     @property

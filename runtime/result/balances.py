@@ -107,8 +107,8 @@ def _isolated(scene: Scene) -> bool:
         for load in scene.load
         for e in (*load.force, *load.moment, *(load.force_per_length or ()))
     )
-    springs = any("ground" in (spring.from_, spring.to) for spring in scene.spring)
-    return not loads and not springs and all(_passive(hinge) for hinge in _roots(scene))
+    grounded = any("ground" in (one.from_, one.to) for one in scene.forces)
+    return not loads and not grounded and all(_passive(hinge) for hinge in _roots(scene))
 
 
 def _roots(scene: Scene) -> list[Hinge]:

@@ -24,17 +24,22 @@ _MOST = 200
 
 
 def stiffest(result: Record) -> Give | None:
-    """Of the springs between ends and of hinges with all motions free; None where there is none,
-    where nothing was sampled, and for scenes of very many."""
+    """Of the springs and bushings between ends and of hinges with all motions free; None where
+    there is none, where nothing was sampled, and for scenes of very many."""
     scene = result.model.scene
     springs = [s for s in scene.spring if s.type == "spring" and s.law.stiffness > 0]
     mounts = [h for h in scene.hinge if h.facts is not None and h.facts.free_body]
-    if not len(result.t) or not 0 < len(springs) + len(mounts) <= _MOST:
+    bushings = [b for b in scene.bushing if b.stiffest[0] > 0]
+    if not len(result.t) or not 0 < len(springs) + len(mounts) + len(bushings) <= _MOST:
         return None
     stiff = max(springs, key=lambda s: s.law.stiffness, default=None)
     found: list[Give] = []
     if stiff is not None:
         found.append(Give(f'spring "{stiff.name}"', stiff.law.stiffness, _stretch(result, stiff)))
+    stiff_one = max(bushings, key=lambda b: b.stiffest[0], default=None)
+    if stiff_one is not None:
+        moved = result.quantity(f"{stiff_one.name}.deflection").values
+        found.append(Give(f'bushing "{stiff_one.name}"', stiff_one.stiffest[0], _largest(moved)))
     for mount in mounts:
         entries = [mount.law.entry(k) for k in range(3)]
         if any(e.stiffness > 0 for e in entries):

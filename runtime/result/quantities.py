@@ -30,6 +30,7 @@ from ..engine.shown import (
     rate_unit,
 )  # fmt: skip
 from ..pack.layout import HingeSlots
+from .bushings import add_bushing
 from .flexible.names import add_body
 from .names import Quantity, Table, Values
 from .observed import quaternions
@@ -50,8 +51,8 @@ RATES = {
 class Quantities:
     """Every quantity of a run by its name, from the states and what they show.
 
-    Names are made per owner, a hinge, a body, an end, a spring or the scene (""), when they are
-    asked for.
+    Names are made per owner, a hinge, a body, an end, a spring, a bushing or the scene (""), when
+    they are asked for.
     """
 
     def __init__(self, observed: Observed, flexible: FlexibleResults) -> None:
@@ -61,6 +62,7 @@ class Quantities:
         self._orientations: dict[str, Array] = {}
         self._tables: dict[str, Table] = {}
         self._springs = {one.name: one for one in observed.references.scene.spring}
+        self._bushings = {one.name: one for one in observed.references.scene.bushing}
 
     # --- of bodies ------------------------------------------------------------------------------
 
@@ -148,10 +150,11 @@ class Quantities:
         return [one.name for one in self.observed.references.scene.output if one.name in there]
 
     def owners(self) -> Iterator[str]:
-        """Hinges, bodies and ends, springs, and the scene itself."""
+        """Hinges, bodies and ends, springs, bushings, and the scene itself."""
         yield from self.layout.hinges
         yield from self.observed.references
         yield from self._springs
+        yield from self._bushings
         yield ""
 
     def of(self, owner: str) -> Table:
@@ -166,11 +169,13 @@ class Quantities:
                 self._scene(table)
             if owner in self._springs:
                 add_spring(table, self.observed, self._springs[owner])
+            if owner in self._bushings:
+                add_bushing(table, self.observed, self._bushings[owner])
             self._tables[owner] = table
         return self._tables[owner]
 
     def _owns(self, owner: str) -> bool:
-        known = self.layout.hinges, self.observed.references, self._springs
+        known = (self.layout.hinges, self.observed.references, self._springs, self._bushings)
         return any(owner in owners for owners in known)
 
     def _body(self, table: Table, reference: str) -> None:

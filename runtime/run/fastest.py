@@ -40,8 +40,10 @@ def fastest_possible(scene: Scene) -> float:
     laws = [table.law for table in (*scene.hinge, *(x for c in scene.chain for x in c.hinge))]
     stiffest = max([k for law in laws for k in law.stiffness], default=0.0)
     stiffest = max([stiffest, *(spring.law.stiffness for spring in scene.spring)])
+    stiffest = max([stiffest, *(k for one in scene.bushing for k in one.stiffest)])
     damped = max([c for law in laws for c in law.damping], default=0.0)
     damped = max([damped, *(spring.law.damping for spring in scene.spring)])
+    damped = max([damped, *(c for one in scene.bushing for c in one.most_damped)])
     if not (stiffest > 0 or damped > 0):
         return 0.0
     tables = (*scene.body, *(table for chain in scene.chain for table in chain.body))

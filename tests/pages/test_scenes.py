@@ -12,6 +12,7 @@ from mstmm.scene import (
     Beam,
     Body,
     Box,
+    Bushing,
     Chain,
     Constraint,
     Coupling,
@@ -65,9 +66,9 @@ def test_scene_runs(block: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "table",
     [
-        Scene, Body, Hinge, Chain, Law, Friction, Limits, Load, Spring, SpringLaw, Event, Beam,
-        Section, Modes, Shapes, Damping, Start, Elastic, ElasticEnd, Arrays, Box, Input, Signal,
-        Output, Constraint, Coupling,
+        Scene, Body, Hinge, Chain, Law, Friction, Limits, Load, Spring, Bushing, SpringLaw, Event,
+        Beam, Section, Modes, Shapes, Damping, Start, Elastic, ElasticEnd, Arrays, Box, Input,
+        Signal, Output, Constraint, Coupling,
     ],
     ids=lambda t: t.__name__,
 )  # fmt: skip

@@ -61,7 +61,7 @@ def _duplicates(scene: SceneTables) -> Iterator[Problem]:
                     f'"{element.name}" is also the name of {table} number {first + 1}; rename one',
                 )
     taken: dict[str, str] = {}
-    for table in ("body", "hinge", "beam", "elastic", "chain"):
+    for table in ("body", "hinge", "beam", "elastic", "chain", "bushing"):
         word = _WORDS.get(table, f"a {table}")
         for i, element in enumerate(getattr(scene, table)):
             other = taken.setdefault(element.name, word)
@@ -94,12 +94,10 @@ def _references(scene: SceneTables) -> Iterator[Problem]:
     for i, load in enumerate(scene.load):
         yield from _end(load.on, scene, ("load", i, "on"))
         yield from _axes(scene, i)
-    for i, spring in enumerate(scene.spring):
-        yield from _end(spring.from_, scene, ("spring", i, "from"))
-        yield from _end(spring.to, scene, ("spring", i, "to"))
-    for i, constraint in enumerate(scene.constraint):
-        yield from _end(constraint.from_, scene, ("constraint", i, "from"))
-        yield from _end(constraint.to, scene, ("constraint", i, "to"))
+    for table in ("spring", "bushing", "constraint"):
+        for i, element in enumerate(getattr(scene, table)):
+            yield from _end(element.from_, scene, (table, i, "from"))
+            yield from _end(element.to, scene, (table, i, "to"))
     hinges = {hinge.name: hinge for hinge in scene.hinge}
     for i, event in enumerate(scene.event):
         if event.hinge is None:

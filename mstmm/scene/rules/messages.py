@@ -32,7 +32,7 @@ _LOOPS = ("loop", "loops", "closure", "closures", "joint", "joints")
 #: The lists of tables of a scene.
 TABLES = (
     "input", "signal", "output", "controller", "body", "hinge", "chain", "beam", "elastic",
-    "load", "event", "spring", "constraint", "coupling",
+    "load", "event", "spring", "bushing", "constraint", "coupling",
 )  # fmt: skip
 
 Problem = tuple[Location, str]

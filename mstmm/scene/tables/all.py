@@ -15,6 +15,7 @@ from ..rules import values as rules
 from ..rules.values import Table
 from .beam import Beam
 from .body import Body
+from .bushing import Bushing
 from .chain import Chain
 from .closures import Constraint, Coupling
 from .constants import constants as named_numbers
@@ -52,6 +53,7 @@ class SceneTables(Table):
     load: tuple[Load, ...] = ()
     event: tuple[Event, ...] = ()
     spring: tuple[Spring, ...] = ()
+    bushing: tuple[Bushing, ...] = ()
     constraint: tuple[Constraint, ...] = ()
     coupling: tuple[Coupling, ...] = ()
 
@@ -75,6 +77,11 @@ class SceneTables(Table):
             for one in self.input
         }  # fmt: skip
         return inputs | signals
+
+    @property
+    def forces(self) -> tuple[Spring | Bushing, ...]:
+        """What acts between two ends, without mass: springs, then bushings."""
+        return (*self.spring, *self.bushing)
 
     @property
     def controlled(self) -> dict[str, str]:

@@ -35,7 +35,8 @@ class End(Table):
         return from_orientation(self.orientation)
 
 
-def _as_end(value: Any) -> Any:
+def as_end(value: Any) -> Any:
+    """A place alone is that of an end without axes of its own."""
     return {"position": value} if isinstance(value, (list, tuple)) else value
 
 
@@ -45,7 +46,7 @@ def _as_ends(value: Any) -> Any:
     for key in value:
         if not isinstance(key, str) or not NAME.fullmatch(key):
             raise refuse(f"expected the name of an end, found {found(key)}")
-    return {key: _as_end(v) for key, v in value.items()}
+    return {key: as_end(v) for key, v in value.items()}
 
 
 class BodyTable(Table):

@@ -140,6 +140,8 @@ def _goes(weld: Hinge, bodies: Mapping[str, Body], scene: Scene, spoken: Spoken)
         {split(one.from_)[0], split(one.to)[0]} == {*pair} and _own(one) for one in scene.spring
     ):
         return None
+    if any({split(one.from_)[0], split(one.to)[0]} & {*pair} - {GROUND} for one in scene.bushing):
+        return None  # its axes are those of its ends
     if weld.inboard_body == GROUND:
         alone = len(scene.skeleton.bodies) == 1
         return None if alone or weld.outboard_body in spoken.places else weld.outboard_body

@@ -14,7 +14,7 @@ from ..renaming import renamed
 #: Keys of the tables that refer to a body or to one of its ends, and to a hinge.
 _PLACES: dict[str, tuple[str, ...]] = {
     "hinge": ("inboard", "outboard"), "chain": ("inboard",), "load": ("on", "axes"),
-    "spring": ("from_", "to"), "event": (), "output": (),
+    "spring": ("from_", "to"), "bushing": ("from_", "to"), "event": (), "output": (),
 }  # fmt: skip
 _HINGES: dict[str, tuple[str, ...]] = {"event": ("hinge",)}
 

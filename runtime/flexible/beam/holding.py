@@ -11,6 +11,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.scene.checks.flexible import free_axes
 from mstmm.scene.rules.values import split
+from mstmm.scene.tables.bushing import Bushing
 from mstmm.scene.tables.loads import Load, Spring
 
 from .data import BeamData
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from mstmm.scene import Chain, Scene
     from mstmm.scene.tables.beam import Beam
     from mstmm.scene.tables.hinge import Hinge
+
+    _Acting = Chain | Spring | Bushing | Load
 
 #: Deflection along y turns the section about z, along z about y, and twist turns it about x.
 AXES = {"y": (0.0, 0.0, 1.0), "z": (0.0, 1.0, 0.0), "twist": (1.0, 0.0, 0.0)}
@@ -64,8 +67,8 @@ class Surroundings:
         self.carries: dict[str, list[Hinge]] = {}
         for hinge in scene.hinge:
             self.carries.setdefault(hinge.inboard_body, []).append(hinge)
-        self.acts: dict[str, list[tuple[str, Chain | Spring | Load]]] = {}
-        acting: list[Chain | Spring | Load] = [*scene.chain, *scene.spring, *scene.load]
+        self.acts: dict[str, list[tuple[str, _Acting]]] = {}
+        acting: list[_Acting] = [*scene.chain, *scene.forces, *scene.load]
         for element in acting:
             for reference in _references(element):
                 name, end = split(reference)
@@ -93,11 +96,13 @@ class Surroundings:
         return self._beyond[body]
 
 
-def _references(element: Chain | Spring | Load) -> tuple[str, ...]:
+def _references(element: _Acting) -> tuple[str, ...]:
     """The bodies and ends that an element acts on."""
     if isinstance(element, Load):
         return (element.on,)
-    return (element.from_, element.to) if isinstance(element, Spring) else (element.inboard,)
+    if isinstance(element, (Spring, Bushing)):
+        return (element.from_, element.to)
+    return (element.inboard,)
 
 
 def holding(around: Surroundings, beam: Beam, data: BeamData) -> Holding:
@@ -171,14 +176,21 @@ def _ends(around: Surroundings, beam: Beam, data: BeamData) -> Iterator[End]:
                 yield End(x, frozenset(AXES if turning else ()))
         elif isinstance(element, Spring):
             yield End(x, frozenset(), _is_stiff(element, data))
+        elif isinstance(element, Bushing):
+            along, about = element.stiffest
+            yield End(x, frozenset(AXES if about else ()), along > HEAVY * _own_stiffness(data))
         else:
             yield End(x, frozenset(AXES), True)
 
 
 def _is_stiff(spring: Spring, data: BeamData) -> bool:
     """Stiff beside the beam as a cantilever, or of a user's type."""
-    own = 3 * _softest(data) / data.length**3
-    return spring.type != "spring" or spring.law.stiffness > HEAVY * own
+    return spring.type != "spring" or spring.law.stiffness > HEAVY * _own_stiffness(data)
+
+
+def _own_stiffness(data: BeamData) -> float:
+    """Of the tip of the beam as a cantilever, N/m."""
+    return 3 * _softest(data) / data.length**3
 
 
 def _acts(hinge: Hinge) -> bool:

@@ -86,7 +86,8 @@ class Planar:
         heights = self._heights(n)
         upright = abs(float(gravity @ n)) <= _ROUNDING * max(1.0, float(np.linalg.norm(gravity)))
         return (
-            upright
+            not scene.bushing
+            and upright
             and heights is not None
             and all(self._hinge_stays(hinge, n) for hinge in scene.hinge)
             and all(self._load_stays(load, n, heights) for load in scene.load)

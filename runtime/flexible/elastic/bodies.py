@@ -189,7 +189,7 @@ def _used(name: str, scene: Scene) -> set[str]:
         reference for hinge in scene.hinge for reference in (hinge.inboard, hinge.outboard)
     ]
     references += [chain.inboard for chain in scene.chain] + [load.on for load in scene.load]
-    references += [reference for spring in scene.spring for reference in (spring.from_, spring.to)]
+    references += [reference for force in scene.forces for reference in (force.from_, force.to)]
     return {at for body, at in map(split, references) if body == name and body != GROUND}
 
 

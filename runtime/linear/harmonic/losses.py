@@ -11,9 +11,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from mstmm.arrays import real
 from mstmm.errors import SceneError
 from mstmm.scene.rules.messages import near
+from mstmm.scene.rules.symmetric import full
 
 from ...engine.engine import Engine
 from ...pack.pack import packed_system
@@ -26,7 +29,7 @@ from ...pack.system import (
     LawRun,
 )
 from ..matrices import State
-from ..standing import spring_length
+from ..standing import bushing_deflection, spring_length
 
 if TYPE_CHECKING:
     from ...engine.compiled import Compiled
@@ -52,8 +55,8 @@ def stiffer(model: Compiled, state: State, losses: Losses) -> Engine:
     bodies = tuple(_stiffer_shapes(model, run, lossy) for run in system.bodies)
     laws = tuple(law for run in system.laws for law in _stiffer_laws(engine, run, lossy))
     forces = tuple(
-        _stiffer_spring(engine, force, state, lossy(spring.name))
-        for force, spring in zip(system.forces, engine.packed.scene.spring, strict=True)
+        _stiffer_force(engine, force, state, lossy(one.name))
+        for force, one in zip(system.forces, engine.packed.scene.forces, strict=True)
     )
     made = replace(system, bodies=bodies, laws=laws, forces=forces)
     return Engine(packed_system(made, engine.packed))
@@ -68,8 +71,8 @@ def by_name(model: Compiled, losses: Losses) -> Callable[[str], float]:
     for name in losses:
         if name not in known:
             raise SceneError(
-                f'structural: "{name}": expected a hinge with a law, a chain, a flexible body or a '
-                f"spring{near(str(name), sorted(known))}"
+                f'structural: "{name}": expected a hinge with a law, a chain, a flexible body, a '
+                f"spring or a bushing{near(str(name), sorted(known))}"
             )
     factors = {name: _factor(f'structural["{name}"]', value) for name, value in losses.items()}
     return lambda name: factors.get(name, factors.get(name.partition("[")[0], 0.0))
@@ -86,7 +89,7 @@ def _elastic(model: Compiled) -> Iterator[str]:
     """Names that may lose energy."""
     packed = model.packed
     yield from model.layout.modal
-    yield from (spring.name for spring in packed.scene.spring)
+    yield from (one.name for one in packed.scene.forces)
     for run in packed.system.laws:
         for _, body, _, _ in run.each():
             name = model.looped.hinge_name(body)
@@ -125,6 +128,24 @@ def _stiffer_law(law: LawNumbers, factor: float) -> LawNumbers:
     for place in _STIFF[law.kernel]:
         p[place] *= 1 + factor
     return replace(law, p=tuple(p))
+
+
+def _stiffer_force(
+    engine: Engine, force: ForceNumbers, state: State, factor: float
+) -> ForceNumbers:
+    if force.element == ("force", "bushing6") and factor:
+        return _stiffer_bushing(engine, force, state, factor)
+    return _stiffer_spring(engine, force, state, factor)
+
+
+def _stiffer_bushing(
+    engine: Engine, force: ForceNumbers, state: State, factor: float
+) -> ForceNumbers:
+    """A stiffer bushing whose load at the state is the same, by more preload."""
+    stiffness, damping, preload = force.p[:21], force.p[21:42], np.array(force.p[42:])
+    more = factor * np.array(full(stiffness)) @ bushing_deflection(engine, force, state)
+    stiffer_ones = ((1 + factor) * k for k in stiffness)
+    return replace(force, p=(*stiffer_ones, *damping, *(preload + more).tolist()))
 
 
 def _stiffer_spring(

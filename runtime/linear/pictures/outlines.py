@@ -152,7 +152,7 @@ class _Sight:
         return observe.shape(motion, np.linspace(0.0, motion.shapes.length, _FINE))
 
     def springs(self) -> Iterator[Array]:
-        """(n, 2, 3) lines of springs."""
+        """(n, 2, 3) lines of springs and bushings."""
         for force in self.packed.system.forces:
             ends = self._observed([Probe(*end) for end in force.ends])
             yield np.moveaxis(ends[:, :, 0:3], 0, 1)

@@ -105,8 +105,8 @@ class _Expansion:
         yield from (hinge.inboard for hinge in self.scene.hinge)
         yield from (chain.inboard for chain in self.scene.chain)
         yield from (load.on for load in self.scene.load)
-        for spring in self.scene.spring:
-            yield from (spring.from_, spring.to)
+        for force in self.scene.forces:
+            yield from (force.from_, force.to)
 
     def _full(self, reference: str) -> str:
         """The end that a reference means: the bare name of a beam is its root."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.expression.expression import Expression, parse
 from mstmm.numbers.rotations import Matrix, to_quaternion
-from mstmm.scene import Body, End, Hinge, Load, Scene, Spring, split
+from mstmm.scene import Body, Bushing, End, Hinge, Load, Scene, Spring, split
 from mstmm.scene.tables.rigid import rigid_beam
 
 from ...flexible.modal_body import ModalBody
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from ...flexible.elastic.ports import Port
 
+Force = TypeVar("Force", Spring, Bushing)
 
 #: What `compile(flexibility=)` takes, and the `model` it gives every flexible body.
 LEVELS = {"coupled": "flexible", "one-way": "one-way", "rigid": "rigid"}
@@ -111,7 +112,8 @@ class _Rigidifying:
                 for chain in scene.chain
             ),
             "load": tuple(map(self._load, scene.load)),
-            "spring": tuple(map(self._spring, scene.spring)),
+            "spring": tuple(map(self._between, scene.spring)),
+            "bushing": tuple(map(self._between, scene.bushing)),
         }  # fmt: skip
         self.made.scene = Scene.model_construct(**fields)
         return self.made
@@ -151,7 +153,7 @@ class _Rigidifying:
         references = [hinge.inboard for hinge in self.scene.hinge]
         references += [chain.inboard for chain in self.scene.chain]
         references += [load.on for load in self.scene.load if load.force_per_length is None]
-        references += [end for spring in self.scene.spring for end in (spring.from_, spring.to)]
+        references += [end for one in self.scene.forces for end in (one.from_, one.to)]
         yield from (reference for reference in references if split(reference)[0] == name)
 
     def _spread(self, name: str) -> list[Load]:
@@ -170,9 +172,9 @@ class _Rigidifying:
     def _hinge(self, hinge: Hinge) -> Hinge:
         return hinge.model_copy(update={"inboard": self._node(hinge.inboard)})
 
-    def _spring(self, spring: Spring) -> Spring:
-        ends = {"from_": self._node(spring.from_), "to": self._node(spring.to)}
-        return spring.model_copy(update=ends)
+    def _between(self, element: Force) -> Force:
+        ends = {"from_": self._node(element.from_), "to": self._node(element.to)}
+        return element.model_copy(update=ends)
 
     def _load(self, load: Load) -> Load:
         name = split(load.on)[0]

@@ -1,0 +1,63 @@
+"""Bushing: three forces and three moments by how two ends move apart and turn."""
+
+import sympy as sp
+
+from ..language.element import ForceElement, Param, Symbols
+from ..language.turning import rotation_vector
+
+_SIX = range(6)
+#: Of symmetric matrices the upper triangle is given, row by row.
+_PAIRS = tuple((i, j) for i in _SIX for j in _SIX if i <= j)
+_UNITS = (("N/m", "N/rad", "N*m/rad"), ("N*s/m", "N*s/rad", "N*m*s/rad"))
+
+
+def _entries(letter: str, units: tuple[str, str, str], meaning: str) -> tuple[Param, ...]:
+    return tuple(
+        Param(f"{letter}{i + 1}{j + 1}", units[(i > 2) + (j > 2)], meaning, default=0.0)
+        for i, j in _PAIRS
+    )
+
+
+def _symmetric(p: Symbols, first: int) -> sp.Matrix:
+    places = {pair: first + k for k, pair in enumerate(_PAIRS)}
+    return sp.Matrix(6, 6, lambda i, j: p[places[min(i, j), max(i, j)]])
+
+
+class Bushing(ForceElement):
+    """V = e^T K e / 2 - e^T preload of the deflection e = [x; rotation vector], and dampers on the
+    rate of x and the relative angular velocity; the angle stays below 170 degrees.
+    """
+
+    name = "bushing6"
+    title = "bushing in six directions"
+    parameters = (
+        *_entries("k", _UNITS[0], "stiffness"),
+        *_entries("c", _UNITS[1], "damping"),
+        *(
+            Param(f"preload{k + 1}", "N" if k < 3 else "N*m", "load on T at rest", default=0.0)
+            for k in _SIX
+        ),
+    )
+
+    def wrench(
+        self,
+        x: sp.Matrix,
+        v: sp.Matrix,
+        rotation: sp.Matrix,
+        w: sp.Matrix,
+        p: Symbols,
+        effort: sp.Symbol,
+        t: sp.Symbol,
+    ) -> tuple[sp.Matrix, sp.Matrix]:
+        lost = _symmetric(p, len(_PAIRS)) * sp.Matrix([*v, *w])
+        return -lost[:3, :], -lost[3:, :]
+
+    def deflection(self, x: sp.Matrix, rotation: sp.Matrix, p: Symbols) -> sp.Matrix:
+        return sp.Matrix([*x, *rotation_vector(rotation)])
+
+    def potential(self, deflection: sp.Matrix, p: Symbols) -> sp.Expr:
+        preload = sp.Matrix(list(p)[-6:])
+        return deflection.dot(_symmetric(p, 0) * deflection / 2 - preload)
+
+    def defined_within(self, x: sp.Matrix, rotation: sp.Matrix, p: Symbols) -> sp.Basic:
+        return 1 + rotation.trace() > sp.Rational(3, 100)

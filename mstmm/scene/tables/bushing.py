@@ -1,0 +1,87 @@
+"""[[bushing]]: three forces and three moments between two ends."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from ...numbers.rotations import Matrix, Vector, from_orientation
+from ..rules import text as texts
+from ..rules import values as rules
+from ..rules.symmetric import full, symmetric, triangle
+from ..rules.values import GROUND, Numbers, Orientation, Shorthand, Table, refuse, split
+from .body import End, as_end
+
+_NOTHING = (0.0,) * 6
+
+
+class Bushing(Table):
+    """A spring and damper in all six directions: load on `to` = preload - K e - C e', and its
+    reaction on `from`.
+
+    The bushing's axes are those of the end `from` (of the ground the inertial ones) turned by
+    `orientation`.  The deflection e is how `to` has moved from where it is at `rest`, x, y, z in m,
+    and its rotation vector in rad, by less than 170 degrees; `rest` is the pose of the end `to` in
+    the bushing's axes, by itself that of `from`.  `position` (m) is the place of the end that is on
+    the ground.
+    """
+
+    name: Annotated[str, texts.name("the bushing's name")] = ""
+    from_: Annotated[str, texts.end()] = Field(alias="from")
+    to: Annotated[str, texts.end()]
+    position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
+    orientation: Annotated[Orientation, rules.orientation()] = (0.0, 0.0, 0.0)
+    rest: Annotated[
+        End,
+        Shorthand(
+            "[x, y, z] in m, or a table with position and orientation", as_end, {"type": "array"}
+        ),
+    ] = End(position=(0.0, 0.0, 0.0))
+    stiffness: Annotated[Numbers, symmetric("N/m", "N m/rad")] = _NOTHING
+    damping: Annotated[Numbers, symmetric("N s/m", "N m s/rad")] = _NOTHING
+    preload: Annotated[Numbers, rules.numbers("three forces in N and three moments in N m", 6)] = (
+        _NOTHING
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Bushing:
+        bodies = (split(self.from_)[0], split(self.to)[0])
+        if bodies[0] == bodies[1]:
+            raise refuse(
+                f'both ends are on "{bodies[0]}", so it does nothing; join two bodies', "to"
+            )
+        if GROUND not in bodies and self.position != (0.0, 0.0, 0.0):
+            raise refuse(
+                "only a bushing on the ground takes a position; give the body an end there",
+                "position",
+            )
+        if not any((*self.stiffness, *self.damping, *self.preload)):
+            raise refuse("missing; a bushing needs stiffness, damping or a preload", "stiffness")
+        return self
+
+    @property
+    def rotation(self) -> Matrix:
+        """The bushing's axes -> axes of the end `from`."""
+        return from_orientation(self.orientation)
+
+    @property
+    def numbers(self) -> Numbers:
+        """Parameters of its force element."""
+        return (*triangle(self.stiffness), *triangle(self.damping), *self.preload)
+
+    @property
+    def stiffest(self) -> tuple[float, float]:
+        """The largest stiffness along axes (N/m) and about them (N m/rad)."""
+        return _largest(self.stiffness)
+
+    @property
+    def most_damped(self) -> tuple[float, float]:
+        """The largest damping along axes (N s/m) and about them (N m s/rad)."""
+        return _largest(self.damping)
+
+
+def _largest(given: Numbers) -> tuple[float, float]:
+    matrix = full(given)
+    along, about = [matrix[i][i] for i in range(3)], [matrix[i][i] for i in range(3, 6)]
+    return max(along), max(about)
