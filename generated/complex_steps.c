@@ -20304,7 +20304,7 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_idle(state->observed, body)) return 0;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
     if (body->modal && body->section && body->placed) {
         mstmm_complex *place = state->tangents->numbers + body->place;
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -20493,7 +20493,7 @@ static int mstmm_complex_at_tangent_carried(mstmm_complex_state *state, int inde
     const mstmm_body *body = &state->model->bodies[index];
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_idle(state->observed, body)) return 0;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
     if (body->modal && body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -20571,7 +20571,7 @@ static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int ind
     const int nu = body->nu;
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_idle(state->observed, body)) return 0;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
     for (int j = 0; j < nu; j++)
         (state->answer + body->u)[j] = mstmm_complex_plain(0);
     if (body->placed) {

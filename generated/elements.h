@@ -656,6 +656,8 @@ int mstmm_sweep_generic0_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic0_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+int mstmm_sweep_generic0_complement_slope(const real *restrict H, const real *restrict d_H,
+    real *restrict d_W);
 
 extern const mstmm_element mstmm_sweep_generic1;
 int mstmm_sweep_generic1_forward(const real *restrict Rt, const real *restrict ro,
@@ -742,6 +744,8 @@ int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic1_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+int mstmm_sweep_generic1_complement_slope(const real *restrict H, const real *restrict d_H,
+    real *restrict d_W);
 
 extern const mstmm_element mstmm_sweep_generic2;
 int mstmm_sweep_generic2_forward(const real *restrict Rt, const real *restrict ro,
@@ -828,6 +832,8 @@ int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic2_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+int mstmm_sweep_generic2_complement_slope(const real *restrict H, const real *restrict d_H,
+    real *restrict d_W);
 
 extern const mstmm_element mstmm_sweep_generic3;
 int mstmm_sweep_generic3_forward(const real *restrict Rt, const real *restrict ro,
@@ -914,6 +920,8 @@ int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic3_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+int mstmm_sweep_generic3_complement_slope(const real *restrict H, const real *restrict d_H,
+    real *restrict d_W);
 
 extern const mstmm_element mstmm_sweep_generic4;
 int mstmm_sweep_generic4_forward(const real *restrict Rt, const real *restrict ro,
@@ -1000,6 +1008,8 @@ int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic4_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+int mstmm_sweep_generic4_complement_slope(const real *restrict H, const real *restrict d_H,
+    real *restrict d_W);
 
 extern const mstmm_element mstmm_sweep_generic5;
 int mstmm_sweep_generic5_forward(const real *restrict Rt, const real *restrict ro,
@@ -1086,6 +1096,8 @@ int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic5_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+int mstmm_sweep_generic5_complement_slope(const real *restrict H, const real *restrict d_H,
+    real *restrict d_W);
 
 extern const mstmm_element mstmm_sweep_generic6;
 int mstmm_sweep_generic6_forward(const real *restrict Rt, const real *restrict ro,
@@ -1172,6 +1184,8 @@ int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic6_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+int mstmm_sweep_generic6_complement_slope(const real *restrict H, const real *restrict d_H,
+    real *restrict d_W);
 
 extern const mstmm_element mstmm_sweep_laws;
 int mstmm_sweep_laws_linear(const real *restrict p, const real *restrict q, const real *restrict u,
@@ -1295,6 +1309,31 @@ int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *
 int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
     const real *restrict x, real *restrict l);
 int mstmm_sweep_loops_loaded(const real *restrict K, const real *restrict x, real *restrict e);
+int mstmm_sweep_loops_gap_slope(const real *restrict A_C, const real *restrict x_C,
+    const real *restrict A_B, const real *restrict x_B, const real *restrict R_e,
+    const real *restrict r_e, const real *restrict Rc, const real *restrict r,
+    const real *restrict d_A_C, const real *restrict d_x_C, const real *restrict d_A_B,
+    const real *restrict d_x_B, const real *restrict d_Rc, const real *restrict d_r,
+    real *restrict d_R_C, real *restrict d_r_A, real *restrict d_d);
+int mstmm_sweep_loops_slip_slope(const real *restrict R_C, const real *restrict r_e,
+    const real *restrict d, const real *restrict v_C, const real *restrict w_C,
+    const real *restrict v_B, const real *restrict w_B, const real *restrict d_R_C,
+    const real *restrict d_d, const real *restrict d_v_C, const real *restrict d_w_C,
+    const real *restrict d_v_B, const real *restrict d_w_B, real *restrict d_slip);
+int mstmm_sweep_loops_drift_slope(const real *restrict R_C, const real *restrict r_e,
+    const real *restrict d, const real *restrict slip, const real *restrict motion_C,
+    const real *restrict motion_B, const real *restrict d_R_C, const real *restrict d_d,
+    const real *restrict d_slip, const real *restrict d_motion_C, const real *restrict d_motion_B,
+    real *restrict d_drift);
+int mstmm_sweep_loops_rows_slope(const real *restrict W, const real *restrict R_C,
+    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
+    const real *restrict relative, const real *restrict d_W, const real *restrict d_R_C,
+    const real *restrict d_Rc, const real *restrict d_r_A, const real *restrict d_relative,
+    real *restrict d_J_A, real *restrict d_J_B, real *restrict d_l);
+int mstmm_sweep_loops_act_slope(const real *restrict J, const real *restrict tau,
+    const real *restrict d_J, const real *restrict d_tau, real *restrict d_e);
+int mstmm_sweep_loops_loaded_slope(const real *restrict K, const real *restrict x,
+    const real *restrict d_K, const real *restrict d_x, real *restrict d_e);
 
 extern const mstmm_element mstmm_sweep_modal;
 int mstmm_sweep_modal_residual(int n, const real *restrict p, const real *restrict C,

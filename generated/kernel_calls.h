@@ -1739,6 +1739,131 @@ static inline int mstmm_loops_loaded_by(struct mstmm_loops_loaded to)
 }
 #define mstmm_loops_loaded(...) mstmm_loops_loaded_by((struct mstmm_loops_loaded){__VA_ARGS__})
 
+struct mstmm_loops_gap_slope {
+    const real *A_C;
+    const real *x_C;
+    const real *A_B;
+    const real *x_B;
+    const real *R_e;
+    const real *r_e;
+    const real *Rc;
+    const real *r;
+    const real *d_A_C;
+    const real *d_x_C;
+    const real *d_A_B;
+    const real *d_x_B;
+    const real *d_Rc;
+    const real *d_r;
+    real *d_R_C;
+    real *d_r_A;
+    real *d_d;
+};
+static inline int mstmm_loops_gap_slope_by(struct mstmm_loops_gap_slope to)
+{
+    return mstmm_sweep_loops_gap_slope(
+        to.A_C, to.x_C, to.A_B, to.x_B, to.R_e, to.r_e, to.Rc, to.r, to.d_A_C, to.d_x_C, to.d_A_B,
+        to.d_x_B, to.d_Rc, to.d_r, to.d_R_C, to.d_r_A, to.d_d);
+}
+#define mstmm_loops_gap_slope(...) mstmm_loops_gap_slope_by((struct mstmm_loops_gap_slope){__VA_ARGS__})
+
+struct mstmm_loops_slip_slope {
+    const real *R_C;
+    const real *r_e;
+    const real *d;
+    const real *v_C;
+    const real *w_C;
+    const real *v_B;
+    const real *w_B;
+    const real *d_R_C;
+    const real *d_d;
+    const real *d_v_C;
+    const real *d_w_C;
+    const real *d_v_B;
+    const real *d_w_B;
+    real *d_slip;
+};
+static inline int mstmm_loops_slip_slope_by(struct mstmm_loops_slip_slope to)
+{
+    return mstmm_sweep_loops_slip_slope(
+        to.R_C, to.r_e, to.d, to.v_C, to.w_C, to.v_B, to.w_B, to.d_R_C, to.d_d, to.d_v_C,
+        to.d_w_C, to.d_v_B, to.d_w_B, to.d_slip);
+}
+#define mstmm_loops_slip_slope(...) mstmm_loops_slip_slope_by((struct mstmm_loops_slip_slope){__VA_ARGS__})
+
+struct mstmm_loops_drift_slope {
+    const real *R_C;
+    const real *r_e;
+    const real *d;
+    const real *slip;
+    const real *motion_C;
+    const real *motion_B;
+    const real *d_R_C;
+    const real *d_d;
+    const real *d_slip;
+    const real *d_motion_C;
+    const real *d_motion_B;
+    real *d_drift;
+};
+static inline int mstmm_loops_drift_slope_by(struct mstmm_loops_drift_slope to)
+{
+    return mstmm_sweep_loops_drift_slope(
+        to.R_C, to.r_e, to.d, to.slip, to.motion_C, to.motion_B, to.d_R_C, to.d_d, to.d_slip,
+        to.d_motion_C, to.d_motion_B, to.d_drift);
+}
+#define mstmm_loops_drift_slope(...) mstmm_loops_drift_slope_by((struct mstmm_loops_drift_slope){__VA_ARGS__})
+
+struct mstmm_loops_rows_slope {
+    const real *W;
+    const real *R_C;
+    const real *r_e;
+    const real *Rc;
+    const real *r_A;
+    const real *relative;
+    const real *d_W;
+    const real *d_R_C;
+    const real *d_Rc;
+    const real *d_r_A;
+    const real *d_relative;
+    real *d_J_A;
+    real *d_J_B;
+    real *d_l;
+};
+static inline int mstmm_loops_rows_slope_by(struct mstmm_loops_rows_slope to)
+{
+    return mstmm_sweep_loops_rows_slope(
+        to.W, to.R_C, to.r_e, to.Rc, to.r_A, to.relative, to.d_W, to.d_R_C, to.d_Rc, to.d_r_A,
+        to.d_relative, to.d_J_A, to.d_J_B, to.d_l);
+}
+#define mstmm_loops_rows_slope(...) mstmm_loops_rows_slope_by((struct mstmm_loops_rows_slope){__VA_ARGS__})
+
+struct mstmm_loops_act_slope {
+    const real *J;
+    const real *tau;
+    const real *d_J;
+    const real *d_tau;
+    real *d_e;
+};
+static inline int mstmm_loops_act_slope_by(struct mstmm_loops_act_slope to)
+{
+    return mstmm_sweep_loops_act_slope(
+        to.J, to.tau, to.d_J, to.d_tau, to.d_e);
+}
+#define mstmm_loops_act_slope(...) mstmm_loops_act_slope_by((struct mstmm_loops_act_slope){__VA_ARGS__})
+
+struct mstmm_loops_loaded_slope {
+    const real *K;
+    const real *x;
+    const real *d_K;
+    const real *d_x;
+    real *d_e;
+};
+static inline int mstmm_loops_loaded_slope_by(struct mstmm_loops_loaded_slope to)
+{
+    return mstmm_sweep_loops_loaded_slope(
+        to.K, to.x, to.d_K, to.d_x, to.d_e);
+}
+#define mstmm_loops_loaded_slope(...) mstmm_loops_loaded_slope_by((struct mstmm_loops_loaded_slope){__VA_ARGS__})
+
 struct mstmm_classical_body_transfer {
     const real *M;
     const real *r_IO;
@@ -2737,6 +2862,21 @@ static inline int mstmm_generic_effort_slope_by(int speeds, struct mstmm_generic
         to.H, to.f, to.d_H, to.d_f, to.d_tau);
 }
 #define mstmm_generic_effort_slope(speeds, ...) mstmm_generic_effort_slope_by(speeds, (struct mstmm_generic_effort_slope){__VA_ARGS__})
+
+struct mstmm_generic_complement_slope {
+    const real *H;
+    const real *d_H;
+    real *d_W;
+};
+typedef int mstmm_generic_complement_slope_kernel(
+    const real *restrict, const real *restrict, real *restrict);
+extern mstmm_generic_complement_slope_kernel *const mstmm_generic_complement_slope_table[];
+static inline int mstmm_generic_complement_slope_by(int speeds, struct mstmm_generic_complement_slope to)
+{
+    return mstmm_generic_complement_slope_table[speeds](
+        to.H, to.d_H, to.d_W);
+}
+#define mstmm_generic_complement_slope(speeds, ...) mstmm_generic_complement_slope_by(speeds, (struct mstmm_generic_complement_slope){__VA_ARGS__})
 
 struct mstmm_generic_tangent_carrier {
     const real *H;

@@ -58,6 +58,8 @@ int mstmm_sweep_generic0_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic0_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+int mstmm_sweep_generic0_complement_slope(const real *restrict H, const real *restrict d_H,
+    real *restrict d_W);
 
 /* bias motion behind a hinge with 0 speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -2704,6 +2706,71 @@ static const mstmm_port mstmm_sweep_generic0_effort_slope_outputs[] = {
     {"d_tau", 0, "N, N*m", 0, 0},
 };
 
+/* complement and its derivative along a direction
+ * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
+ * in  H[6][0] motion subspace
+ * in  d_H[6][0] derivative of H
+ * out d_W[6][6] derivative of W
+ */
+int mstmm_sweep_generic0_complement_slope(const real *restrict H, const real *restrict d_H,
+    real *restrict d_W)
+{
+    (void)H;
+    (void)d_H;
+    d_W[0] = 0.0;
+    d_W[1] = 0.0;
+    d_W[2] = 0.0;
+    d_W[3] = 0.0;
+    d_W[4] = 0.0;
+    d_W[5] = 0.0;
+    d_W[6] = 0.0;
+    d_W[7] = 0.0;
+    d_W[8] = 0.0;
+    d_W[9] = 0.0;
+    d_W[10] = 0.0;
+    d_W[11] = 0.0;
+    d_W[12] = 0.0;
+    d_W[13] = 0.0;
+    d_W[14] = 0.0;
+    d_W[15] = 0.0;
+    d_W[16] = 0.0;
+    d_W[17] = 0.0;
+    d_W[18] = 0.0;
+    d_W[19] = 0.0;
+    d_W[20] = 0.0;
+    d_W[21] = 0.0;
+    d_W[22] = 0.0;
+    d_W[23] = 0.0;
+    d_W[24] = 0.0;
+    d_W[25] = 0.0;
+    d_W[26] = 0.0;
+    d_W[27] = 0.0;
+    d_W[28] = 0.0;
+    d_W[29] = 0.0;
+    d_W[30] = 0.0;
+    d_W[31] = 0.0;
+    d_W[32] = 0.0;
+    d_W[33] = 0.0;
+    d_W[34] = 0.0;
+    d_W[35] = 0.0;
+    return 0;
+}
+
+static int mstmm_sweep_generic0_complement_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic0_complement_slope(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic0_complement_slope_inputs[] = {
+    {"H", 0, "", 0, 0},
+    {"d_H", 0, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic0_complement_slope_outputs[] = {
+    {"d_W", 36, "", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
     {
         .name = "forward",
@@ -2873,13 +2940,25 @@ static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "complement_slope",
+        .function = (void (*)(void))mstmm_sweep_generic0_complement_slope,
+        .call = mstmm_sweep_generic0_complement_slope_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic0_complement_slope_inputs,
+        .outputs = mstmm_sweep_generic0_complement_slope_outputs,
+        .ir_hash = "09d39915cf088a312ea637a555c0ef183d0601bc0405599a329b5142f9b53344",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic0 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic0",
-    .hash = "535eaedc3731fa7fa636bf46d3ad593cd0b07f910ca045b92436c0cfb5453402",
+    .hash = "700c2110838f33498507ed20a480ab5c848f0703661ec9e23ee7a4d1a34f4354",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2889,6 +2968,6 @@ const mstmm_element mstmm_sweep_generic0 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 14,
+    .n_kernels = 15,
     .kernels = mstmm_sweep_generic0_kernels,
 };

@@ -95,6 +95,8 @@ int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *rest
     real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
 int mstmm_sweep_generic1_effort_slope(const real *restrict H, const real *restrict f,
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
+int mstmm_sweep_generic1_complement_slope(const real *restrict H, const real *restrict d_H,
+    real *restrict d_W);
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
@@ -5249,6 +5251,244 @@ static const mstmm_port mstmm_sweep_generic1_effort_slope_outputs[] = {
     {"d_tau", 1, "N, N*m", 0, 0},
 };
 
+/* complement and its derivative along a direction
+ * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
+ * in  H[6] motion subspace
+ * in  d_H[6] derivative of H
+ * out d_W[6][6] derivative of W
+ */
+int mstmm_sweep_generic1_complement_slope(const real *restrict H, const real *restrict d_H,
+    real *restrict d_W)
+{
+    const real t0 = H[5] * H[5];
+    const real t1 = H[4] * H[4];
+    const real t2 = H[3] * H[3];
+    const real t3 = H[2] * H[2];
+    const real t4 = H[0] * H[0];
+    const real t5 = H[1] * H[1];
+    const real t6 = t4 + t5;
+    const real t7 = t3 + t6;
+    const real t8 = t2 + t7;
+    const real t9 = t1 + t8;
+    const real t10 = t0 + t9;
+    const real t11 = 1.0 / t10;
+    const real t12 = t11 * d_H[0];
+    const real t13 = H[1] * d_H[1];
+    const real t14 = t13 + t13;
+    const real t15 = H[0] * d_H[0];
+    const real t16 = t15 + t15;
+    const real t17 = t14 + t16;
+    const real t18 = H[2] * d_H[2];
+    const real t19 = t18 + t18;
+    const real t20 = t17 + t19;
+    const real t21 = H[3] * d_H[3];
+    const real t22 = t21 + t21;
+    const real t23 = t20 + t22;
+    const real t24 = H[4] * d_H[4];
+    const real t25 = t24 + t24;
+    const real t26 = t23 + t25;
+    const real t27 = H[5] * d_H[5];
+    const real t28 = t27 + t27;
+    const real t29 = t26 + t28;
+    const real t30 = t11 * t29;
+    const real t31 = t30 / t10;
+    const real t32 = H[0] * t31;
+    const real t33 = t12 - t32;
+    d_W[0] = t33;
+    const real t34 = t11 * d_H[1];
+    const real t35 = H[1] * t31;
+    const real t36 = t34 - t35;
+    d_W[1] = t36;
+    const real t37 = t11 * d_H[2];
+    const real t38 = H[2] * t31;
+    const real t39 = t37 - t38;
+    d_W[2] = t39;
+    const real t40 = t11 * d_H[3];
+    const real t41 = H[3] * t31;
+    const real t42 = t40 - t41;
+    d_W[3] = t42;
+    const real t43 = t11 * d_H[4];
+    const real t44 = H[4] * t31;
+    const real t45 = t43 - t44;
+    d_W[4] = t45;
+    const real t46 = t11 * d_H[5];
+    const real t47 = H[5] * t31;
+    const real t48 = t46 - t47;
+    d_W[5] = t48;
+    const real t49 = H[0] < 0.0;
+    const real t50 = sqrt(t10);
+    const real t51 = -t50;
+    const real t52 = t49 != 0 ? t51 : t50;
+    const real t53 = H[0] + t52;
+    const real t54 = fabs(H[0]);
+    const real t55 = t50 + t54;
+    const real t56 = t50 * t55;
+    const real t57 = 0.0 < t56;
+    const real t58 = 1.0 / t56;
+    const real t59 = t57 != 0 ? t58 : 0.0;
+    const real t60 = t53 * t59;
+    const real t61 = t60 * d_H[1];
+    const real t62 = t50 * 2.0;
+    const real t63 = t29 / t62;
+    const real t64 = -t63;
+    const real t65 = t49 != 0 ? t64 : t63;
+    const real t66 = d_H[0] + t65;
+    const real t67 = t59 * t66;
+    const real t68 = t55 * t63;
+    const real t69 = H[0] > 0 ? 1 : (H[0] < 0 ? -1 : H[0]);
+    const real t70 = d_H[0] * t69;
+    const real t71 = t70 + t63;
+    const real t72 = t50 * t71;
+    const real t73 = t68 + t72;
+    const real t74 = t58 * t73;
+    const real t75 = t74 / t56;
+    const real t76 = -t75;
+    const real t77 = t57 != 0 ? t76 : 0.0;
+    const real t78 = t53 * t77;
+    const real t79 = t67 + t78;
+    const real t80 = H[1] * t79;
+    const real t81 = t61 + t80;
+    const real t82 = -t81;
+    d_W[6] = t82;
+    const real t83 = t59 * t14;
+    const real t84 = t5 * t77;
+    const real t85 = t83 + t84;
+    const real t86 = -t85;
+    d_W[7] = t86;
+    const real t87 = H[1] * t59;
+    const real t88 = t87 * d_H[2];
+    const real t89 = t59 * d_H[1];
+    const real t90 = H[1] * t77;
+    const real t91 = t89 + t90;
+    const real t92 = H[2] * t91;
+    const real t93 = t88 + t92;
+    const real t94 = -t93;
+    d_W[8] = t94;
+    const real t95 = t87 * d_H[3];
+    const real t96 = H[3] * t91;
+    const real t97 = t95 + t96;
+    const real t98 = -t97;
+    d_W[9] = t98;
+    const real t99 = t87 * d_H[4];
+    const real t100 = H[4] * t91;
+    const real t101 = t99 + t100;
+    const real t102 = -t101;
+    d_W[10] = t102;
+    const real t103 = t87 * d_H[5];
+    const real t104 = H[5] * t91;
+    const real t105 = t103 + t104;
+    const real t106 = -t105;
+    d_W[11] = t106;
+    const real t107 = t60 * d_H[2];
+    const real t108 = H[2] * t79;
+    const real t109 = t107 + t108;
+    const real t110 = -t109;
+    d_W[12] = t110;
+    d_W[13] = t94;
+    const real t111 = t59 * t19;
+    const real t112 = t3 * t77;
+    const real t113 = t111 + t112;
+    const real t114 = -t113;
+    d_W[14] = t114;
+    const real t115 = H[2] * t59;
+    const real t116 = t115 * d_H[3];
+    const real t117 = t59 * d_H[2];
+    const real t118 = H[2] * t77;
+    const real t119 = t117 + t118;
+    const real t120 = H[3] * t119;
+    const real t121 = t116 + t120;
+    const real t122 = -t121;
+    d_W[15] = t122;
+    const real t123 = t115 * d_H[4];
+    const real t124 = H[4] * t119;
+    const real t125 = t123 + t124;
+    const real t126 = -t125;
+    d_W[16] = t126;
+    const real t127 = t115 * d_H[5];
+    const real t128 = H[5] * t119;
+    const real t129 = t127 + t128;
+    const real t130 = -t129;
+    d_W[17] = t130;
+    const real t131 = t60 * d_H[3];
+    const real t132 = H[3] * t79;
+    const real t133 = t131 + t132;
+    const real t134 = -t133;
+    d_W[18] = t134;
+    d_W[19] = t98;
+    d_W[20] = t122;
+    const real t135 = t59 * t22;
+    const real t136 = t2 * t77;
+    const real t137 = t135 + t136;
+    const real t138 = -t137;
+    d_W[21] = t138;
+    const real t139 = H[3] * t59;
+    const real t140 = t139 * d_H[4];
+    const real t141 = t59 * d_H[3];
+    const real t142 = H[3] * t77;
+    const real t143 = t141 + t142;
+    const real t144 = H[4] * t143;
+    const real t145 = t140 + t144;
+    const real t146 = -t145;
+    d_W[22] = t146;
+    const real t147 = t139 * d_H[5];
+    const real t148 = H[5] * t143;
+    const real t149 = t147 + t148;
+    const real t150 = -t149;
+    d_W[23] = t150;
+    const real t151 = t60 * d_H[4];
+    const real t152 = H[4] * t79;
+    const real t153 = t151 + t152;
+    const real t154 = -t153;
+    d_W[24] = t154;
+    d_W[25] = t102;
+    d_W[26] = t126;
+    d_W[27] = t146;
+    const real t155 = t59 * t25;
+    const real t156 = t1 * t77;
+    const real t157 = t155 + t156;
+    const real t158 = -t157;
+    d_W[28] = t158;
+    const real t159 = H[4] * t59;
+    const real t160 = t159 * d_H[5];
+    const real t161 = t59 * d_H[4];
+    const real t162 = H[4] * t77;
+    const real t163 = t161 + t162;
+    const real t164 = H[5] * t163;
+    const real t165 = t160 + t164;
+    const real t166 = -t165;
+    d_W[29] = t166;
+    const real t167 = t60 * d_H[5];
+    const real t168 = H[5] * t79;
+    const real t169 = t167 + t168;
+    const real t170 = -t169;
+    d_W[30] = t170;
+    d_W[31] = t106;
+    d_W[32] = t130;
+    d_W[33] = t150;
+    d_W[34] = t166;
+    const real t171 = t59 * t28;
+    const real t172 = t0 * t77;
+    const real t173 = t171 + t172;
+    const real t174 = -t173;
+    d_W[35] = t174;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_complement_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_complement_slope(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_complement_slope_inputs[] = {
+    {"H", 6, "", 0, 0},
+    {"d_H", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_complement_slope_outputs[] = {
+    {"d_W", 36, "", 0, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
     {
         .name = "forward",
@@ -5574,13 +5814,25 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "complement_slope",
+        .function = (void (*)(void))mstmm_sweep_generic1_complement_slope,
+        .call = mstmm_sweep_generic1_complement_slope_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_complement_slope_inputs,
+        .outputs = mstmm_sweep_generic1_complement_slope_outputs,
+        .ir_hash = "0507e02251edd20f66c41b7f47906d828fac8651a5529283c6f3efcd00ef2eef",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "0dd1fe2223e8f8a6ca58255e25dffb4c31bdaecb712618b78b51b5a2b3f5c467",
+    .hash = "89043460c3388ae7a319d33994a87f52b3523c9fc09cb0e9ba047954b7fba452",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -5590,6 +5842,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 27,
+    .n_kernels = 28,
     .kernels = mstmm_sweep_generic1_kernels,
 };

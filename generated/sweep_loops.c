@@ -35,9 +35,32 @@ int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restr
     const real *restrict l, const real *restrict delta, real *restrict x);
 int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *restrict L_p,
     const real *restrict x_p, real *restrict x);
-int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
-    const real *restrict x, real *restrict l);
 int mstmm_sweep_loops_loaded(const real *restrict K, const real *restrict x, real *restrict e);
+int mstmm_sweep_loops_gap_slope(const real *restrict A_C, const real *restrict x_C,
+    const real *restrict A_B, const real *restrict x_B, const real *restrict R_e,
+    const real *restrict r_e, const real *restrict Rc, const real *restrict r,
+    const real *restrict d_A_C, const real *restrict d_x_C, const real *restrict d_A_B,
+    const real *restrict d_x_B, const real *restrict d_Rc, const real *restrict d_r,
+    real *restrict d_R_C, real *restrict d_r_A, real *restrict d_d);
+int mstmm_sweep_loops_slip_slope(const real *restrict R_C, const real *restrict r_e,
+    const real *restrict d, const real *restrict v_C, const real *restrict w_C,
+    const real *restrict v_B, const real *restrict w_B, const real *restrict d_R_C,
+    const real *restrict d_d, const real *restrict d_v_C, const real *restrict d_w_C,
+    const real *restrict d_v_B, const real *restrict d_w_B, real *restrict d_slip);
+int mstmm_sweep_loops_drift_slope(const real *restrict R_C, const real *restrict r_e,
+    const real *restrict d, const real *restrict slip, const real *restrict motion_C,
+    const real *restrict motion_B, const real *restrict d_R_C, const real *restrict d_d,
+    const real *restrict d_slip, const real *restrict d_motion_C, const real *restrict d_motion_B,
+    real *restrict d_drift);
+int mstmm_sweep_loops_rows_slope(const real *restrict W, const real *restrict R_C,
+    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
+    const real *restrict relative, const real *restrict d_W, const real *restrict d_R_C,
+    const real *restrict d_Rc, const real *restrict d_r_A, const real *restrict d_relative,
+    real *restrict d_J_A, real *restrict d_J_B, real *restrict d_l);
+int mstmm_sweep_loops_act_slope(const real *restrict J, const real *restrict tau,
+    const real *restrict d_J, const real *restrict d_tau, real *restrict d_e);
+int mstmm_sweep_loops_loaded_slope(const real *restrict K, const real *restrict x,
+    const real *restrict d_K, const real *restrict d_x, real *restrict d_e);
 
 /* gap of a hinge that closes a loop
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1763,39 +1786,6 @@ static const mstmm_port mstmm_sweep_loops_multiplier_less_outputs[] = {
     {"x", 1, "", 1, 0},
 };
 
-/* the row of a rotor with a multiplier
- * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
- * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  softness[1] 1 / J of the rotor on the row
- * in  s[1] acceleration of the speed that it turns with
- * in  x[1] (N, N*m) multiplier
- * out l[1] known part of the row, added to what is there
- */
-int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
-    const real *restrict x, real *restrict l)
-{
-    const real t0 = softness[0] * x[0];
-    const real t1 = s[0] - t0;
-    l[0] += t1;
-    return 0;
-}
-
-static int mstmm_sweep_loops_yielded_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_yielded(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_yielded_inputs[] = {
-    {"softness", 1, "", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_yielded_outputs[] = {
-    {"l", 1, "", 1, 0},
-};
-
 /* load of a multiplier
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
@@ -1833,6 +1823,2346 @@ static const mstmm_port mstmm_sweep_loops_loaded_inputs[] = {
 
 static const mstmm_port mstmm_sweep_loops_loaded_outputs[] = {
     {"e", 6, "", 1, 0},
+};
+
+/* gap and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  A_C[3][3] rotation, axes of C to inertial axes
+ * in  x_C[3] (m) origin of C, inertial axes
+ * in  A_B[3][3] rotation, axes of B to inertial axes
+ * in  x_B[3] (m) P of B, inertial axes
+ * in  R_e[3][3] rotation, axes of C to axes of B where the loop is closed
+ * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  d_A_C[3][3] derivative of A_C
+ * in  d_x_C[3] (m) derivative of x_C
+ * in  d_A_B[3][3] derivative of A_B
+ * in  d_x_B[3] (m) derivative of x_B
+ * in  d_Rc[3][3] derivative of Rc
+ * in  d_r[3] (m) derivative of r
+ * out d_R_C[3][3] derivative of R_C
+ * out d_r_A[3] (m) derivative of r_A
+ * out d_d[3] (m) derivative of d
+ */
+int mstmm_sweep_loops_gap_slope(const real *restrict A_C, const real *restrict x_C,
+    const real *restrict A_B, const real *restrict x_B, const real *restrict R_e,
+    const real *restrict r_e, const real *restrict Rc, const real *restrict r,
+    const real *restrict d_A_C, const real *restrict d_x_C, const real *restrict d_A_B,
+    const real *restrict d_x_B, const real *restrict d_Rc, const real *restrict d_r,
+    real *restrict d_R_C, real *restrict d_r_A, real *restrict d_d)
+{
+    (void)R_e;
+    (void)r;
+    const real t0 = A_B[6] * d_A_C[6];
+    const real t1 = A_C[6] * d_A_B[6];
+    const real t2 = t0 + t1;
+    const real t3 = A_B[3] * d_A_C[3];
+    const real t4 = A_C[3] * d_A_B[3];
+    const real t5 = t3 + t4;
+    const real t6 = A_B[0] * d_A_C[0];
+    const real t7 = A_C[0] * d_A_B[0];
+    const real t8 = t6 + t7;
+    const real t9 = t5 + t8;
+    const real t10 = t2 + t9;
+    d_R_C[0] = t10;
+    const real t11 = A_C[7] * d_A_B[6];
+    const real t12 = A_B[6] * d_A_C[7];
+    const real t13 = t11 + t12;
+    const real t14 = A_C[4] * d_A_B[3];
+    const real t15 = A_B[3] * d_A_C[4];
+    const real t16 = t14 + t15;
+    const real t17 = A_C[1] * d_A_B[0];
+    const real t18 = A_B[0] * d_A_C[1];
+    const real t19 = t17 + t18;
+    const real t20 = t16 + t19;
+    const real t21 = t13 + t20;
+    d_R_C[1] = t21;
+    const real t22 = A_C[8] * d_A_B[6];
+    const real t23 = A_B[6] * d_A_C[8];
+    const real t24 = t22 + t23;
+    const real t25 = A_C[5] * d_A_B[3];
+    const real t26 = A_B[3] * d_A_C[5];
+    const real t27 = t25 + t26;
+    const real t28 = A_C[2] * d_A_B[0];
+    const real t29 = A_B[0] * d_A_C[2];
+    const real t30 = t28 + t29;
+    const real t31 = t27 + t30;
+    const real t32 = t24 + t31;
+    d_R_C[2] = t32;
+    const real t33 = A_B[7] * d_A_C[6];
+    const real t34 = A_C[6] * d_A_B[7];
+    const real t35 = t33 + t34;
+    const real t36 = A_B[4] * d_A_C[3];
+    const real t37 = A_C[3] * d_A_B[4];
+    const real t38 = t36 + t37;
+    const real t39 = A_B[1] * d_A_C[0];
+    const real t40 = A_C[0] * d_A_B[1];
+    const real t41 = t39 + t40;
+    const real t42 = t38 + t41;
+    const real t43 = t35 + t42;
+    d_R_C[3] = t43;
+    const real t44 = A_B[7] * d_A_C[7];
+    const real t45 = A_C[7] * d_A_B[7];
+    const real t46 = t44 + t45;
+    const real t47 = A_B[4] * d_A_C[4];
+    const real t48 = A_C[4] * d_A_B[4];
+    const real t49 = t47 + t48;
+    const real t50 = A_B[1] * d_A_C[1];
+    const real t51 = A_C[1] * d_A_B[1];
+    const real t52 = t50 + t51;
+    const real t53 = t49 + t52;
+    const real t54 = t46 + t53;
+    d_R_C[4] = t54;
+    const real t55 = A_B[7] * d_A_C[8];
+    const real t56 = A_C[8] * d_A_B[7];
+    const real t57 = t55 + t56;
+    const real t58 = A_B[4] * d_A_C[5];
+    const real t59 = A_C[5] * d_A_B[4];
+    const real t60 = t58 + t59;
+    const real t61 = A_B[1] * d_A_C[2];
+    const real t62 = A_C[2] * d_A_B[1];
+    const real t63 = t61 + t62;
+    const real t64 = t60 + t63;
+    const real t65 = t57 + t64;
+    d_R_C[5] = t65;
+    const real t66 = A_B[8] * d_A_C[6];
+    const real t67 = A_C[6] * d_A_B[8];
+    const real t68 = t66 + t67;
+    const real t69 = A_B[5] * d_A_C[3];
+    const real t70 = A_C[3] * d_A_B[5];
+    const real t71 = t69 + t70;
+    const real t72 = A_B[2] * d_A_C[0];
+    const real t73 = A_C[0] * d_A_B[2];
+    const real t74 = t72 + t73;
+    const real t75 = t71 + t74;
+    const real t76 = t68 + t75;
+    d_R_C[6] = t76;
+    const real t77 = A_B[8] * d_A_C[7];
+    const real t78 = A_C[7] * d_A_B[8];
+    const real t79 = t77 + t78;
+    const real t80 = A_B[5] * d_A_C[4];
+    const real t81 = A_C[4] * d_A_B[5];
+    const real t82 = t80 + t81;
+    const real t83 = A_B[2] * d_A_C[1];
+    const real t84 = A_C[1] * d_A_B[2];
+    const real t85 = t83 + t84;
+    const real t86 = t82 + t85;
+    const real t87 = t79 + t86;
+    d_R_C[7] = t87;
+    const real t88 = A_B[8] * d_A_C[8];
+    const real t89 = A_C[8] * d_A_B[8];
+    const real t90 = t88 + t89;
+    const real t91 = A_B[5] * d_A_C[5];
+    const real t92 = A_C[5] * d_A_B[5];
+    const real t93 = t91 + t92;
+    const real t94 = A_B[2] * d_A_C[2];
+    const real t95 = A_C[2] * d_A_B[2];
+    const real t96 = t94 + t95;
+    const real t97 = t93 + t96;
+    const real t98 = t90 + t97;
+    d_R_C[8] = t98;
+    const real t99 = A_B[6] * r_e[0];
+    const real t100 = A_B[7] * r_e[1];
+    const real t101 = t99 + t100;
+    const real t102 = A_B[8] * r_e[2];
+    const real t103 = t101 + t102;
+    const real t104 = t103 - x_C[2];
+    const real t105 = t104 + x_B[2];
+    const real t106 = t105 * d_A_C[8];
+    const real t107 = r_e[2] * d_A_B[8];
+    const real t108 = r_e[1] * d_A_B[7];
+    const real t109 = r_e[0] * d_A_B[6];
+    const real t110 = t108 + t109;
+    const real t111 = t107 + t110;
+    const real t112 = t111 - d_x_C[2];
+    const real t113 = d_x_B[2] + t112;
+    const real t114 = A_C[8] * t113;
+    const real t115 = t106 + t114;
+    const real t116 = A_B[3] * r_e[0];
+    const real t117 = A_B[4] * r_e[1];
+    const real t118 = t116 + t117;
+    const real t119 = A_B[5] * r_e[2];
+    const real t120 = t118 + t119;
+    const real t121 = t120 - x_C[1];
+    const real t122 = t121 + x_B[1];
+    const real t123 = t122 * d_A_C[5];
+    const real t124 = r_e[2] * d_A_B[5];
+    const real t125 = r_e[1] * d_A_B[4];
+    const real t126 = r_e[0] * d_A_B[3];
+    const real t127 = t125 + t126;
+    const real t128 = t124 + t127;
+    const real t129 = t128 - d_x_C[1];
+    const real t130 = d_x_B[1] + t129;
+    const real t131 = A_C[5] * t130;
+    const real t132 = t123 + t131;
+    const real t133 = A_B[0] * r_e[0];
+    const real t134 = A_B[1] * r_e[1];
+    const real t135 = t133 + t134;
+    const real t136 = A_B[2] * r_e[2];
+    const real t137 = t135 + t136;
+    const real t138 = t137 - x_C[0];
+    const real t139 = t138 + x_B[0];
+    const real t140 = t139 * d_A_C[2];
+    const real t141 = r_e[2] * d_A_B[2];
+    const real t142 = r_e[1] * d_A_B[1];
+    const real t143 = r_e[0] * d_A_B[0];
+    const real t144 = t142 + t143;
+    const real t145 = t141 + t144;
+    const real t146 = t145 - d_x_C[0];
+    const real t147 = d_x_B[0] + t146;
+    const real t148 = A_C[2] * t147;
+    const real t149 = t140 + t148;
+    const real t150 = t132 + t149;
+    const real t151 = t115 + t150;
+    const real t152 = Rc[2] * t151;
+    const real t153 = A_C[2] * t139;
+    const real t154 = A_C[5] * t122;
+    const real t155 = t153 + t154;
+    const real t156 = A_C[8] * t105;
+    const real t157 = t155 + t156;
+    const real t158 = t157 * d_Rc[2];
+    const real t159 = t152 + t158;
+    const real t160 = t105 * d_A_C[7];
+    const real t161 = A_C[7] * t113;
+    const real t162 = t160 + t161;
+    const real t163 = t122 * d_A_C[4];
+    const real t164 = A_C[4] * t130;
+    const real t165 = t163 + t164;
+    const real t166 = t139 * d_A_C[1];
+    const real t167 = A_C[1] * t147;
+    const real t168 = t166 + t167;
+    const real t169 = t165 + t168;
+    const real t170 = t162 + t169;
+    const real t171 = Rc[1] * t170;
+    const real t172 = A_C[1] * t139;
+    const real t173 = A_C[4] * t122;
+    const real t174 = t172 + t173;
+    const real t175 = A_C[7] * t105;
+    const real t176 = t174 + t175;
+    const real t177 = t176 * d_Rc[1];
+    const real t178 = t171 + t177;
+    const real t179 = t105 * d_A_C[6];
+    const real t180 = A_C[6] * t113;
+    const real t181 = t179 + t180;
+    const real t182 = t122 * d_A_C[3];
+    const real t183 = A_C[3] * t130;
+    const real t184 = t182 + t183;
+    const real t185 = t139 * d_A_C[0];
+    const real t186 = A_C[0] * t147;
+    const real t187 = t185 + t186;
+    const real t188 = t184 + t187;
+    const real t189 = t181 + t188;
+    const real t190 = Rc[0] * t189;
+    const real t191 = A_C[0] * t139;
+    const real t192 = A_C[3] * t122;
+    const real t193 = t191 + t192;
+    const real t194 = A_C[6] * t105;
+    const real t195 = t193 + t194;
+    const real t196 = t195 * d_Rc[0];
+    const real t197 = t190 + t196;
+    const real t198 = t178 + t197;
+    const real t199 = t159 + t198;
+    const real t200 = d_r[0] + t199;
+    d_r_A[0] = t200;
+    const real t201 = Rc[5] * t151;
+    const real t202 = t157 * d_Rc[5];
+    const real t203 = t201 + t202;
+    const real t204 = Rc[4] * t170;
+    const real t205 = t176 * d_Rc[4];
+    const real t206 = t204 + t205;
+    const real t207 = Rc[3] * t189;
+    const real t208 = t195 * d_Rc[3];
+    const real t209 = t207 + t208;
+    const real t210 = t206 + t209;
+    const real t211 = t203 + t210;
+    const real t212 = d_r[1] + t211;
+    d_r_A[1] = t212;
+    const real t213 = Rc[8] * t151;
+    const real t214 = t157 * d_Rc[8];
+    const real t215 = t213 + t214;
+    const real t216 = Rc[7] * t170;
+    const real t217 = t176 * d_Rc[7];
+    const real t218 = t216 + t217;
+    const real t219 = Rc[6] * t189;
+    const real t220 = t195 * d_Rc[6];
+    const real t221 = t219 + t220;
+    const real t222 = t218 + t221;
+    const real t223 = t215 + t222;
+    const real t224 = d_r[2] + t223;
+    d_r_A[2] = t224;
+    d_d[0] = t189;
+    d_d[1] = t170;
+    d_d[2] = t151;
+    return 0;
+}
+
+static int mstmm_sweep_loops_gap_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_gap_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_loops_gap_slope_inputs[] = {
+    {"A_C", 9, "", 0, 0},
+    {"x_C", 3, "m", 0, 0},
+    {"A_B", 9, "", 0, 0},
+    {"x_B", 3, "m", 0, 0},
+    {"R_e", 9, "", 0, 0},
+    {"r_e", 3, "m", 0, 0},
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"d_A_C", 9, "", 0, 0},
+    {"d_x_C", 3, "m", 0, 0},
+    {"d_A_B", 9, "", 0, 0},
+    {"d_x_B", 3, "m", 0, 0},
+    {"d_Rc", 9, "", 0, 0},
+    {"d_r", 3, "m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_gap_slope_outputs[] = {
+    {"d_R_C", 9, "", 0, 0},
+    {"d_r_A", 3, "m", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+};
+
+/* slip and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  R_C[3][3] rotation, axes of C to axes of B
+ * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
+ * in  d[3] (m) that end from the origin of C, axes of C
+ * in  v_C[3] (m/s) velocity of C, own axes
+ * in  w_C[3] (rad/s) angular velocity of C, own axes
+ * in  v_B[3] (m/s) velocity of P of B, own axes
+ * in  w_B[3] (rad/s) angular velocity of B, own axes
+ * in  d_R_C[3][3] derivative of R_C
+ * in  d_d[3] (m) derivative of d
+ * in  d_v_C[3] (m/s) derivative of v_C
+ * in  d_w_C[3] (rad/s) derivative of w_C
+ * in  d_v_B[3] (m/s) derivative of v_B
+ * in  d_w_B[3] (rad/s) derivative of w_B
+ * out d_slip[6] derivative of slip
+ */
+int mstmm_sweep_loops_slip_slope(const real *restrict R_C, const real *restrict r_e,
+    const real *restrict d, const real *restrict v_C, const real *restrict w_C,
+    const real *restrict v_B, const real *restrict w_B, const real *restrict d_R_C,
+    const real *restrict d_d, const real *restrict d_v_C, const real *restrict d_w_C,
+    const real *restrict d_v_B, const real *restrict d_w_B, real *restrict d_slip)
+{
+    (void)v_C;
+    const real t0 = w_C[2] * d_d[1];
+    const real t1 = d[1] * d_w_C[2];
+    const real t2 = t0 + t1;
+    const real t3 = w_C[1] * d_d[2];
+    const real t4 = d[2] * d_w_C[1];
+    const real t5 = t3 + t4;
+    const real t6 = t2 - t5;
+    const real t7 = t6 - d_v_C[0];
+    const real t8 = r_e[1] * d_w_B[0];
+    const real t9 = r_e[0] * d_w_B[1];
+    const real t10 = t8 - t9;
+    const real t11 = d_v_B[2] + t10;
+    const real t12 = R_C[6] * t11;
+    const real t13 = r_e[1] * w_B[0];
+    const real t14 = w_B[1] * r_e[0];
+    const real t15 = t13 - t14;
+    const real t16 = t15 + v_B[2];
+    const real t17 = t16 * d_R_C[6];
+    const real t18 = t12 + t17;
+    const real t19 = r_e[0] * d_w_B[2];
+    const real t20 = r_e[2] * d_w_B[0];
+    const real t21 = t19 - t20;
+    const real t22 = d_v_B[1] + t21;
+    const real t23 = R_C[3] * t22;
+    const real t24 = w_B[2] * r_e[0];
+    const real t25 = r_e[2] * w_B[0];
+    const real t26 = t24 - t25;
+    const real t27 = t26 + v_B[1];
+    const real t28 = t27 * d_R_C[3];
+    const real t29 = t23 + t28;
+    const real t30 = r_e[2] * d_w_B[1];
+    const real t31 = r_e[1] * d_w_B[2];
+    const real t32 = t30 - t31;
+    const real t33 = d_v_B[0] + t32;
+    const real t34 = R_C[0] * t33;
+    const real t35 = r_e[2] * w_B[1];
+    const real t36 = r_e[1] * w_B[2];
+    const real t37 = t35 - t36;
+    const real t38 = t37 + v_B[0];
+    const real t39 = t38 * d_R_C[0];
+    const real t40 = t34 + t39;
+    const real t41 = t29 + t40;
+    const real t42 = t18 + t41;
+    const real t43 = t7 + t42;
+    d_slip[0] = t43;
+    const real t44 = w_C[0] * d_d[2];
+    const real t45 = d[2] * d_w_C[0];
+    const real t46 = t44 + t45;
+    const real t47 = d[0] * d_w_C[2];
+    const real t48 = w_C[2] * d_d[0];
+    const real t49 = t47 + t48;
+    const real t50 = t46 - t49;
+    const real t51 = t50 - d_v_C[1];
+    const real t52 = R_C[7] * t11;
+    const real t53 = t16 * d_R_C[7];
+    const real t54 = t52 + t53;
+    const real t55 = R_C[4] * t22;
+    const real t56 = t27 * d_R_C[4];
+    const real t57 = t55 + t56;
+    const real t58 = R_C[1] * t33;
+    const real t59 = t38 * d_R_C[1];
+    const real t60 = t58 + t59;
+    const real t61 = t57 + t60;
+    const real t62 = t54 + t61;
+    const real t63 = t51 + t62;
+    d_slip[1] = t63;
+    const real t64 = d[0] * d_w_C[1];
+    const real t65 = w_C[1] * d_d[0];
+    const real t66 = t64 + t65;
+    const real t67 = w_C[0] * d_d[1];
+    const real t68 = d[1] * d_w_C[0];
+    const real t69 = t67 + t68;
+    const real t70 = t66 - t69;
+    const real t71 = t70 - d_v_C[2];
+    const real t72 = R_C[8] * t11;
+    const real t73 = t16 * d_R_C[8];
+    const real t74 = t72 + t73;
+    const real t75 = R_C[5] * t22;
+    const real t76 = t27 * d_R_C[5];
+    const real t77 = t75 + t76;
+    const real t78 = R_C[2] * t33;
+    const real t79 = t38 * d_R_C[2];
+    const real t80 = t78 + t79;
+    const real t81 = t77 + t80;
+    const real t82 = t74 + t81;
+    const real t83 = t71 + t82;
+    d_slip[2] = t83;
+    const real t84 = R_C[6] * d_w_B[2];
+    const real t85 = w_B[2] * d_R_C[6];
+    const real t86 = t84 + t85;
+    const real t87 = R_C[3] * d_w_B[1];
+    const real t88 = w_B[1] * d_R_C[3];
+    const real t89 = t87 + t88;
+    const real t90 = w_B[0] * d_R_C[0];
+    const real t91 = R_C[0] * d_w_B[0];
+    const real t92 = t90 + t91;
+    const real t93 = t89 + t92;
+    const real t94 = t86 + t93;
+    const real t95 = t94 - d_w_C[0];
+    d_slip[3] = t95;
+    const real t96 = R_C[7] * d_w_B[2];
+    const real t97 = w_B[2] * d_R_C[7];
+    const real t98 = t96 + t97;
+    const real t99 = R_C[4] * d_w_B[1];
+    const real t100 = w_B[1] * d_R_C[4];
+    const real t101 = t99 + t100;
+    const real t102 = R_C[1] * d_w_B[0];
+    const real t103 = w_B[0] * d_R_C[1];
+    const real t104 = t102 + t103;
+    const real t105 = t101 + t104;
+    const real t106 = t98 + t105;
+    const real t107 = t106 - d_w_C[1];
+    d_slip[4] = t107;
+    const real t108 = R_C[8] * d_w_B[2];
+    const real t109 = w_B[2] * d_R_C[8];
+    const real t110 = t108 + t109;
+    const real t111 = R_C[5] * d_w_B[1];
+    const real t112 = w_B[1] * d_R_C[5];
+    const real t113 = t111 + t112;
+    const real t114 = R_C[2] * d_w_B[0];
+    const real t115 = w_B[0] * d_R_C[2];
+    const real t116 = t114 + t115;
+    const real t117 = t113 + t116;
+    const real t118 = t110 + t117;
+    const real t119 = t118 - d_w_C[2];
+    d_slip[5] = t119;
+    return 0;
+}
+
+static int mstmm_sweep_loops_slip_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_slip_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_slip_slope_inputs[] = {
+    {"R_C", 9, "", 0, 0},
+    {"r_e", 3, "m", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"v_C", 3, "m/s", 0, 0},
+    {"w_C", 3, "rad/s", 0, 0},
+    {"v_B", 3, "m/s", 0, 0},
+    {"w_B", 3, "rad/s", 0, 0},
+    {"d_R_C", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+    {"d_v_C", 3, "m/s", 0, 0},
+    {"d_w_C", 3, "rad/s", 0, 0},
+    {"d_v_B", 3, "m/s", 0, 0},
+    {"d_w_B", 3, "rad/s", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_slip_slope_outputs[] = {
+    {"d_slip", 6, "", 0, 0},
+};
+
+/* drift and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  R_C[3][3] rotation, axes of C to axes of B
+ * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
+ * in  d[3] (m) that end from the origin of C, axes of C
+ * in  slip[6] rate of d and relative angular velocity, axes of C
+ * in  motion_C[9] bias motion of C: w, wd, rdd, own axes
+ * in  motion_B[9] bias motion of B: w, wd, rdd, own axes
+ * in  d_R_C[3][3] derivative of R_C
+ * in  d_d[3] (m) derivative of d
+ * in  d_slip[6] derivative of slip
+ * in  d_motion_C[9] derivative of motion_C
+ * in  d_motion_B[9] derivative of motion_B
+ * out d_drift[6] derivative of drift
+ */
+int mstmm_sweep_loops_drift_slope(const real *restrict R_C, const real *restrict r_e,
+    const real *restrict d, const real *restrict slip, const real *restrict motion_C,
+    const real *restrict motion_B, const real *restrict d_R_C, const real *restrict d_d,
+    const real *restrict d_slip, const real *restrict d_motion_C, const real *restrict d_motion_B,
+    real *restrict d_drift)
+{
+    const real t0 = motion_C[2] * d_motion_C[2];
+    const real t1 = t0 + t0;
+    const real t2 = motion_C[1] * d_motion_C[1];
+    const real t3 = t2 + t2;
+    const real t4 = t1 + t3;
+    const real t5 = d[0] * t4;
+    const real t6 = motion_C[1] * motion_C[1];
+    const real t7 = motion_C[2] * motion_C[2];
+    const real t8 = t6 + t7;
+    const real t9 = t8 * d_d[0];
+    const real t10 = t5 + t9;
+    const real t11 = motion_C[1] * motion_C[0];
+    const real t12 = t11 * d_d[1];
+    const real t13 = motion_C[0] * d_motion_C[1];
+    const real t14 = motion_C[1] * d_motion_C[0];
+    const real t15 = t13 + t14;
+    const real t16 = d[1] * t15;
+    const real t17 = t12 + t16;
+    const real t18 = t10 - t17;
+    const real t19 = motion_C[2] * motion_C[0];
+    const real t20 = t19 * d_d[2];
+    const real t21 = motion_C[0] * d_motion_C[2];
+    const real t22 = motion_C[2] * d_motion_C[0];
+    const real t23 = t21 + t22;
+    const real t24 = d[2] * t23;
+    const real t25 = t20 + t24;
+    const real t26 = t18 - t25;
+    const real t27 = motion_C[5] * d_d[1];
+    const real t28 = d[1] * d_motion_C[5];
+    const real t29 = t27 + t28;
+    const real t30 = motion_C[4] * d_d[2];
+    const real t31 = d[2] * d_motion_C[4];
+    const real t32 = t30 + t31;
+    const real t33 = t29 - t32;
+    const real t34 = t26 + t33;
+    const real t35 = motion_B[2] * d_motion_B[1];
+    const real t36 = motion_B[1] * d_motion_B[2];
+    const real t37 = t35 + t36;
+    const real t38 = r_e[1] * t37;
+    const real t39 = motion_B[2] * d_motion_B[0];
+    const real t40 = motion_B[0] * d_motion_B[2];
+    const real t41 = t39 + t40;
+    const real t42 = r_e[0] * t41;
+    const real t43 = t38 + t42;
+    const real t44 = motion_B[0] * d_motion_B[0];
+    const real t45 = t44 + t44;
+    const real t46 = motion_B[1] * d_motion_B[1];
+    const real t47 = t46 + t46;
+    const real t48 = t45 + t47;
+    const real t49 = r_e[2] * t48;
+    const real t50 = t43 - t49;
+    const real t51 = r_e[1] * d_motion_B[3];
+    const real t52 = r_e[0] * d_motion_B[4];
+    const real t53 = t51 - t52;
+    const real t54 = t50 + t53;
+    const real t55 = d_motion_B[8] + t54;
+    const real t56 = R_C[6] * t55;
+    const real t57 = r_e[1] * motion_B[3];
+    const real t58 = motion_B[4] * r_e[0];
+    const real t59 = t57 - t58;
+    const real t60 = motion_B[0] * motion_B[2];
+    const real t61 = r_e[0] * t60;
+    const real t62 = motion_B[1] * motion_B[2];
+    const real t63 = r_e[1] * t62;
+    const real t64 = t61 + t63;
+    const real t65 = motion_B[1] * motion_B[1];
+    const real t66 = motion_B[0] * motion_B[0];
+    const real t67 = t65 + t66;
+    const real t68 = r_e[2] * t67;
+    const real t69 = t64 - t68;
+    const real t70 = t59 + t69;
+    const real t71 = t70 + motion_B[8];
+    const real t72 = t71 * d_R_C[6];
+    const real t73 = t56 + t72;
+    const real t74 = r_e[2] * t37;
+    const real t75 = motion_B[1] * d_motion_B[0];
+    const real t76 = motion_B[0] * d_motion_B[1];
+    const real t77 = t75 + t76;
+    const real t78 = r_e[0] * t77;
+    const real t79 = motion_B[2] * d_motion_B[2];
+    const real t80 = t79 + t79;
+    const real t81 = t45 + t80;
+    const real t82 = r_e[1] * t81;
+    const real t83 = t78 - t82;
+    const real t84 = t74 + t83;
+    const real t85 = r_e[0] * d_motion_B[5];
+    const real t86 = r_e[2] * d_motion_B[3];
+    const real t87 = t85 - t86;
+    const real t88 = t84 + t87;
+    const real t89 = d_motion_B[7] + t88;
+    const real t90 = R_C[3] * t89;
+    const real t91 = motion_B[5] * r_e[0];
+    const real t92 = r_e[2] * motion_B[3];
+    const real t93 = t91 - t92;
+    const real t94 = motion_B[0] * motion_B[1];
+    const real t95 = t94 * r_e[0];
+    const real t96 = motion_B[2] * motion_B[2];
+    const real t97 = t96 + t66;
+    const real t98 = r_e[1] * t97;
+    const real t99 = t95 - t98;
+    const real t100 = r_e[2] * t62;
+    const real t101 = t99 + t100;
+    const real t102 = t93 + t101;
+    const real t103 = t102 + motion_B[7];
+    const real t104 = t103 * d_R_C[3];
+    const real t105 = t90 + t104;
+    const real t106 = r_e[2] * t41;
+    const real t107 = r_e[1] * t77;
+    const real t108 = t47 + t80;
+    const real t109 = r_e[0] * t108;
+    const real t110 = t107 - t109;
+    const real t111 = t106 + t110;
+    const real t112 = r_e[2] * d_motion_B[4];
+    const real t113 = r_e[1] * d_motion_B[5];
+    const real t114 = t112 - t113;
+    const real t115 = t111 + t114;
+    const real t116 = d_motion_B[6] + t115;
+    const real t117 = R_C[0] * t116;
+    const real t118 = r_e[2] * motion_B[4];
+    const real t119 = r_e[1] * motion_B[5];
+    const real t120 = t118 - t119;
+    const real t121 = r_e[1] * t94;
+    const real t122 = t65 + t96;
+    const real t123 = t122 * r_e[0];
+    const real t124 = t121 - t123;
+    const real t125 = r_e[2] * t60;
+    const real t126 = t124 + t125;
+    const real t127 = t120 + t126;
+    const real t128 = t127 + motion_B[6];
+    const real t129 = t128 * d_R_C[0];
+    const real t130 = t117 + t129;
+    const real t131 = t105 + t130;
+    const real t132 = t73 + t131;
+    const real t133 = t34 + t132;
+    const real t134 = motion_C[2] * d_slip[1];
+    const real t135 = slip[1] * d_motion_C[2];
+    const real t136 = t134 + t135;
+    const real t137 = 2.0 * t136;
+    const real t138 = motion_C[1] * d_slip[2];
+    const real t139 = slip[2] * d_motion_C[1];
+    const real t140 = t138 + t139;
+    const real t141 = 2.0 * t140;
+    const real t142 = t137 - t141;
+    const real t143 = t142 - d_motion_C[6];
+    const real t144 = t133 + t143;
+    d_drift[0] = t144;
+    const real t145 = motion_C[0] * motion_C[0];
+    const real t146 = t7 + t145;
+    const real t147 = t146 * d_d[1];
+    const real t148 = motion_C[0] * d_motion_C[0];
+    const real t149 = t148 + t148;
+    const real t150 = t1 + t149;
+    const real t151 = d[1] * t150;
+    const real t152 = t147 + t151;
+    const real t153 = t11 * d_d[0];
+    const real t154 = d[0] * t15;
+    const real t155 = t153 + t154;
+    const real t156 = t152 - t155;
+    const real t157 = motion_C[2] * motion_C[1];
+    const real t158 = t157 * d_d[2];
+    const real t159 = motion_C[1] * d_motion_C[2];
+    const real t160 = motion_C[2] * d_motion_C[1];
+    const real t161 = t159 + t160;
+    const real t162 = d[2] * t161;
+    const real t163 = t158 + t162;
+    const real t164 = t156 - t163;
+    const real t165 = motion_C[3] * d_d[2];
+    const real t166 = d[2] * d_motion_C[3];
+    const real t167 = t165 + t166;
+    const real t168 = d[0] * d_motion_C[5];
+    const real t169 = motion_C[5] * d_d[0];
+    const real t170 = t168 + t169;
+    const real t171 = t167 - t170;
+    const real t172 = t164 + t171;
+    const real t173 = R_C[7] * t55;
+    const real t174 = t71 * d_R_C[7];
+    const real t175 = t173 + t174;
+    const real t176 = R_C[4] * t89;
+    const real t177 = t103 * d_R_C[4];
+    const real t178 = t176 + t177;
+    const real t179 = R_C[1] * t116;
+    const real t180 = t128 * d_R_C[1];
+    const real t181 = t179 + t180;
+    const real t182 = t178 + t181;
+    const real t183 = t175 + t182;
+    const real t184 = t172 + t183;
+    const real t185 = motion_C[0] * d_slip[2];
+    const real t186 = slip[2] * d_motion_C[0];
+    const real t187 = t185 + t186;
+    const real t188 = 2.0 * t187;
+    const real t189 = slip[0] * d_motion_C[2];
+    const real t190 = motion_C[2] * d_slip[0];
+    const real t191 = t189 + t190;
+    const real t192 = 2.0 * t191;
+    const real t193 = t188 - t192;
+    const real t194 = t193 - d_motion_C[7];
+    const real t195 = t184 + t194;
+    d_drift[1] = t195;
+    const real t196 = t6 + t145;
+    const real t197 = t196 * d_d[2];
+    const real t198 = t3 + t149;
+    const real t199 = d[2] * t198;
+    const real t200 = t197 + t199;
+    const real t201 = t157 * d_d[1];
+    const real t202 = d[1] * t161;
+    const real t203 = t201 + t202;
+    const real t204 = t19 * d_d[0];
+    const real t205 = d[0] * t23;
+    const real t206 = t204 + t205;
+    const real t207 = t203 + t206;
+    const real t208 = t200 - t207;
+    const real t209 = d[0] * d_motion_C[4];
+    const real t210 = motion_C[4] * d_d[0];
+    const real t211 = t209 + t210;
+    const real t212 = motion_C[3] * d_d[1];
+    const real t213 = d[1] * d_motion_C[3];
+    const real t214 = t212 + t213;
+    const real t215 = t211 - t214;
+    const real t216 = t208 + t215;
+    const real t217 = R_C[8] * t55;
+    const real t218 = t71 * d_R_C[8];
+    const real t219 = t217 + t218;
+    const real t220 = R_C[5] * t89;
+    const real t221 = t103 * d_R_C[5];
+    const real t222 = t220 + t221;
+    const real t223 = R_C[2] * t116;
+    const real t224 = t128 * d_R_C[2];
+    const real t225 = t223 + t224;
+    const real t226 = t222 + t225;
+    const real t227 = t219 + t226;
+    const real t228 = t216 + t227;
+    const real t229 = slip[0] * d_motion_C[1];
+    const real t230 = motion_C[1] * d_slip[0];
+    const real t231 = t229 + t230;
+    const real t232 = 2.0 * t231;
+    const real t233 = motion_C[0] * d_slip[1];
+    const real t234 = slip[1] * d_motion_C[0];
+    const real t235 = t233 + t234;
+    const real t236 = 2.0 * t235;
+    const real t237 = t232 - t236;
+    const real t238 = t237 - d_motion_C[8];
+    const real t239 = t228 + t238;
+    d_drift[2] = t239;
+    const real t240 = slip[4] * d_motion_C[2];
+    const real t241 = motion_C[2] * d_slip[4];
+    const real t242 = t240 + t241;
+    const real t243 = slip[5] * d_motion_C[1];
+    const real t244 = motion_C[1] * d_slip[5];
+    const real t245 = t243 + t244;
+    const real t246 = t242 - t245;
+    const real t247 = t246 - d_motion_C[3];
+    const real t248 = R_C[6] * d_motion_B[5];
+    const real t249 = motion_B[5] * d_R_C[6];
+    const real t250 = t248 + t249;
+    const real t251 = R_C[3] * d_motion_B[4];
+    const real t252 = motion_B[4] * d_R_C[3];
+    const real t253 = t251 + t252;
+    const real t254 = motion_B[3] * d_R_C[0];
+    const real t255 = R_C[0] * d_motion_B[3];
+    const real t256 = t254 + t255;
+    const real t257 = t253 + t256;
+    const real t258 = t250 + t257;
+    const real t259 = t247 + t258;
+    d_drift[3] = t259;
+    const real t260 = slip[5] * d_motion_C[0];
+    const real t261 = motion_C[0] * d_slip[5];
+    const real t262 = t260 + t261;
+    const real t263 = slip[3] * d_motion_C[2];
+    const real t264 = motion_C[2] * d_slip[3];
+    const real t265 = t263 + t264;
+    const real t266 = t262 - t265;
+    const real t267 = t266 - d_motion_C[4];
+    const real t268 = R_C[7] * d_motion_B[5];
+    const real t269 = motion_B[5] * d_R_C[7];
+    const real t270 = t268 + t269;
+    const real t271 = R_C[4] * d_motion_B[4];
+    const real t272 = motion_B[4] * d_R_C[4];
+    const real t273 = t271 + t272;
+    const real t274 = R_C[1] * d_motion_B[3];
+    const real t275 = motion_B[3] * d_R_C[1];
+    const real t276 = t274 + t275;
+    const real t277 = t273 + t276;
+    const real t278 = t270 + t277;
+    const real t279 = t267 + t278;
+    d_drift[4] = t279;
+    const real t280 = slip[3] * d_motion_C[1];
+    const real t281 = motion_C[1] * d_slip[3];
+    const real t282 = t280 + t281;
+    const real t283 = slip[4] * d_motion_C[0];
+    const real t284 = motion_C[0] * d_slip[4];
+    const real t285 = t283 + t284;
+    const real t286 = t282 - t285;
+    const real t287 = t286 - d_motion_C[5];
+    const real t288 = R_C[8] * d_motion_B[5];
+    const real t289 = motion_B[5] * d_R_C[8];
+    const real t290 = t288 + t289;
+    const real t291 = R_C[5] * d_motion_B[4];
+    const real t292 = motion_B[4] * d_R_C[5];
+    const real t293 = t291 + t292;
+    const real t294 = R_C[2] * d_motion_B[3];
+    const real t295 = motion_B[3] * d_R_C[2];
+    const real t296 = t294 + t295;
+    const real t297 = t293 + t296;
+    const real t298 = t290 + t297;
+    const real t299 = t287 + t298;
+    d_drift[5] = t299;
+    return 0;
+}
+
+static int mstmm_sweep_loops_drift_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_drift_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_drift_slope_inputs[] = {
+    {"R_C", 9, "", 0, 0},
+    {"r_e", 3, "m", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"slip", 6, "", 0, 0},
+    {"motion_C", 9, "", 0, 0},
+    {"motion_B", 9, "", 0, 0},
+    {"d_R_C", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+    {"d_slip", 6, "", 0, 0},
+    {"d_motion_C", 9, "", 0, 0},
+    {"d_motion_B", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_drift_slope_outputs[] = {
+    {"d_drift", 6, "", 0, 0},
+};
+
+/* rows and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  W[6][6] rows: H^+, then what the hinge holds
+ * in  R_C[3][3] rotation, axes of C to axes of B
+ * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r_A[3] (m) the end of B from P of A, axes of A
+ * in  relative[6] motion of the end of B relative to C
+ * in  d_W[6][6] derivative of W
+ * in  d_R_C[3][3] derivative of R_C
+ * in  d_Rc[3][3] derivative of Rc
+ * in  d_r_A[3] (m) derivative of r_A
+ * in  d_relative[6] derivative of relative
+ * out d_J_A[6][6] derivative of J_A
+ * out d_J_B[6][6] derivative of J_B
+ * out d_l[6] derivative of l
+ */
+int mstmm_sweep_loops_rows_slope(const real *restrict W, const real *restrict R_C,
+    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
+    const real *restrict relative, const real *restrict d_W, const real *restrict d_R_C,
+    const real *restrict d_Rc, const real *restrict d_r_A, const real *restrict d_relative,
+    real *restrict d_J_A, real *restrict d_J_B, real *restrict d_l)
+{
+    const real t0 = Rc[1] * d_W[1];
+    const real t1 = W[1] * d_Rc[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rc[0] * d_W[0];
+    const real t4 = W[0] * d_Rc[0];
+    const real t5 = t3 + t4;
+    const real t6 = t2 + t5;
+    const real t7 = Rc[2] * d_W[2];
+    const real t8 = W[2] * d_Rc[2];
+    const real t9 = t7 + t8;
+    const real t10 = t6 + t9;
+    const real t11 = -t10;
+    d_J_A[0] = t11;
+    const real t12 = Rc[4] * d_W[1];
+    const real t13 = W[1] * d_Rc[4];
+    const real t14 = t12 + t13;
+    const real t15 = Rc[3] * d_W[0];
+    const real t16 = W[0] * d_Rc[3];
+    const real t17 = t15 + t16;
+    const real t18 = t14 + t17;
+    const real t19 = Rc[5] * d_W[2];
+    const real t20 = W[2] * d_Rc[5];
+    const real t21 = t19 + t20;
+    const real t22 = t18 + t21;
+    const real t23 = -t22;
+    d_J_A[1] = t23;
+    const real t24 = Rc[7] * d_W[1];
+    const real t25 = W[1] * d_Rc[7];
+    const real t26 = t24 + t25;
+    const real t27 = Rc[6] * d_W[0];
+    const real t28 = W[0] * d_Rc[6];
+    const real t29 = t27 + t28;
+    const real t30 = t26 + t29;
+    const real t31 = Rc[8] * d_W[2];
+    const real t32 = W[2] * d_Rc[8];
+    const real t33 = t31 + t32;
+    const real t34 = t30 + t33;
+    const real t35 = -t34;
+    d_J_A[2] = t35;
+    const real t36 = r_A[2] * t22;
+    const real t37 = W[2] * Rc[5];
+    const real t38 = W[0] * Rc[3];
+    const real t39 = W[1] * Rc[4];
+    const real t40 = t38 + t39;
+    const real t41 = t37 + t40;
+    const real t42 = t41 * d_r_A[2];
+    const real t43 = t36 + t42;
+    const real t44 = r_A[1] * t34;
+    const real t45 = W[2] * Rc[8];
+    const real t46 = W[0] * Rc[6];
+    const real t47 = W[1] * Rc[7];
+    const real t48 = t46 + t47;
+    const real t49 = t45 + t48;
+    const real t50 = t49 * d_r_A[1];
+    const real t51 = t44 + t50;
+    const real t52 = t43 - t51;
+    const real t53 = W[3] * d_Rc[0];
+    const real t54 = Rc[0] * d_W[3];
+    const real t55 = t53 + t54;
+    const real t56 = t52 - t55;
+    const real t57 = W[4] * d_Rc[1];
+    const real t58 = Rc[1] * d_W[4];
+    const real t59 = t57 + t58;
+    const real t60 = t56 - t59;
+    const real t61 = W[5] * d_Rc[2];
+    const real t62 = Rc[2] * d_W[5];
+    const real t63 = t61 + t62;
+    const real t64 = t60 - t63;
+    d_J_A[3] = t64;
+    const real t65 = r_A[0] * t34;
+    const real t66 = t49 * d_r_A[0];
+    const real t67 = t65 + t66;
+    const real t68 = r_A[2] * t10;
+    const real t69 = W[2] * Rc[2];
+    const real t70 = W[0] * Rc[0];
+    const real t71 = W[1] * Rc[1];
+    const real t72 = t70 + t71;
+    const real t73 = t69 + t72;
+    const real t74 = t73 * d_r_A[2];
+    const real t75 = t68 + t74;
+    const real t76 = t67 - t75;
+    const real t77 = W[3] * d_Rc[3];
+    const real t78 = Rc[3] * d_W[3];
+    const real t79 = t77 + t78;
+    const real t80 = t76 - t79;
+    const real t81 = W[4] * d_Rc[4];
+    const real t82 = Rc[4] * d_W[4];
+    const real t83 = t81 + t82;
+    const real t84 = t80 - t83;
+    const real t85 = W[5] * d_Rc[5];
+    const real t86 = Rc[5] * d_W[5];
+    const real t87 = t85 + t86;
+    const real t88 = t84 - t87;
+    d_J_A[4] = t88;
+    const real t89 = r_A[1] * t10;
+    const real t90 = t73 * d_r_A[1];
+    const real t91 = t89 + t90;
+    const real t92 = r_A[0] * t22;
+    const real t93 = t41 * d_r_A[0];
+    const real t94 = t92 + t93;
+    const real t95 = t91 - t94;
+    const real t96 = W[3] * d_Rc[6];
+    const real t97 = Rc[6] * d_W[3];
+    const real t98 = t96 + t97;
+    const real t99 = t95 - t98;
+    const real t100 = W[4] * d_Rc[7];
+    const real t101 = Rc[7] * d_W[4];
+    const real t102 = t100 + t101;
+    const real t103 = t99 - t102;
+    const real t104 = W[5] * d_Rc[8];
+    const real t105 = Rc[8] * d_W[5];
+    const real t106 = t104 + t105;
+    const real t107 = t103 - t106;
+    d_J_A[5] = t107;
+    const real t108 = W[7] * d_Rc[1];
+    const real t109 = Rc[1] * d_W[7];
+    const real t110 = t108 + t109;
+    const real t111 = W[6] * d_Rc[0];
+    const real t112 = Rc[0] * d_W[6];
+    const real t113 = t111 + t112;
+    const real t114 = t110 + t113;
+    const real t115 = W[8] * d_Rc[2];
+    const real t116 = Rc[2] * d_W[8];
+    const real t117 = t115 + t116;
+    const real t118 = t114 + t117;
+    const real t119 = -t118;
+    d_J_A[6] = t119;
+    const real t120 = W[7] * d_Rc[4];
+    const real t121 = Rc[4] * d_W[7];
+    const real t122 = t120 + t121;
+    const real t123 = W[6] * d_Rc[3];
+    const real t124 = Rc[3] * d_W[6];
+    const real t125 = t123 + t124;
+    const real t126 = t122 + t125;
+    const real t127 = W[8] * d_Rc[5];
+    const real t128 = Rc[5] * d_W[8];
+    const real t129 = t127 + t128;
+    const real t130 = t126 + t129;
+    const real t131 = -t130;
+    d_J_A[7] = t131;
+    const real t132 = W[7] * d_Rc[7];
+    const real t133 = Rc[7] * d_W[7];
+    const real t134 = t132 + t133;
+    const real t135 = W[6] * d_Rc[6];
+    const real t136 = Rc[6] * d_W[6];
+    const real t137 = t135 + t136;
+    const real t138 = t134 + t137;
+    const real t139 = W[8] * d_Rc[8];
+    const real t140 = Rc[8] * d_W[8];
+    const real t141 = t139 + t140;
+    const real t142 = t138 + t141;
+    const real t143 = -t142;
+    d_J_A[8] = t143;
+    const real t144 = Rc[5] * W[8];
+    const real t145 = Rc[3] * W[6];
+    const real t146 = Rc[4] * W[7];
+    const real t147 = t145 + t146;
+    const real t148 = t144 + t147;
+    const real t149 = t148 * d_r_A[2];
+    const real t150 = r_A[2] * t130;
+    const real t151 = t149 + t150;
+    const real t152 = Rc[8] * W[8];
+    const real t153 = Rc[6] * W[6];
+    const real t154 = Rc[7] * W[7];
+    const real t155 = t153 + t154;
+    const real t156 = t152 + t155;
+    const real t157 = t156 * d_r_A[1];
+    const real t158 = r_A[1] * t142;
+    const real t159 = t157 + t158;
+    const real t160 = t151 - t159;
+    const real t161 = W[9] * d_Rc[0];
+    const real t162 = Rc[0] * d_W[9];
+    const real t163 = t161 + t162;
+    const real t164 = t160 - t163;
+    const real t165 = W[10] * d_Rc[1];
+    const real t166 = Rc[1] * d_W[10];
+    const real t167 = t165 + t166;
+    const real t168 = t164 - t167;
+    const real t169 = W[11] * d_Rc[2];
+    const real t170 = Rc[2] * d_W[11];
+    const real t171 = t169 + t170;
+    const real t172 = t168 - t171;
+    d_J_A[9] = t172;
+    const real t173 = t156 * d_r_A[0];
+    const real t174 = r_A[0] * t142;
+    const real t175 = t173 + t174;
+    const real t176 = Rc[2] * W[8];
+    const real t177 = Rc[0] * W[6];
+    const real t178 = Rc[1] * W[7];
+    const real t179 = t177 + t178;
+    const real t180 = t176 + t179;
+    const real t181 = t180 * d_r_A[2];
+    const real t182 = r_A[2] * t118;
+    const real t183 = t181 + t182;
+    const real t184 = t175 - t183;
+    const real t185 = W[9] * d_Rc[3];
+    const real t186 = Rc[3] * d_W[9];
+    const real t187 = t185 + t186;
+    const real t188 = t184 - t187;
+    const real t189 = W[10] * d_Rc[4];
+    const real t190 = Rc[4] * d_W[10];
+    const real t191 = t189 + t190;
+    const real t192 = t188 - t191;
+    const real t193 = W[11] * d_Rc[5];
+    const real t194 = Rc[5] * d_W[11];
+    const real t195 = t193 + t194;
+    const real t196 = t192 - t195;
+    d_J_A[10] = t196;
+    const real t197 = t180 * d_r_A[1];
+    const real t198 = r_A[1] * t118;
+    const real t199 = t197 + t198;
+    const real t200 = t148 * d_r_A[0];
+    const real t201 = r_A[0] * t130;
+    const real t202 = t200 + t201;
+    const real t203 = t199 - t202;
+    const real t204 = W[9] * d_Rc[6];
+    const real t205 = Rc[6] * d_W[9];
+    const real t206 = t204 + t205;
+    const real t207 = t203 - t206;
+    const real t208 = W[10] * d_Rc[7];
+    const real t209 = Rc[7] * d_W[10];
+    const real t210 = t208 + t209;
+    const real t211 = t207 - t210;
+    const real t212 = W[11] * d_Rc[8];
+    const real t213 = Rc[8] * d_W[11];
+    const real t214 = t212 + t213;
+    const real t215 = t211 - t214;
+    d_J_A[11] = t215;
+    const real t216 = W[13] * d_Rc[1];
+    const real t217 = Rc[1] * d_W[13];
+    const real t218 = t216 + t217;
+    const real t219 = W[12] * d_Rc[0];
+    const real t220 = Rc[0] * d_W[12];
+    const real t221 = t219 + t220;
+    const real t222 = t218 + t221;
+    const real t223 = W[14] * d_Rc[2];
+    const real t224 = Rc[2] * d_W[14];
+    const real t225 = t223 + t224;
+    const real t226 = t222 + t225;
+    const real t227 = -t226;
+    d_J_A[12] = t227;
+    const real t228 = W[13] * d_Rc[4];
+    const real t229 = Rc[4] * d_W[13];
+    const real t230 = t228 + t229;
+    const real t231 = W[12] * d_Rc[3];
+    const real t232 = Rc[3] * d_W[12];
+    const real t233 = t231 + t232;
+    const real t234 = t230 + t233;
+    const real t235 = W[14] * d_Rc[5];
+    const real t236 = Rc[5] * d_W[14];
+    const real t237 = t235 + t236;
+    const real t238 = t234 + t237;
+    const real t239 = -t238;
+    d_J_A[13] = t239;
+    const real t240 = W[13] * d_Rc[7];
+    const real t241 = Rc[7] * d_W[13];
+    const real t242 = t240 + t241;
+    const real t243 = W[12] * d_Rc[6];
+    const real t244 = Rc[6] * d_W[12];
+    const real t245 = t243 + t244;
+    const real t246 = t242 + t245;
+    const real t247 = W[14] * d_Rc[8];
+    const real t248 = Rc[8] * d_W[14];
+    const real t249 = t247 + t248;
+    const real t250 = t246 + t249;
+    const real t251 = -t250;
+    d_J_A[14] = t251;
+    const real t252 = Rc[5] * W[14];
+    const real t253 = Rc[3] * W[12];
+    const real t254 = Rc[4] * W[13];
+    const real t255 = t253 + t254;
+    const real t256 = t252 + t255;
+    const real t257 = t256 * d_r_A[2];
+    const real t258 = r_A[2] * t238;
+    const real t259 = t257 + t258;
+    const real t260 = Rc[8] * W[14];
+    const real t261 = Rc[6] * W[12];
+    const real t262 = Rc[7] * W[13];
+    const real t263 = t261 + t262;
+    const real t264 = t260 + t263;
+    const real t265 = t264 * d_r_A[1];
+    const real t266 = r_A[1] * t250;
+    const real t267 = t265 + t266;
+    const real t268 = t259 - t267;
+    const real t269 = W[15] * d_Rc[0];
+    const real t270 = Rc[0] * d_W[15];
+    const real t271 = t269 + t270;
+    const real t272 = t268 - t271;
+    const real t273 = W[16] * d_Rc[1];
+    const real t274 = Rc[1] * d_W[16];
+    const real t275 = t273 + t274;
+    const real t276 = t272 - t275;
+    const real t277 = W[17] * d_Rc[2];
+    const real t278 = Rc[2] * d_W[17];
+    const real t279 = t277 + t278;
+    const real t280 = t276 - t279;
+    d_J_A[15] = t280;
+    const real t281 = t264 * d_r_A[0];
+    const real t282 = r_A[0] * t250;
+    const real t283 = t281 + t282;
+    const real t284 = Rc[2] * W[14];
+    const real t285 = Rc[0] * W[12];
+    const real t286 = Rc[1] * W[13];
+    const real t287 = t285 + t286;
+    const real t288 = t284 + t287;
+    const real t289 = t288 * d_r_A[2];
+    const real t290 = r_A[2] * t226;
+    const real t291 = t289 + t290;
+    const real t292 = t283 - t291;
+    const real t293 = W[15] * d_Rc[3];
+    const real t294 = Rc[3] * d_W[15];
+    const real t295 = t293 + t294;
+    const real t296 = t292 - t295;
+    const real t297 = W[16] * d_Rc[4];
+    const real t298 = Rc[4] * d_W[16];
+    const real t299 = t297 + t298;
+    const real t300 = t296 - t299;
+    const real t301 = W[17] * d_Rc[5];
+    const real t302 = Rc[5] * d_W[17];
+    const real t303 = t301 + t302;
+    const real t304 = t300 - t303;
+    d_J_A[16] = t304;
+    const real t305 = t288 * d_r_A[1];
+    const real t306 = r_A[1] * t226;
+    const real t307 = t305 + t306;
+    const real t308 = t256 * d_r_A[0];
+    const real t309 = r_A[0] * t238;
+    const real t310 = t308 + t309;
+    const real t311 = t307 - t310;
+    const real t312 = W[15] * d_Rc[6];
+    const real t313 = Rc[6] * d_W[15];
+    const real t314 = t312 + t313;
+    const real t315 = t311 - t314;
+    const real t316 = W[16] * d_Rc[7];
+    const real t317 = Rc[7] * d_W[16];
+    const real t318 = t316 + t317;
+    const real t319 = t315 - t318;
+    const real t320 = W[17] * d_Rc[8];
+    const real t321 = Rc[8] * d_W[17];
+    const real t322 = t320 + t321;
+    const real t323 = t319 - t322;
+    d_J_A[17] = t323;
+    const real t324 = W[19] * d_Rc[1];
+    const real t325 = Rc[1] * d_W[19];
+    const real t326 = t324 + t325;
+    const real t327 = W[18] * d_Rc[0];
+    const real t328 = Rc[0] * d_W[18];
+    const real t329 = t327 + t328;
+    const real t330 = t326 + t329;
+    const real t331 = W[20] * d_Rc[2];
+    const real t332 = Rc[2] * d_W[20];
+    const real t333 = t331 + t332;
+    const real t334 = t330 + t333;
+    const real t335 = -t334;
+    d_J_A[18] = t335;
+    const real t336 = W[19] * d_Rc[4];
+    const real t337 = Rc[4] * d_W[19];
+    const real t338 = t336 + t337;
+    const real t339 = W[18] * d_Rc[3];
+    const real t340 = Rc[3] * d_W[18];
+    const real t341 = t339 + t340;
+    const real t342 = t338 + t341;
+    const real t343 = W[20] * d_Rc[5];
+    const real t344 = Rc[5] * d_W[20];
+    const real t345 = t343 + t344;
+    const real t346 = t342 + t345;
+    const real t347 = -t346;
+    d_J_A[19] = t347;
+    const real t348 = W[19] * d_Rc[7];
+    const real t349 = Rc[7] * d_W[19];
+    const real t350 = t348 + t349;
+    const real t351 = W[18] * d_Rc[6];
+    const real t352 = Rc[6] * d_W[18];
+    const real t353 = t351 + t352;
+    const real t354 = t350 + t353;
+    const real t355 = W[20] * d_Rc[8];
+    const real t356 = Rc[8] * d_W[20];
+    const real t357 = t355 + t356;
+    const real t358 = t354 + t357;
+    const real t359 = -t358;
+    d_J_A[20] = t359;
+    const real t360 = Rc[5] * W[20];
+    const real t361 = Rc[3] * W[18];
+    const real t362 = Rc[4] * W[19];
+    const real t363 = t361 + t362;
+    const real t364 = t360 + t363;
+    const real t365 = t364 * d_r_A[2];
+    const real t366 = r_A[2] * t346;
+    const real t367 = t365 + t366;
+    const real t368 = Rc[8] * W[20];
+    const real t369 = Rc[6] * W[18];
+    const real t370 = Rc[7] * W[19];
+    const real t371 = t369 + t370;
+    const real t372 = t368 + t371;
+    const real t373 = t372 * d_r_A[1];
+    const real t374 = r_A[1] * t358;
+    const real t375 = t373 + t374;
+    const real t376 = t367 - t375;
+    const real t377 = W[21] * d_Rc[0];
+    const real t378 = Rc[0] * d_W[21];
+    const real t379 = t377 + t378;
+    const real t380 = t376 - t379;
+    const real t381 = W[22] * d_Rc[1];
+    const real t382 = Rc[1] * d_W[22];
+    const real t383 = t381 + t382;
+    const real t384 = t380 - t383;
+    const real t385 = W[23] * d_Rc[2];
+    const real t386 = Rc[2] * d_W[23];
+    const real t387 = t385 + t386;
+    const real t388 = t384 - t387;
+    d_J_A[21] = t388;
+    const real t389 = t372 * d_r_A[0];
+    const real t390 = r_A[0] * t358;
+    const real t391 = t389 + t390;
+    const real t392 = Rc[2] * W[20];
+    const real t393 = Rc[0] * W[18];
+    const real t394 = Rc[1] * W[19];
+    const real t395 = t393 + t394;
+    const real t396 = t392 + t395;
+    const real t397 = t396 * d_r_A[2];
+    const real t398 = r_A[2] * t334;
+    const real t399 = t397 + t398;
+    const real t400 = t391 - t399;
+    const real t401 = W[21] * d_Rc[3];
+    const real t402 = Rc[3] * d_W[21];
+    const real t403 = t401 + t402;
+    const real t404 = t400 - t403;
+    const real t405 = W[22] * d_Rc[4];
+    const real t406 = Rc[4] * d_W[22];
+    const real t407 = t405 + t406;
+    const real t408 = t404 - t407;
+    const real t409 = W[23] * d_Rc[5];
+    const real t410 = Rc[5] * d_W[23];
+    const real t411 = t409 + t410;
+    const real t412 = t408 - t411;
+    d_J_A[22] = t412;
+    const real t413 = t396 * d_r_A[1];
+    const real t414 = r_A[1] * t334;
+    const real t415 = t413 + t414;
+    const real t416 = t364 * d_r_A[0];
+    const real t417 = r_A[0] * t346;
+    const real t418 = t416 + t417;
+    const real t419 = t415 - t418;
+    const real t420 = W[21] * d_Rc[6];
+    const real t421 = Rc[6] * d_W[21];
+    const real t422 = t420 + t421;
+    const real t423 = t419 - t422;
+    const real t424 = W[22] * d_Rc[7];
+    const real t425 = Rc[7] * d_W[22];
+    const real t426 = t424 + t425;
+    const real t427 = t423 - t426;
+    const real t428 = W[23] * d_Rc[8];
+    const real t429 = Rc[8] * d_W[23];
+    const real t430 = t428 + t429;
+    const real t431 = t427 - t430;
+    d_J_A[23] = t431;
+    const real t432 = W[25] * d_Rc[1];
+    const real t433 = Rc[1] * d_W[25];
+    const real t434 = t432 + t433;
+    const real t435 = W[24] * d_Rc[0];
+    const real t436 = Rc[0] * d_W[24];
+    const real t437 = t435 + t436;
+    const real t438 = t434 + t437;
+    const real t439 = W[26] * d_Rc[2];
+    const real t440 = Rc[2] * d_W[26];
+    const real t441 = t439 + t440;
+    const real t442 = t438 + t441;
+    const real t443 = -t442;
+    d_J_A[24] = t443;
+    const real t444 = W[25] * d_Rc[4];
+    const real t445 = Rc[4] * d_W[25];
+    const real t446 = t444 + t445;
+    const real t447 = W[24] * d_Rc[3];
+    const real t448 = Rc[3] * d_W[24];
+    const real t449 = t447 + t448;
+    const real t450 = t446 + t449;
+    const real t451 = W[26] * d_Rc[5];
+    const real t452 = Rc[5] * d_W[26];
+    const real t453 = t451 + t452;
+    const real t454 = t450 + t453;
+    const real t455 = -t454;
+    d_J_A[25] = t455;
+    const real t456 = W[25] * d_Rc[7];
+    const real t457 = Rc[7] * d_W[25];
+    const real t458 = t456 + t457;
+    const real t459 = W[24] * d_Rc[6];
+    const real t460 = Rc[6] * d_W[24];
+    const real t461 = t459 + t460;
+    const real t462 = t458 + t461;
+    const real t463 = W[26] * d_Rc[8];
+    const real t464 = Rc[8] * d_W[26];
+    const real t465 = t463 + t464;
+    const real t466 = t462 + t465;
+    const real t467 = -t466;
+    d_J_A[26] = t467;
+    const real t468 = Rc[5] * W[26];
+    const real t469 = Rc[3] * W[24];
+    const real t470 = Rc[4] * W[25];
+    const real t471 = t469 + t470;
+    const real t472 = t468 + t471;
+    const real t473 = t472 * d_r_A[2];
+    const real t474 = r_A[2] * t454;
+    const real t475 = t473 + t474;
+    const real t476 = Rc[8] * W[26];
+    const real t477 = Rc[6] * W[24];
+    const real t478 = Rc[7] * W[25];
+    const real t479 = t477 + t478;
+    const real t480 = t476 + t479;
+    const real t481 = t480 * d_r_A[1];
+    const real t482 = r_A[1] * t466;
+    const real t483 = t481 + t482;
+    const real t484 = t475 - t483;
+    const real t485 = W[27] * d_Rc[0];
+    const real t486 = Rc[0] * d_W[27];
+    const real t487 = t485 + t486;
+    const real t488 = t484 - t487;
+    const real t489 = W[28] * d_Rc[1];
+    const real t490 = Rc[1] * d_W[28];
+    const real t491 = t489 + t490;
+    const real t492 = t488 - t491;
+    const real t493 = W[29] * d_Rc[2];
+    const real t494 = Rc[2] * d_W[29];
+    const real t495 = t493 + t494;
+    const real t496 = t492 - t495;
+    d_J_A[27] = t496;
+    const real t497 = t480 * d_r_A[0];
+    const real t498 = r_A[0] * t466;
+    const real t499 = t497 + t498;
+    const real t500 = Rc[2] * W[26];
+    const real t501 = Rc[0] * W[24];
+    const real t502 = Rc[1] * W[25];
+    const real t503 = t501 + t502;
+    const real t504 = t500 + t503;
+    const real t505 = t504 * d_r_A[2];
+    const real t506 = r_A[2] * t442;
+    const real t507 = t505 + t506;
+    const real t508 = t499 - t507;
+    const real t509 = W[27] * d_Rc[3];
+    const real t510 = Rc[3] * d_W[27];
+    const real t511 = t509 + t510;
+    const real t512 = t508 - t511;
+    const real t513 = W[28] * d_Rc[4];
+    const real t514 = Rc[4] * d_W[28];
+    const real t515 = t513 + t514;
+    const real t516 = t512 - t515;
+    const real t517 = W[29] * d_Rc[5];
+    const real t518 = Rc[5] * d_W[29];
+    const real t519 = t517 + t518;
+    const real t520 = t516 - t519;
+    d_J_A[28] = t520;
+    const real t521 = t504 * d_r_A[1];
+    const real t522 = r_A[1] * t442;
+    const real t523 = t521 + t522;
+    const real t524 = t472 * d_r_A[0];
+    const real t525 = r_A[0] * t454;
+    const real t526 = t524 + t525;
+    const real t527 = t523 - t526;
+    const real t528 = W[27] * d_Rc[6];
+    const real t529 = Rc[6] * d_W[27];
+    const real t530 = t528 + t529;
+    const real t531 = t527 - t530;
+    const real t532 = W[28] * d_Rc[7];
+    const real t533 = Rc[7] * d_W[28];
+    const real t534 = t532 + t533;
+    const real t535 = t531 - t534;
+    const real t536 = W[29] * d_Rc[8];
+    const real t537 = Rc[8] * d_W[29];
+    const real t538 = t536 + t537;
+    const real t539 = t535 - t538;
+    d_J_A[29] = t539;
+    const real t540 = W[31] * d_Rc[1];
+    const real t541 = Rc[1] * d_W[31];
+    const real t542 = t540 + t541;
+    const real t543 = W[30] * d_Rc[0];
+    const real t544 = Rc[0] * d_W[30];
+    const real t545 = t543 + t544;
+    const real t546 = t542 + t545;
+    const real t547 = W[32] * d_Rc[2];
+    const real t548 = Rc[2] * d_W[32];
+    const real t549 = t547 + t548;
+    const real t550 = t546 + t549;
+    const real t551 = -t550;
+    d_J_A[30] = t551;
+    const real t552 = W[31] * d_Rc[4];
+    const real t553 = Rc[4] * d_W[31];
+    const real t554 = t552 + t553;
+    const real t555 = W[30] * d_Rc[3];
+    const real t556 = Rc[3] * d_W[30];
+    const real t557 = t555 + t556;
+    const real t558 = t554 + t557;
+    const real t559 = W[32] * d_Rc[5];
+    const real t560 = Rc[5] * d_W[32];
+    const real t561 = t559 + t560;
+    const real t562 = t558 + t561;
+    const real t563 = -t562;
+    d_J_A[31] = t563;
+    const real t564 = W[31] * d_Rc[7];
+    const real t565 = Rc[7] * d_W[31];
+    const real t566 = t564 + t565;
+    const real t567 = W[30] * d_Rc[6];
+    const real t568 = Rc[6] * d_W[30];
+    const real t569 = t567 + t568;
+    const real t570 = t566 + t569;
+    const real t571 = W[32] * d_Rc[8];
+    const real t572 = Rc[8] * d_W[32];
+    const real t573 = t571 + t572;
+    const real t574 = t570 + t573;
+    const real t575 = -t574;
+    d_J_A[32] = t575;
+    const real t576 = Rc[5] * W[32];
+    const real t577 = Rc[3] * W[30];
+    const real t578 = Rc[4] * W[31];
+    const real t579 = t577 + t578;
+    const real t580 = t576 + t579;
+    const real t581 = t580 * d_r_A[2];
+    const real t582 = r_A[2] * t562;
+    const real t583 = t581 + t582;
+    const real t584 = Rc[8] * W[32];
+    const real t585 = Rc[6] * W[30];
+    const real t586 = Rc[7] * W[31];
+    const real t587 = t585 + t586;
+    const real t588 = t584 + t587;
+    const real t589 = t588 * d_r_A[1];
+    const real t590 = r_A[1] * t574;
+    const real t591 = t589 + t590;
+    const real t592 = t583 - t591;
+    const real t593 = W[33] * d_Rc[0];
+    const real t594 = Rc[0] * d_W[33];
+    const real t595 = t593 + t594;
+    const real t596 = t592 - t595;
+    const real t597 = W[34] * d_Rc[1];
+    const real t598 = Rc[1] * d_W[34];
+    const real t599 = t597 + t598;
+    const real t600 = t596 - t599;
+    const real t601 = W[35] * d_Rc[2];
+    const real t602 = Rc[2] * d_W[35];
+    const real t603 = t601 + t602;
+    const real t604 = t600 - t603;
+    d_J_A[33] = t604;
+    const real t605 = t588 * d_r_A[0];
+    const real t606 = r_A[0] * t574;
+    const real t607 = t605 + t606;
+    const real t608 = Rc[2] * W[32];
+    const real t609 = Rc[0] * W[30];
+    const real t610 = Rc[1] * W[31];
+    const real t611 = t609 + t610;
+    const real t612 = t608 + t611;
+    const real t613 = t612 * d_r_A[2];
+    const real t614 = r_A[2] * t550;
+    const real t615 = t613 + t614;
+    const real t616 = t607 - t615;
+    const real t617 = W[33] * d_Rc[3];
+    const real t618 = Rc[3] * d_W[33];
+    const real t619 = t617 + t618;
+    const real t620 = t616 - t619;
+    const real t621 = W[34] * d_Rc[4];
+    const real t622 = Rc[4] * d_W[34];
+    const real t623 = t621 + t622;
+    const real t624 = t620 - t623;
+    const real t625 = W[35] * d_Rc[5];
+    const real t626 = Rc[5] * d_W[35];
+    const real t627 = t625 + t626;
+    const real t628 = t624 - t627;
+    d_J_A[34] = t628;
+    const real t629 = t612 * d_r_A[1];
+    const real t630 = r_A[1] * t550;
+    const real t631 = t629 + t630;
+    const real t632 = t580 * d_r_A[0];
+    const real t633 = r_A[0] * t562;
+    const real t634 = t632 + t633;
+    const real t635 = t631 - t634;
+    const real t636 = W[33] * d_Rc[6];
+    const real t637 = Rc[6] * d_W[33];
+    const real t638 = t636 + t637;
+    const real t639 = t635 - t638;
+    const real t640 = W[34] * d_Rc[7];
+    const real t641 = Rc[7] * d_W[34];
+    const real t642 = t640 + t641;
+    const real t643 = t639 - t642;
+    const real t644 = W[35] * d_Rc[8];
+    const real t645 = Rc[8] * d_W[35];
+    const real t646 = t644 + t645;
+    const real t647 = t643 - t646;
+    d_J_A[35] = t647;
+    const real t648 = R_C[1] * d_W[1];
+    const real t649 = W[1] * d_R_C[1];
+    const real t650 = t648 + t649;
+    const real t651 = R_C[0] * d_W[0];
+    const real t652 = W[0] * d_R_C[0];
+    const real t653 = t651 + t652;
+    const real t654 = t650 + t653;
+    const real t655 = R_C[2] * d_W[2];
+    const real t656 = W[2] * d_R_C[2];
+    const real t657 = t655 + t656;
+    const real t658 = t654 + t657;
+    d_J_B[0] = t658;
+    const real t659 = R_C[4] * d_W[1];
+    const real t660 = W[1] * d_R_C[4];
+    const real t661 = t659 + t660;
+    const real t662 = R_C[3] * d_W[0];
+    const real t663 = W[0] * d_R_C[3];
+    const real t664 = t662 + t663;
+    const real t665 = t661 + t664;
+    const real t666 = R_C[5] * d_W[2];
+    const real t667 = W[2] * d_R_C[5];
+    const real t668 = t666 + t667;
+    const real t669 = t665 + t668;
+    d_J_B[1] = t669;
+    const real t670 = R_C[7] * d_W[1];
+    const real t671 = W[1] * d_R_C[7];
+    const real t672 = t670 + t671;
+    const real t673 = R_C[6] * d_W[0];
+    const real t674 = W[0] * d_R_C[6];
+    const real t675 = t673 + t674;
+    const real t676 = t672 + t675;
+    const real t677 = R_C[8] * d_W[2];
+    const real t678 = W[2] * d_R_C[8];
+    const real t679 = t677 + t678;
+    const real t680 = t676 + t679;
+    d_J_B[2] = t680;
+    const real t681 = r_e[1] * t680;
+    const real t682 = r_e[2] * t669;
+    const real t683 = t681 - t682;
+    const real t684 = R_C[0] * d_W[3];
+    const real t685 = W[3] * d_R_C[0];
+    const real t686 = t684 + t685;
+    const real t687 = t683 + t686;
+    const real t688 = R_C[1] * d_W[4];
+    const real t689 = W[4] * d_R_C[1];
+    const real t690 = t688 + t689;
+    const real t691 = t687 + t690;
+    const real t692 = R_C[2] * d_W[5];
+    const real t693 = W[5] * d_R_C[2];
+    const real t694 = t692 + t693;
+    const real t695 = t691 + t694;
+    d_J_B[3] = t695;
+    const real t696 = r_e[2] * t658;
+    const real t697 = r_e[0] * t680;
+    const real t698 = t696 - t697;
+    const real t699 = R_C[3] * d_W[3];
+    const real t700 = W[3] * d_R_C[3];
+    const real t701 = t699 + t700;
+    const real t702 = t698 + t701;
+    const real t703 = R_C[4] * d_W[4];
+    const real t704 = W[4] * d_R_C[4];
+    const real t705 = t703 + t704;
+    const real t706 = t702 + t705;
+    const real t707 = R_C[5] * d_W[5];
+    const real t708 = W[5] * d_R_C[5];
+    const real t709 = t707 + t708;
+    const real t710 = t706 + t709;
+    d_J_B[4] = t710;
+    const real t711 = r_e[0] * t669;
+    const real t712 = r_e[1] * t658;
+    const real t713 = t711 - t712;
+    const real t714 = R_C[6] * d_W[3];
+    const real t715 = W[3] * d_R_C[6];
+    const real t716 = t714 + t715;
+    const real t717 = t713 + t716;
+    const real t718 = R_C[7] * d_W[4];
+    const real t719 = W[4] * d_R_C[7];
+    const real t720 = t718 + t719;
+    const real t721 = t717 + t720;
+    const real t722 = R_C[8] * d_W[5];
+    const real t723 = W[5] * d_R_C[8];
+    const real t724 = t722 + t723;
+    const real t725 = t721 + t724;
+    d_J_B[5] = t725;
+    const real t726 = R_C[1] * d_W[7];
+    const real t727 = W[7] * d_R_C[1];
+    const real t728 = t726 + t727;
+    const real t729 = R_C[0] * d_W[6];
+    const real t730 = W[6] * d_R_C[0];
+    const real t731 = t729 + t730;
+    const real t732 = t728 + t731;
+    const real t733 = R_C[2] * d_W[8];
+    const real t734 = W[8] * d_R_C[2];
+    const real t735 = t733 + t734;
+    const real t736 = t732 + t735;
+    d_J_B[6] = t736;
+    const real t737 = R_C[4] * d_W[7];
+    const real t738 = W[7] * d_R_C[4];
+    const real t739 = t737 + t738;
+    const real t740 = R_C[3] * d_W[6];
+    const real t741 = W[6] * d_R_C[3];
+    const real t742 = t740 + t741;
+    const real t743 = t739 + t742;
+    const real t744 = R_C[5] * d_W[8];
+    const real t745 = W[8] * d_R_C[5];
+    const real t746 = t744 + t745;
+    const real t747 = t743 + t746;
+    d_J_B[7] = t747;
+    const real t748 = R_C[7] * d_W[7];
+    const real t749 = W[7] * d_R_C[7];
+    const real t750 = t748 + t749;
+    const real t751 = R_C[6] * d_W[6];
+    const real t752 = W[6] * d_R_C[6];
+    const real t753 = t751 + t752;
+    const real t754 = t750 + t753;
+    const real t755 = R_C[8] * d_W[8];
+    const real t756 = W[8] * d_R_C[8];
+    const real t757 = t755 + t756;
+    const real t758 = t754 + t757;
+    d_J_B[8] = t758;
+    const real t759 = r_e[1] * t758;
+    const real t760 = r_e[2] * t747;
+    const real t761 = t759 - t760;
+    const real t762 = R_C[0] * d_W[9];
+    const real t763 = W[9] * d_R_C[0];
+    const real t764 = t762 + t763;
+    const real t765 = t761 + t764;
+    const real t766 = R_C[1] * d_W[10];
+    const real t767 = W[10] * d_R_C[1];
+    const real t768 = t766 + t767;
+    const real t769 = t765 + t768;
+    const real t770 = R_C[2] * d_W[11];
+    const real t771 = W[11] * d_R_C[2];
+    const real t772 = t770 + t771;
+    const real t773 = t769 + t772;
+    d_J_B[9] = t773;
+    const real t774 = r_e[2] * t736;
+    const real t775 = r_e[0] * t758;
+    const real t776 = t774 - t775;
+    const real t777 = R_C[3] * d_W[9];
+    const real t778 = W[9] * d_R_C[3];
+    const real t779 = t777 + t778;
+    const real t780 = t776 + t779;
+    const real t781 = R_C[4] * d_W[10];
+    const real t782 = W[10] * d_R_C[4];
+    const real t783 = t781 + t782;
+    const real t784 = t780 + t783;
+    const real t785 = R_C[5] * d_W[11];
+    const real t786 = W[11] * d_R_C[5];
+    const real t787 = t785 + t786;
+    const real t788 = t784 + t787;
+    d_J_B[10] = t788;
+    const real t789 = r_e[0] * t747;
+    const real t790 = r_e[1] * t736;
+    const real t791 = t789 - t790;
+    const real t792 = R_C[6] * d_W[9];
+    const real t793 = W[9] * d_R_C[6];
+    const real t794 = t792 + t793;
+    const real t795 = t791 + t794;
+    const real t796 = R_C[7] * d_W[10];
+    const real t797 = W[10] * d_R_C[7];
+    const real t798 = t796 + t797;
+    const real t799 = t795 + t798;
+    const real t800 = R_C[8] * d_W[11];
+    const real t801 = W[11] * d_R_C[8];
+    const real t802 = t800 + t801;
+    const real t803 = t799 + t802;
+    d_J_B[11] = t803;
+    const real t804 = R_C[1] * d_W[13];
+    const real t805 = W[13] * d_R_C[1];
+    const real t806 = t804 + t805;
+    const real t807 = R_C[0] * d_W[12];
+    const real t808 = W[12] * d_R_C[0];
+    const real t809 = t807 + t808;
+    const real t810 = t806 + t809;
+    const real t811 = R_C[2] * d_W[14];
+    const real t812 = W[14] * d_R_C[2];
+    const real t813 = t811 + t812;
+    const real t814 = t810 + t813;
+    d_J_B[12] = t814;
+    const real t815 = R_C[4] * d_W[13];
+    const real t816 = W[13] * d_R_C[4];
+    const real t817 = t815 + t816;
+    const real t818 = R_C[3] * d_W[12];
+    const real t819 = W[12] * d_R_C[3];
+    const real t820 = t818 + t819;
+    const real t821 = t817 + t820;
+    const real t822 = R_C[5] * d_W[14];
+    const real t823 = W[14] * d_R_C[5];
+    const real t824 = t822 + t823;
+    const real t825 = t821 + t824;
+    d_J_B[13] = t825;
+    const real t826 = R_C[7] * d_W[13];
+    const real t827 = W[13] * d_R_C[7];
+    const real t828 = t826 + t827;
+    const real t829 = R_C[6] * d_W[12];
+    const real t830 = W[12] * d_R_C[6];
+    const real t831 = t829 + t830;
+    const real t832 = t828 + t831;
+    const real t833 = R_C[8] * d_W[14];
+    const real t834 = W[14] * d_R_C[8];
+    const real t835 = t833 + t834;
+    const real t836 = t832 + t835;
+    d_J_B[14] = t836;
+    const real t837 = r_e[1] * t836;
+    const real t838 = r_e[2] * t825;
+    const real t839 = t837 - t838;
+    const real t840 = R_C[0] * d_W[15];
+    const real t841 = W[15] * d_R_C[0];
+    const real t842 = t840 + t841;
+    const real t843 = t839 + t842;
+    const real t844 = R_C[1] * d_W[16];
+    const real t845 = W[16] * d_R_C[1];
+    const real t846 = t844 + t845;
+    const real t847 = t843 + t846;
+    const real t848 = R_C[2] * d_W[17];
+    const real t849 = W[17] * d_R_C[2];
+    const real t850 = t848 + t849;
+    const real t851 = t847 + t850;
+    d_J_B[15] = t851;
+    const real t852 = r_e[2] * t814;
+    const real t853 = r_e[0] * t836;
+    const real t854 = t852 - t853;
+    const real t855 = R_C[3] * d_W[15];
+    const real t856 = W[15] * d_R_C[3];
+    const real t857 = t855 + t856;
+    const real t858 = t854 + t857;
+    const real t859 = R_C[4] * d_W[16];
+    const real t860 = W[16] * d_R_C[4];
+    const real t861 = t859 + t860;
+    const real t862 = t858 + t861;
+    const real t863 = R_C[5] * d_W[17];
+    const real t864 = W[17] * d_R_C[5];
+    const real t865 = t863 + t864;
+    const real t866 = t862 + t865;
+    d_J_B[16] = t866;
+    const real t867 = r_e[0] * t825;
+    const real t868 = r_e[1] * t814;
+    const real t869 = t867 - t868;
+    const real t870 = R_C[6] * d_W[15];
+    const real t871 = W[15] * d_R_C[6];
+    const real t872 = t870 + t871;
+    const real t873 = t869 + t872;
+    const real t874 = R_C[7] * d_W[16];
+    const real t875 = W[16] * d_R_C[7];
+    const real t876 = t874 + t875;
+    const real t877 = t873 + t876;
+    const real t878 = R_C[8] * d_W[17];
+    const real t879 = W[17] * d_R_C[8];
+    const real t880 = t878 + t879;
+    const real t881 = t877 + t880;
+    d_J_B[17] = t881;
+    const real t882 = R_C[1] * d_W[19];
+    const real t883 = W[19] * d_R_C[1];
+    const real t884 = t882 + t883;
+    const real t885 = R_C[0] * d_W[18];
+    const real t886 = W[18] * d_R_C[0];
+    const real t887 = t885 + t886;
+    const real t888 = t884 + t887;
+    const real t889 = R_C[2] * d_W[20];
+    const real t890 = W[20] * d_R_C[2];
+    const real t891 = t889 + t890;
+    const real t892 = t888 + t891;
+    d_J_B[18] = t892;
+    const real t893 = R_C[4] * d_W[19];
+    const real t894 = W[19] * d_R_C[4];
+    const real t895 = t893 + t894;
+    const real t896 = R_C[3] * d_W[18];
+    const real t897 = W[18] * d_R_C[3];
+    const real t898 = t896 + t897;
+    const real t899 = t895 + t898;
+    const real t900 = R_C[5] * d_W[20];
+    const real t901 = W[20] * d_R_C[5];
+    const real t902 = t900 + t901;
+    const real t903 = t899 + t902;
+    d_J_B[19] = t903;
+    const real t904 = R_C[7] * d_W[19];
+    const real t905 = W[19] * d_R_C[7];
+    const real t906 = t904 + t905;
+    const real t907 = R_C[6] * d_W[18];
+    const real t908 = W[18] * d_R_C[6];
+    const real t909 = t907 + t908;
+    const real t910 = t906 + t909;
+    const real t911 = R_C[8] * d_W[20];
+    const real t912 = W[20] * d_R_C[8];
+    const real t913 = t911 + t912;
+    const real t914 = t910 + t913;
+    d_J_B[20] = t914;
+    const real t915 = r_e[1] * t914;
+    const real t916 = r_e[2] * t903;
+    const real t917 = t915 - t916;
+    const real t918 = R_C[0] * d_W[21];
+    const real t919 = W[21] * d_R_C[0];
+    const real t920 = t918 + t919;
+    const real t921 = t917 + t920;
+    const real t922 = R_C[1] * d_W[22];
+    const real t923 = W[22] * d_R_C[1];
+    const real t924 = t922 + t923;
+    const real t925 = t921 + t924;
+    const real t926 = R_C[2] * d_W[23];
+    const real t927 = W[23] * d_R_C[2];
+    const real t928 = t926 + t927;
+    const real t929 = t925 + t928;
+    d_J_B[21] = t929;
+    const real t930 = r_e[2] * t892;
+    const real t931 = r_e[0] * t914;
+    const real t932 = t930 - t931;
+    const real t933 = R_C[3] * d_W[21];
+    const real t934 = W[21] * d_R_C[3];
+    const real t935 = t933 + t934;
+    const real t936 = t932 + t935;
+    const real t937 = R_C[4] * d_W[22];
+    const real t938 = W[22] * d_R_C[4];
+    const real t939 = t937 + t938;
+    const real t940 = t936 + t939;
+    const real t941 = R_C[5] * d_W[23];
+    const real t942 = W[23] * d_R_C[5];
+    const real t943 = t941 + t942;
+    const real t944 = t940 + t943;
+    d_J_B[22] = t944;
+    const real t945 = r_e[0] * t903;
+    const real t946 = r_e[1] * t892;
+    const real t947 = t945 - t946;
+    const real t948 = R_C[6] * d_W[21];
+    const real t949 = W[21] * d_R_C[6];
+    const real t950 = t948 + t949;
+    const real t951 = t947 + t950;
+    const real t952 = R_C[7] * d_W[22];
+    const real t953 = W[22] * d_R_C[7];
+    const real t954 = t952 + t953;
+    const real t955 = t951 + t954;
+    const real t956 = R_C[8] * d_W[23];
+    const real t957 = W[23] * d_R_C[8];
+    const real t958 = t956 + t957;
+    const real t959 = t955 + t958;
+    d_J_B[23] = t959;
+    const real t960 = R_C[1] * d_W[25];
+    const real t961 = W[25] * d_R_C[1];
+    const real t962 = t960 + t961;
+    const real t963 = R_C[0] * d_W[24];
+    const real t964 = W[24] * d_R_C[0];
+    const real t965 = t963 + t964;
+    const real t966 = t962 + t965;
+    const real t967 = R_C[2] * d_W[26];
+    const real t968 = W[26] * d_R_C[2];
+    const real t969 = t967 + t968;
+    const real t970 = t966 + t969;
+    d_J_B[24] = t970;
+    const real t971 = R_C[4] * d_W[25];
+    const real t972 = W[25] * d_R_C[4];
+    const real t973 = t971 + t972;
+    const real t974 = R_C[3] * d_W[24];
+    const real t975 = W[24] * d_R_C[3];
+    const real t976 = t974 + t975;
+    const real t977 = t973 + t976;
+    const real t978 = R_C[5] * d_W[26];
+    const real t979 = W[26] * d_R_C[5];
+    const real t980 = t978 + t979;
+    const real t981 = t977 + t980;
+    d_J_B[25] = t981;
+    const real t982 = R_C[7] * d_W[25];
+    const real t983 = W[25] * d_R_C[7];
+    const real t984 = t982 + t983;
+    const real t985 = R_C[6] * d_W[24];
+    const real t986 = W[24] * d_R_C[6];
+    const real t987 = t985 + t986;
+    const real t988 = t984 + t987;
+    const real t989 = R_C[8] * d_W[26];
+    const real t990 = W[26] * d_R_C[8];
+    const real t991 = t989 + t990;
+    const real t992 = t988 + t991;
+    d_J_B[26] = t992;
+    const real t993 = r_e[1] * t992;
+    const real t994 = r_e[2] * t981;
+    const real t995 = t993 - t994;
+    const real t996 = R_C[0] * d_W[27];
+    const real t997 = W[27] * d_R_C[0];
+    const real t998 = t996 + t997;
+    const real t999 = t995 + t998;
+    const real t1000 = R_C[1] * d_W[28];
+    const real t1001 = W[28] * d_R_C[1];
+    const real t1002 = t1000 + t1001;
+    const real t1003 = t999 + t1002;
+    const real t1004 = R_C[2] * d_W[29];
+    const real t1005 = W[29] * d_R_C[2];
+    const real t1006 = t1004 + t1005;
+    const real t1007 = t1003 + t1006;
+    d_J_B[27] = t1007;
+    const real t1008 = r_e[2] * t970;
+    const real t1009 = r_e[0] * t992;
+    const real t1010 = t1008 - t1009;
+    const real t1011 = R_C[3] * d_W[27];
+    const real t1012 = W[27] * d_R_C[3];
+    const real t1013 = t1011 + t1012;
+    const real t1014 = t1010 + t1013;
+    const real t1015 = R_C[4] * d_W[28];
+    const real t1016 = W[28] * d_R_C[4];
+    const real t1017 = t1015 + t1016;
+    const real t1018 = t1014 + t1017;
+    const real t1019 = R_C[5] * d_W[29];
+    const real t1020 = W[29] * d_R_C[5];
+    const real t1021 = t1019 + t1020;
+    const real t1022 = t1018 + t1021;
+    d_J_B[28] = t1022;
+    const real t1023 = r_e[0] * t981;
+    const real t1024 = r_e[1] * t970;
+    const real t1025 = t1023 - t1024;
+    const real t1026 = R_C[6] * d_W[27];
+    const real t1027 = W[27] * d_R_C[6];
+    const real t1028 = t1026 + t1027;
+    const real t1029 = t1025 + t1028;
+    const real t1030 = R_C[7] * d_W[28];
+    const real t1031 = W[28] * d_R_C[7];
+    const real t1032 = t1030 + t1031;
+    const real t1033 = t1029 + t1032;
+    const real t1034 = R_C[8] * d_W[29];
+    const real t1035 = W[29] * d_R_C[8];
+    const real t1036 = t1034 + t1035;
+    const real t1037 = t1033 + t1036;
+    d_J_B[29] = t1037;
+    const real t1038 = R_C[1] * d_W[31];
+    const real t1039 = W[31] * d_R_C[1];
+    const real t1040 = t1038 + t1039;
+    const real t1041 = R_C[0] * d_W[30];
+    const real t1042 = W[30] * d_R_C[0];
+    const real t1043 = t1041 + t1042;
+    const real t1044 = t1040 + t1043;
+    const real t1045 = R_C[2] * d_W[32];
+    const real t1046 = W[32] * d_R_C[2];
+    const real t1047 = t1045 + t1046;
+    const real t1048 = t1044 + t1047;
+    d_J_B[30] = t1048;
+    const real t1049 = R_C[4] * d_W[31];
+    const real t1050 = W[31] * d_R_C[4];
+    const real t1051 = t1049 + t1050;
+    const real t1052 = R_C[3] * d_W[30];
+    const real t1053 = W[30] * d_R_C[3];
+    const real t1054 = t1052 + t1053;
+    const real t1055 = t1051 + t1054;
+    const real t1056 = R_C[5] * d_W[32];
+    const real t1057 = W[32] * d_R_C[5];
+    const real t1058 = t1056 + t1057;
+    const real t1059 = t1055 + t1058;
+    d_J_B[31] = t1059;
+    const real t1060 = R_C[7] * d_W[31];
+    const real t1061 = W[31] * d_R_C[7];
+    const real t1062 = t1060 + t1061;
+    const real t1063 = R_C[6] * d_W[30];
+    const real t1064 = W[30] * d_R_C[6];
+    const real t1065 = t1063 + t1064;
+    const real t1066 = t1062 + t1065;
+    const real t1067 = R_C[8] * d_W[32];
+    const real t1068 = W[32] * d_R_C[8];
+    const real t1069 = t1067 + t1068;
+    const real t1070 = t1066 + t1069;
+    d_J_B[32] = t1070;
+    const real t1071 = r_e[1] * t1070;
+    const real t1072 = r_e[2] * t1059;
+    const real t1073 = t1071 - t1072;
+    const real t1074 = R_C[0] * d_W[33];
+    const real t1075 = W[33] * d_R_C[0];
+    const real t1076 = t1074 + t1075;
+    const real t1077 = t1073 + t1076;
+    const real t1078 = R_C[1] * d_W[34];
+    const real t1079 = W[34] * d_R_C[1];
+    const real t1080 = t1078 + t1079;
+    const real t1081 = t1077 + t1080;
+    const real t1082 = R_C[2] * d_W[35];
+    const real t1083 = W[35] * d_R_C[2];
+    const real t1084 = t1082 + t1083;
+    const real t1085 = t1081 + t1084;
+    d_J_B[33] = t1085;
+    const real t1086 = r_e[2] * t1048;
+    const real t1087 = r_e[0] * t1070;
+    const real t1088 = t1086 - t1087;
+    const real t1089 = R_C[3] * d_W[33];
+    const real t1090 = W[33] * d_R_C[3];
+    const real t1091 = t1089 + t1090;
+    const real t1092 = t1088 + t1091;
+    const real t1093 = R_C[4] * d_W[34];
+    const real t1094 = W[34] * d_R_C[4];
+    const real t1095 = t1093 + t1094;
+    const real t1096 = t1092 + t1095;
+    const real t1097 = R_C[5] * d_W[35];
+    const real t1098 = W[35] * d_R_C[5];
+    const real t1099 = t1097 + t1098;
+    const real t1100 = t1096 + t1099;
+    d_J_B[34] = t1100;
+    const real t1101 = r_e[0] * t1059;
+    const real t1102 = r_e[1] * t1048;
+    const real t1103 = t1101 - t1102;
+    const real t1104 = R_C[6] * d_W[33];
+    const real t1105 = W[33] * d_R_C[6];
+    const real t1106 = t1104 + t1105;
+    const real t1107 = t1103 + t1106;
+    const real t1108 = R_C[7] * d_W[34];
+    const real t1109 = W[34] * d_R_C[7];
+    const real t1110 = t1108 + t1109;
+    const real t1111 = t1107 + t1110;
+    const real t1112 = R_C[8] * d_W[35];
+    const real t1113 = W[35] * d_R_C[8];
+    const real t1114 = t1112 + t1113;
+    const real t1115 = t1111 + t1114;
+    d_J_B[35] = t1115;
+    const real t1116 = relative[5] * d_W[5];
+    const real t1117 = W[5] * d_relative[5];
+    const real t1118 = t1116 + t1117;
+    const real t1119 = relative[4] * d_W[4];
+    const real t1120 = W[4] * d_relative[4];
+    const real t1121 = t1119 + t1120;
+    const real t1122 = relative[3] * d_W[3];
+    const real t1123 = W[3] * d_relative[3];
+    const real t1124 = t1122 + t1123;
+    const real t1125 = relative[2] * d_W[2];
+    const real t1126 = W[2] * d_relative[2];
+    const real t1127 = t1125 + t1126;
+    const real t1128 = relative[1] * d_W[1];
+    const real t1129 = W[1] * d_relative[1];
+    const real t1130 = t1128 + t1129;
+    const real t1131 = relative[0] * d_W[0];
+    const real t1132 = W[0] * d_relative[0];
+    const real t1133 = t1131 + t1132;
+    const real t1134 = t1130 + t1133;
+    const real t1135 = t1127 + t1134;
+    const real t1136 = t1124 + t1135;
+    const real t1137 = t1121 + t1136;
+    const real t1138 = t1118 + t1137;
+    d_l[0] = t1138;
+    const real t1139 = relative[5] * d_W[11];
+    const real t1140 = W[11] * d_relative[5];
+    const real t1141 = t1139 + t1140;
+    const real t1142 = relative[4] * d_W[10];
+    const real t1143 = W[10] * d_relative[4];
+    const real t1144 = t1142 + t1143;
+    const real t1145 = relative[3] * d_W[9];
+    const real t1146 = W[9] * d_relative[3];
+    const real t1147 = t1145 + t1146;
+    const real t1148 = relative[2] * d_W[8];
+    const real t1149 = W[8] * d_relative[2];
+    const real t1150 = t1148 + t1149;
+    const real t1151 = relative[1] * d_W[7];
+    const real t1152 = W[7] * d_relative[1];
+    const real t1153 = t1151 + t1152;
+    const real t1154 = relative[0] * d_W[6];
+    const real t1155 = W[6] * d_relative[0];
+    const real t1156 = t1154 + t1155;
+    const real t1157 = t1153 + t1156;
+    const real t1158 = t1150 + t1157;
+    const real t1159 = t1147 + t1158;
+    const real t1160 = t1144 + t1159;
+    const real t1161 = t1141 + t1160;
+    d_l[1] = t1161;
+    const real t1162 = relative[5] * d_W[17];
+    const real t1163 = W[17] * d_relative[5];
+    const real t1164 = t1162 + t1163;
+    const real t1165 = relative[4] * d_W[16];
+    const real t1166 = W[16] * d_relative[4];
+    const real t1167 = t1165 + t1166;
+    const real t1168 = relative[3] * d_W[15];
+    const real t1169 = W[15] * d_relative[3];
+    const real t1170 = t1168 + t1169;
+    const real t1171 = relative[2] * d_W[14];
+    const real t1172 = W[14] * d_relative[2];
+    const real t1173 = t1171 + t1172;
+    const real t1174 = relative[1] * d_W[13];
+    const real t1175 = W[13] * d_relative[1];
+    const real t1176 = t1174 + t1175;
+    const real t1177 = relative[0] * d_W[12];
+    const real t1178 = W[12] * d_relative[0];
+    const real t1179 = t1177 + t1178;
+    const real t1180 = t1176 + t1179;
+    const real t1181 = t1173 + t1180;
+    const real t1182 = t1170 + t1181;
+    const real t1183 = t1167 + t1182;
+    const real t1184 = t1164 + t1183;
+    d_l[2] = t1184;
+    const real t1185 = relative[5] * d_W[23];
+    const real t1186 = W[23] * d_relative[5];
+    const real t1187 = t1185 + t1186;
+    const real t1188 = relative[4] * d_W[22];
+    const real t1189 = W[22] * d_relative[4];
+    const real t1190 = t1188 + t1189;
+    const real t1191 = relative[3] * d_W[21];
+    const real t1192 = W[21] * d_relative[3];
+    const real t1193 = t1191 + t1192;
+    const real t1194 = relative[2] * d_W[20];
+    const real t1195 = W[20] * d_relative[2];
+    const real t1196 = t1194 + t1195;
+    const real t1197 = relative[1] * d_W[19];
+    const real t1198 = W[19] * d_relative[1];
+    const real t1199 = t1197 + t1198;
+    const real t1200 = relative[0] * d_W[18];
+    const real t1201 = W[18] * d_relative[0];
+    const real t1202 = t1200 + t1201;
+    const real t1203 = t1199 + t1202;
+    const real t1204 = t1196 + t1203;
+    const real t1205 = t1193 + t1204;
+    const real t1206 = t1190 + t1205;
+    const real t1207 = t1187 + t1206;
+    d_l[3] = t1207;
+    const real t1208 = relative[5] * d_W[29];
+    const real t1209 = W[29] * d_relative[5];
+    const real t1210 = t1208 + t1209;
+    const real t1211 = relative[4] * d_W[28];
+    const real t1212 = W[28] * d_relative[4];
+    const real t1213 = t1211 + t1212;
+    const real t1214 = relative[3] * d_W[27];
+    const real t1215 = W[27] * d_relative[3];
+    const real t1216 = t1214 + t1215;
+    const real t1217 = relative[2] * d_W[26];
+    const real t1218 = W[26] * d_relative[2];
+    const real t1219 = t1217 + t1218;
+    const real t1220 = relative[1] * d_W[25];
+    const real t1221 = W[25] * d_relative[1];
+    const real t1222 = t1220 + t1221;
+    const real t1223 = relative[0] * d_W[24];
+    const real t1224 = W[24] * d_relative[0];
+    const real t1225 = t1223 + t1224;
+    const real t1226 = t1222 + t1225;
+    const real t1227 = t1219 + t1226;
+    const real t1228 = t1216 + t1227;
+    const real t1229 = t1213 + t1228;
+    const real t1230 = t1210 + t1229;
+    d_l[4] = t1230;
+    const real t1231 = relative[5] * d_W[35];
+    const real t1232 = W[35] * d_relative[5];
+    const real t1233 = t1231 + t1232;
+    const real t1234 = relative[4] * d_W[34];
+    const real t1235 = W[34] * d_relative[4];
+    const real t1236 = t1234 + t1235;
+    const real t1237 = relative[3] * d_W[33];
+    const real t1238 = W[33] * d_relative[3];
+    const real t1239 = t1237 + t1238;
+    const real t1240 = relative[2] * d_W[32];
+    const real t1241 = W[32] * d_relative[2];
+    const real t1242 = t1240 + t1241;
+    const real t1243 = relative[1] * d_W[31];
+    const real t1244 = W[31] * d_relative[1];
+    const real t1245 = t1243 + t1244;
+    const real t1246 = relative[0] * d_W[30];
+    const real t1247 = W[30] * d_relative[0];
+    const real t1248 = t1246 + t1247;
+    const real t1249 = t1245 + t1248;
+    const real t1250 = t1242 + t1249;
+    const real t1251 = t1239 + t1250;
+    const real t1252 = t1236 + t1251;
+    const real t1253 = t1233 + t1252;
+    d_l[5] = t1253;
+    return 0;
+}
+
+static int mstmm_sweep_loops_rows_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_rows_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_loops_rows_slope_inputs[] = {
+    {"W", 36, "", 0, 0},
+    {"R_C", 9, "", 0, 0},
+    {"r_e", 3, "m", 0, 0},
+    {"Rc", 9, "", 0, 0},
+    {"r_A", 3, "m", 0, 0},
+    {"relative", 6, "", 0, 0},
+    {"d_W", 36, "", 0, 0},
+    {"d_R_C", 9, "", 0, 0},
+    {"d_Rc", 9, "", 0, 0},
+    {"d_r_A", 3, "m", 0, 0},
+    {"d_relative", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_rows_slope_outputs[] = {
+    {"d_J_A", 36, "", 0, 0},
+    {"d_J_B", 36, "", 0, 0},
+    {"d_l", 6, "", 0, 0},
+};
+
+/* act and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  J[6] load of an effort of one
+ * in  tau[1] (N, N*m) effort
+ * in  d_J[6] derivative of J
+ * in  d_tau[1] (N, N*m) derivative of tau
+ * out d_e[6] (N, N*m) derivative of e, added to what is there
+ */
+int mstmm_sweep_loops_act_slope(const real *restrict J, const real *restrict tau,
+    const real *restrict d_J, const real *restrict d_tau, real *restrict d_e)
+{
+    const real t0 = tau[0] * d_J[0];
+    const real t1 = J[0] * d_tau[0];
+    const real t2 = t0 + t1;
+    const real t3 = -t2;
+    d_e[0] += t3;
+    const real t4 = J[1] * d_tau[0];
+    const real t5 = tau[0] * d_J[1];
+    const real t6 = t4 + t5;
+    const real t7 = -t6;
+    d_e[1] += t7;
+    const real t8 = J[2] * d_tau[0];
+    const real t9 = tau[0] * d_J[2];
+    const real t10 = t8 + t9;
+    const real t11 = -t10;
+    d_e[2] += t11;
+    const real t12 = J[3] * d_tau[0];
+    const real t13 = tau[0] * d_J[3];
+    const real t14 = t12 + t13;
+    const real t15 = -t14;
+    d_e[3] += t15;
+    const real t16 = J[4] * d_tau[0];
+    const real t17 = tau[0] * d_J[4];
+    const real t18 = t16 + t17;
+    const real t19 = -t18;
+    d_e[4] += t19;
+    const real t20 = J[5] * d_tau[0];
+    const real t21 = tau[0] * d_J[5];
+    const real t22 = t20 + t21;
+    const real t23 = -t22;
+    d_e[5] += t23;
+    return 0;
+}
+
+static int mstmm_sweep_loops_act_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_act_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_act_slope_inputs[] = {
+    {"J", 6, "", 0, 0},
+    {"tau", 1, "N, N*m", 0, 0},
+    {"d_J", 6, "", 0, 0},
+    {"d_tau", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_act_slope_outputs[] = {
+    {"d_e", 6, "N, N*m", 1, 0},
+};
+
+/* loaded and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  K[6] column of the row, at P of the body that it is seen from
+ * in  x[1] (N, N*m) multiplier
+ * in  d_K[6] derivative of K
+ * in  d_x[1] (N, N*m) derivative of x
+ * out d_e[6] derivative of e, added to what is there
+ */
+int mstmm_sweep_loops_loaded_slope(const real *restrict K, const real *restrict x,
+    const real *restrict d_K, const real *restrict d_x, real *restrict d_e)
+{
+    const real t0 = x[0] * d_K[0];
+    const real t1 = K[0] * d_x[0];
+    const real t2 = t0 + t1;
+    d_e[0] += t2;
+    const real t3 = K[1] * d_x[0];
+    const real t4 = x[0] * d_K[1];
+    const real t5 = t3 + t4;
+    d_e[1] += t5;
+    const real t6 = K[2] * d_x[0];
+    const real t7 = x[0] * d_K[2];
+    const real t8 = t6 + t7;
+    d_e[2] += t8;
+    const real t9 = K[3] * d_x[0];
+    const real t10 = x[0] * d_K[3];
+    const real t11 = t9 + t10;
+    d_e[3] += t11;
+    const real t12 = K[4] * d_x[0];
+    const real t13 = x[0] * d_K[4];
+    const real t14 = t12 + t13;
+    d_e[4] += t14;
+    const real t15 = K[5] * d_x[0];
+    const real t16 = x[0] * d_K[5];
+    const real t17 = t15 + t16;
+    d_e[5] += t17;
+    return 0;
+}
+
+static int mstmm_sweep_loops_loaded_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_loaded_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_loaded_slope_inputs[] = {
+    {"K", 6, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+    {"d_K", 6, "", 0, 0},
+    {"d_x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_loaded_slope_outputs[] = {
+    {"d_e", 6, "", 1, 0},
 };
 
 static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
@@ -1969,18 +4299,6 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "yielded",
-        .function = (void (*)(void))mstmm_sweep_loops_yielded,
-        .call = mstmm_sweep_loops_yielded_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_yielded_inputs,
-        .outputs = mstmm_sweep_loops_yielded_outputs,
-        .ir_hash = "baaae1f5fc4da35685307e2a7b399631d64e8f5994e34c7bf54b7d71f1494e5d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
         .name = "loaded",
         .function = (void (*)(void))mstmm_sweep_loops_loaded,
         .call = mstmm_sweep_loops_loaded_call,
@@ -1992,13 +4310,85 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "gap_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_gap_slope,
+        .call = mstmm_sweep_loops_gap_slope_call,
+        .n_inputs = 14,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_loops_gap_slope_inputs,
+        .outputs = mstmm_sweep_loops_gap_slope_outputs,
+        .ir_hash = "78ab5c623d83c8b29bb13c5c6760972a129fc38630cdc9a00a1b33ac30d247b4",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "slip_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_slip_slope,
+        .call = mstmm_sweep_loops_slip_slope_call,
+        .n_inputs = 13,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_slip_slope_inputs,
+        .outputs = mstmm_sweep_loops_slip_slope_outputs,
+        .ir_hash = "423da2aa958ec8c67333d1b5f32c4635ba89d940ba6b3f08738aa20909b3298a",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "drift_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_drift_slope,
+        .call = mstmm_sweep_loops_drift_slope_call,
+        .n_inputs = 11,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_drift_slope_inputs,
+        .outputs = mstmm_sweep_loops_drift_slope_outputs,
+        .ir_hash = "d1a2b73b1dd95dc575f8b7d73ca0f8e47e54e4df5e24550fed0482eef184f7f5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "rows_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_rows_slope,
+        .call = mstmm_sweep_loops_rows_slope_call,
+        .n_inputs = 11,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_loops_rows_slope_inputs,
+        .outputs = mstmm_sweep_loops_rows_slope_outputs,
+        .ir_hash = "199e11047479b830f9a4bb29adcc4715c1770c05826d97bc9d34aef52e77fca9",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "act_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_act_slope,
+        .call = mstmm_sweep_loops_act_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_act_slope_inputs,
+        .outputs = mstmm_sweep_loops_act_slope_outputs,
+        .ir_hash = "76d5eb4f8f1057d5f1549b215d42ae0a8416fd19558daf580ca5edbe872e5ec7",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "loaded_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_loaded_slope,
+        .call = mstmm_sweep_loops_loaded_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_loaded_slope_inputs,
+        .outputs = mstmm_sweep_loops_loaded_slope_outputs,
+        .ir_hash = "05b3a17bc0f74e44cfbc84240a25807b65ec73ec5aad3484d1cccabee4faed8b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_loops = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "loops",
-    .hash = "bc2683371360dee8d00dc1ea649afef00c7cb01a43bc0c8d65c598c187824f6e",
+    .hash = "1723808e4f5e56b4e21a3eeecb05fc2f3ea430cd193f9cd03d1a6dab5af1c816",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2008,6 +4398,6 @@ const mstmm_element mstmm_sweep_loops = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 13,
+    .n_kernels = 18,
     .kernels = mstmm_sweep_loops_kernels,
 };

@@ -169,6 +169,16 @@ mstmm_generic_effort_slope_kernel *const mstmm_generic_effort_slope_table[] = {
     mstmm_sweep_generic6_effort_slope,
 };
 
+mstmm_generic_complement_slope_kernel *const mstmm_generic_complement_slope_table[] = {
+    mstmm_sweep_generic0_complement_slope,
+    mstmm_sweep_generic1_complement_slope,
+    mstmm_sweep_generic2_complement_slope,
+    mstmm_sweep_generic3_complement_slope,
+    mstmm_sweep_generic4_complement_slope,
+    mstmm_sweep_generic5_complement_slope,
+    mstmm_sweep_generic6_complement_slope,
+};
+
 mstmm_generic_tangent_carrier_kernel *const mstmm_generic_tangent_carrier_table[] = {
     mstmm_sweep_generic0_tangent_carrier,
     mstmm_sweep_generic1_tangent_carrier,
@@ -1141,7 +1151,7 @@ static int mstmm_at_carried(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_aside(state, index)) return 0;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
     for (int r = looped->first_row; r < looped->first_row + looped->n_rows; r++) {
         code = mstmm_at_row_closed(state, r);
         if (code) return code;
@@ -1229,7 +1239,7 @@ static int mstmm_at_answered(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_aside(state, index)) return 0;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
         if (!body->section && speeds) {
@@ -1347,6 +1357,71 @@ static int mstmm_at_drive_power(mstmm_state *state, int index)
         mstmm_frames_speed_power(
             .tau = driven, .u = state->u + body->u + k, .P = P);
         state->balance->power += P[0];
+    }
+    return 0;
+}
+
+/* Rows of a hinge that closes a loop, and all the load that it puts on its bodies. */
+static int mstmm_at_closures_loaded(mstmm_state *state, int index)
+{
+    real drift[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    const mstmm_closure *closure = looped->closure;
+    real *outboard = closure ? mstmm_block(state->model, state->workspace, closure->outboard) : NULL;
+    real *loops = state->workspace + state->model->loops;
+    real *closed = closure ? loops + closure->numbers : NULL;
+    int code;
+    if (!looped->closure) return 0;
+    if (!body->generic) {
+        code = mstmm_at_hinge_motion(state, index);
+        if (code) return code;
+    }
+    code = mstmm_generic_complement(nu,
+        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .W = closed + MSTMM_CLOSURE_W);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
+    mstmm_loops_gap(
+        .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
+        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .R_e = closure->turn,
+        .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .R_C = closed + MSTMM_CLOSURE_R_C, .r_A = closed + MSTMM_CLOSURE_LEVER,
+        .d = closed + MSTMM_CLOSURE_D, .gap = closed + MSTMM_CLOSURE_GAP);
+    mstmm_loops_slip(
+        .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
+        .v_C = block + MSTMM_BLOCK_V, .w_C = block + MSTMM_BLOCK_MOTION,
+        .v_B = outboard + MSTMM_BLOCK_V, .w_B = outboard + MSTMM_BLOCK_MOTION,
+        .slip = closed + MSTMM_CLOSURE_SLIP);
+    mstmm_loops_drift(
+        .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
+        .slip = closed + MSTMM_CLOSURE_SLIP, .motion_C = block + MSTMM_BLOCK_MOTION,
+        .motion_B = outboard + MSTMM_BLOCK_MOTION, .drift = drift);
+    mstmm_loops_rows(
+        .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
+        .Rc = block + MSTMM_BLOCK_R, .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = drift,
+        .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
+        .l = closed + MSTMM_CLOSURE_L);
+    for (int k = 0; k < body->nu; k++) {
+        mstmm_loops_act(
+            .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = parent + MSTMM_BLOCK_E);
+        mstmm_loops_act(
+            .J = closed + MSTMM_CLOSURE_J_B + 6 * k,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
+            .e = outboard + MSTMM_BLOCK_E);
+    }
+    for (int c = 0; c < 6; c++) {
+        if (closure->rows[c] < 0) continue;
+        mstmm_loops_loaded(
+            .K = closed + MSTMM_CLOSURE_J_A + 6 * c,
+            .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
+            .e = parent + MSTMM_BLOCK_E);
+        mstmm_loops_loaded(
+            .K = closed + MSTMM_CLOSURE_J_B + 6 * c,
+            .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
+            .e = outboard + MSTMM_BLOCK_E);
     }
     return 0;
 }
@@ -2039,6 +2114,95 @@ static int mstmm_at_forces_slope(mstmm_state *state, int index)
         .A = from + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_f, .F = F_back,
         .M = M_back, .d_A = d_from + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = d_F_back,
         .d_M = d_M_back, .d_e = d_from + MSTMM_BLOCK_E);
+    return 0;
+}
+
+/* Derivatives: rows of a hinge that closes a loop, and all the load that it puts on its bodies. */
+static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
+{
+    real drift[6];
+    real d_drift[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    const mstmm_closure *closure = looped->closure;
+    real *outboard = closure ? mstmm_block(state->model, state->workspace, closure->outboard) : NULL;
+    real *loops = state->workspace + state->model->loops;
+    real *closed = closure ? loops + closure->numbers : NULL;
+    real *d_block = state->slope->workspace + body->block;
+    real *d_parent = mstmm_block(state->model, state->slope->workspace, body->parent);
+    real *d_outboard = closure ? mstmm_block(state->model, state->slope->workspace, closure->outboard) : NULL;
+    real *d_loops = state->slope->workspace + state->model->loops;
+    real *d_closed = closure ? d_loops + closure->numbers : NULL;
+    if (!looped->closure) return 0;
+    mstmm_generic_complement_slope(nu,
+        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+        .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H), .d_W = d_closed + MSTMM_CLOSURE_W);
+    mstmm_loops_gap_slope(
+        .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
+        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .R_e = closure->turn,
+        .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .d_A_C = d_block + MSTMM_BLOCK_A, .d_x_C = d_block + MSTMM_BLOCK_X,
+        .d_A_B = d_outboard + MSTMM_BLOCK_A, .d_x_B = d_outboard + MSTMM_BLOCK_X,
+        .d_Rc = d_block + MSTMM_BLOCK_R, .d_r = d_block + MSTMM_BLOCK_SHIFT,
+        .d_R_C = d_closed + MSTMM_CLOSURE_R_C, .d_r_A = d_closed + MSTMM_CLOSURE_LEVER,
+        .d_d = d_closed + MSTMM_CLOSURE_D);
+    mstmm_loops_slip_slope(
+        .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
+        .v_C = block + MSTMM_BLOCK_V, .w_C = block + MSTMM_BLOCK_MOTION,
+        .v_B = outboard + MSTMM_BLOCK_V, .w_B = outboard + MSTMM_BLOCK_MOTION,
+        .d_R_C = d_closed + MSTMM_CLOSURE_R_C, .d_d = d_closed + MSTMM_CLOSURE_D,
+        .d_v_C = d_block + MSTMM_BLOCK_V, .d_w_C = d_block + MSTMM_BLOCK_MOTION,
+        .d_v_B = d_outboard + MSTMM_BLOCK_V, .d_w_B = d_outboard + MSTMM_BLOCK_MOTION,
+        .d_slip = d_closed + MSTMM_CLOSURE_SLIP);
+    mstmm_loops_drift(
+        .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
+        .slip = closed + MSTMM_CLOSURE_SLIP, .motion_C = block + MSTMM_BLOCK_MOTION,
+        .motion_B = outboard + MSTMM_BLOCK_MOTION, .drift = drift);
+    mstmm_loops_drift_slope(
+        .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
+        .slip = closed + MSTMM_CLOSURE_SLIP, .motion_C = block + MSTMM_BLOCK_MOTION,
+        .motion_B = outboard + MSTMM_BLOCK_MOTION, .d_R_C = d_closed + MSTMM_CLOSURE_R_C,
+        .d_d = d_closed + MSTMM_CLOSURE_D, .d_slip = d_closed + MSTMM_CLOSURE_SLIP,
+        .d_motion_C = d_block + MSTMM_BLOCK_MOTION,
+        .d_motion_B = d_outboard + MSTMM_BLOCK_MOTION, .d_drift = d_drift);
+    mstmm_loops_rows_slope(
+        .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
+        .Rc = block + MSTMM_BLOCK_R, .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = drift,
+        .d_W = d_closed + MSTMM_CLOSURE_W, .d_R_C = d_closed + MSTMM_CLOSURE_R_C,
+        .d_Rc = d_block + MSTMM_BLOCK_R, .d_r_A = d_closed + MSTMM_CLOSURE_LEVER,
+        .d_relative = d_drift, .d_J_A = d_closed + MSTMM_CLOSURE_J_A,
+        .d_J_B = d_closed + MSTMM_CLOSURE_J_B, .d_l = d_closed + MSTMM_CLOSURE_L);
+    for (int k = 0; k < body->nu; k++) {
+        mstmm_loops_act_slope(
+            .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
+            .d_J = d_closed + MSTMM_CLOSURE_J_A + 6 * k,
+            .d_tau = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU) + k,
+            .d_e = d_parent + MSTMM_BLOCK_E);
+        mstmm_loops_act_slope(
+            .J = closed + MSTMM_CLOSURE_J_B + 6 * k,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
+            .d_J = d_closed + MSTMM_CLOSURE_J_B + 6 * k,
+            .d_tau = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU) + k,
+            .d_e = d_outboard + MSTMM_BLOCK_E);
+    }
+    for (int c = 0; c < 6; c++) {
+        if (closure->rows[c] < 0) continue;
+        mstmm_loops_loaded_slope(
+            .K = closed + MSTMM_CLOSURE_J_A + 6 * c,
+            .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
+            .d_K = d_closed + MSTMM_CLOSURE_J_A + 6 * c,
+            .d_x = d_loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
+            .d_e = d_parent + MSTMM_BLOCK_E);
+        mstmm_loops_loaded_slope(
+            .K = closed + MSTMM_CLOSURE_J_B + 6 * c,
+            .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
+            .d_K = d_closed + MSTMM_CLOSURE_J_B + 6 * c,
+            .d_x = d_loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
+            .d_e = d_outboard + MSTMM_BLOCK_E);
+    }
     return 0;
 }
 
@@ -2757,7 +2921,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_idle(state->observed, body)) return 0;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
     if (body->modal && body->section) {
         const int nu = body->nu;
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -3105,7 +3269,7 @@ static int mstmm_at_tangent_brought(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_idle(state->observed, body)) return 0;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
     if (body->modal && body->section) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
@@ -3323,7 +3487,7 @@ static int mstmm_at_tangent_carried(mstmm_state *state, int index)
     const mstmm_body *body = &state->model->bodies[index];
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_idle(state->observed, body)) return 0;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
     if (body->modal && body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -3401,7 +3565,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
     const int nu = body->nu;
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_idle(state->observed, body)) return 0;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
     for (int j = 0; j < nu; j++)
         (state->answer + body->u)[j] = 0;
     if (body->placed) {
@@ -3587,7 +3751,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
-    if (mstmm_idle(state->observed, body)) return 0;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
     if (body->section) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
@@ -3834,7 +3998,7 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
     const int nu = body->nu;
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
-    if (mstmm_idle(state->observed, body)) return 0;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
     for (int j = 0; j < nu; j++)
         (state->answer + body->u)[j] = 0;
     if (body->placed) {
@@ -4719,6 +4883,26 @@ static int mstmm_pass_drive_power(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_closures_loaded(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(block + MSTMM_BLOCK_A, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
+static int mstmm_pass_closures_loaded(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_closures_loaded(state, i, MSTMM_TILE);
+        const int code = mstmm_at_closures_loaded(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 MSTMM_AT_ONCE void mstmm_fetch_required(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -4937,6 +5121,31 @@ static int mstmm_pass_forces_slope(mstmm_state *state)
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_forces; i++) {
         const int code = mstmm_at_forces_slope(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_closures_loaded_slope(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    real *d_block = state->slope->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(d_block + MSTMM_BLOCK_R, d_block + MSTMM_BLOCK_MOTION + 9);
+    mstmm_fetch(d_block + MSTMM_BLOCK_A, d_block + MSTMM_BLOCK_V + 3);
+    mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+}
+static int mstmm_pass_closures_loaded_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_closures_loaded_slope(state, i, MSTMM_TILE);
+        const int code = mstmm_at_closures_loaded_slope(state, i);
         if (code) return code;
     }
     return 0;
@@ -5980,6 +6189,10 @@ int mstmm_run_inverse_dynamics(mstmm_state *state)
         code = mstmm_pass_forces(state);
         if (code) return code;
     }
+    if (model->looped && state->residual) {
+        code = mstmm_pass_closures_loaded(state);
+        if (code) return code;
+    }
     code = mstmm_pass_required(state);
     if (code) return code;
     return 0;
@@ -6116,7 +6329,7 @@ int mstmm_run_required_slope(mstmm_state *state)
         code = mstmm_chain_required_slope(state);
         if (code) return code;
     }
-    if ((model->needs_pose || model->product)) {
+    if ((model->needs_pose || model->product) || model->looped) {
         code = mstmm_pass_efforts_slope(state);
         if (code) return code;
         code = mstmm_pass_laws_slope(state);
@@ -6135,6 +6348,10 @@ int mstmm_run_required_slope(mstmm_state *state)
         }
         if ((model->needs_pose || model->product)) {
             code = mstmm_pass_forces_slope(state);
+            if (code) return code;
+        }
+        if (model->looped) {
+            code = mstmm_pass_closures_loaded_slope(state);
             if (code) return code;
         }
         code = mstmm_pass_required_slope(state);
@@ -6186,6 +6403,18 @@ int mstmm_run_applied_slope(mstmm_state *state)
     }
     if ((model->needs_pose || model->product)) {
         code = mstmm_pass_forces_across(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_efforts_slope(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_laws_slope(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_closures_loaded_slope(state);
         if (code) return code;
     }
     return 0;

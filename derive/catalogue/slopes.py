@@ -41,6 +41,7 @@ _MOVING: dict[str, dict[str, tuple[str, str]]] = {
     "generic": {
         "forward": ("R d H v w c s motion_I", ""),
         "effort": ("H f", ""),
+        "complement": ("H", ""),
     },
     "frames": {
         "pose": ("A_I x_I Rc r", ""),
@@ -53,6 +54,14 @@ _MOVING: dict[str, dict[str, tuple[str, str]]] = {
         "length": ("x_F x_T v_F v_T", ""),
         "transport": ("Rc r e", ""),
         "driven_effort": ("felt udot tau", ""),
+    },
+    "loops": {
+        "gap": ("A_C x_C A_B x_B Rc r", "R_C r_A d"),
+        "slip": ("R_C d v_C w_C v_B w_B", ""),
+        "drift": ("R_C d slip motion_C motion_B", ""),
+        "rows": ("W R_C Rc r_A relative", ""),
+        "act": ("J tau", ""),
+        "loaded": ("K x", ""),
     },
     "modal": {
         "residual": ("eta etad motion", "S_rf e e_f"),

@@ -112,7 +112,7 @@ def shared_specs() -> list[ElementSpec]:
         plain(name="beam", title="Euler-Bernoulli beam", kernels=_lowered(beam_kernels())),
         plain(name="modal", title="flexible bodies", kernels=_lowered(modal_kernels(), "modal")),
         plain(name="tangent", title="tangent of a step", kernels=_lowered(tangent_kernels())),
-        plain(name="loops", title="closed loops", kernels=_lowered(loop_kernels())),
+        plain(name="loops", title="closed loops", kernels=_lowered(loop_kernels(), "loops")),
         plain(name="qr", title="sweep as least squares", kernels=_lowered(qr_kernels())),
         plain(name="screw", title="transport across axial screws", kernels=screws),
         *(

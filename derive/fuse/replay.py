@@ -137,6 +137,7 @@ class Replay(Slots):
         s = self.state.structure
         known = {
             "linked": False, "product": False, "qr": False, "looped": False, "refined": False,
+            "residual": False,
             "balance": True, "efforts": True,
             "inverse": self.inverse,
             "driving": True,

@@ -202,7 +202,9 @@ VARIABLES: dict[str, tuple[str, tuple[str, ...]]] = {
                ("body", "columns")),
 }  # fmt: skip
 #: Variables that have a counterpart in the second workspace, where derivatives lie.
-_DOUBLED = ("block", "parent", "on", "axes", "from", "to", "modes", "laid")
+_DOUBLED = (
+    "block", "parent", "on", "axes", "from", "to", "modes", "laid", "outboard", "loops", "closed",
+)  # fmt: skip
 
 
 def _derivative(text: str) -> str:
@@ -217,10 +219,10 @@ def _derivative(text: str) -> str:
 
 VARIABLES |= {
     f"d_{name}": (
-        VARIABLES[name][0].replace(f"*{name} ", f"*d_{name} ").replace(
-            "state->workspace", "state->slope->workspace"
-        ),
-        VARIABLES[name][1],
+        VARIABLES[name][0].replace(f"*{name} ", f"*d_{name} ")
+        .replace("state->workspace", "state->slope->workspace")
+        .replace("? loops", "? d_loops"),
+        tuple(f"d_{word}" if word == "loops" else word for word in VARIABLES[name][1]),
     )
     for name in _DOUBLED
 }  # fmt: skip

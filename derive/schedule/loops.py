@@ -33,30 +33,35 @@ def _rows(relative: str, when: str) -> Call:
                 relative=relative, **_ROWS)  # fmt: skip
 
 
+_MEETING = (
+    Do(whole=HINGE_MOTION, when="own"),
+    call("generic{nu}.complement", fails="hinge", H="hinge.H", W="closure.W"),
+    call("loops.gap", A_C="body.A", x_C="body.x", A_B="outboard.A", x_B="outboard.x",
+         R_e="closure.turn", r_e="closure.end", **BODY, R_C="closure.R_C",
+         r_A="closure.lever", d="closure.d", gap="closure.gap"),
+    call("loops.slip", **_MET, d="closure.d", v_C="body.v", w_C="body.w", v_B="outboard.v",
+         w_B="outboard.w", slip="closure.slip"),
+)  # fmt: skip
+#: Rows of accelerations, and the load of the hinge's laws.
+_DRIVEN = (
+    call("loops.drift", **_MET, d="closure.d", slip="closure.slip", motion_C="body.motion",
+         motion_B="outboard.motion", drift="local.drift"),
+    _rows("local.drift", ""),
+    EachSpeed(
+        steps=(
+            call("loops.act", J="closure.J_A[6 * k]", tau="body.tau[k]", e="parent.e"),
+            call("loops.act", J="closure.J_B[6 * k]", tau="body.tau[k]", e="outboard.e"),
+        ),
+    ),
+)  # fmt: skip
+
 CLOSURES = Pass(
     "closures", "body", "Rows of a hinge that closes a loop, and the load of its laws.",
     (
-        Do(whole=HINGE_MOTION, when="own"),
-        call("generic{nu}.complement", fails="hinge", H="hinge.H", W="closure.W"),
-        call("loops.gap", A_C="body.A", x_C="body.x", A_B="outboard.A", x_B="outboard.x",
-             R_e="closure.turn", r_e="closure.end", **BODY, R_C="closure.R_C",
-             r_A="closure.lever", d="closure.d", gap="closure.gap"),
-        call("loops.slip", **_MET, d="closure.d", v_C="body.v", w_C="body.w", v_B="outboard.v",
-             w_B="outboard.w", slip="closure.slip"),
+        *_MEETING,
         _rows("closure.gap", "gaping"),
         _rows("closure.slip", "slipping"),
-        *only(
-            "!corrected",
-            call("loops.drift", **_MET, d="closure.d", slip="closure.slip",
-                 motion_C="body.motion", motion_B="outboard.motion", drift="local.drift"),
-            _rows("local.drift", ""),
-            EachSpeed(
-                steps=(
-                    call("loops.act", J="closure.J_A[6 * k]", tau="body.tau[k]", e="parent.e"),
-                    call("loops.act", J="closure.J_B[6 * k]", tau="body.tau[k]", e="outboard.e"),
-                ),
-            ),
-        ),
+        *only("!corrected", *_DRIVEN),
         Each(
             of="rows",
             steps=(
@@ -72,6 +77,24 @@ CLOSURES = Pass(
                     call("loops.yielded", when="soft", softness="line.softness", s="body.s[c]",
                          x="line.told", l="line.known"),
                 ),
+            ),
+        ),
+    ),
+    skip="!cut",
+)  # fmt: skip
+
+#: Multipliers are known here, from an evaluation of accelerations in the same workspace.
+CLOSURES_LOADED = Pass(
+    "closures_loaded", "body", "Rows of a hinge that closes a loop, and all the load that it puts"
+    " on its bodies.",
+    (
+        *_MEETING,
+        *_DRIVEN,
+        Each(
+            of="rows",
+            steps=(
+                call("loops.loaded", K="closure.J_A[6 * c]", x="line.x", e="parent.e"),
+                call("loops.loaded", K="closure.J_B[6 * c]", x="line.x", e="outboard.e"),
             ),
         ),
     ),

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
-from .steps import Add, Call, Copy, Do, EachSpeed, Evaluate, Gather, Pass, Step
+from .steps import Add, Call, Copy, Do, Each, EachSpeed, Evaluate, Gather, Pass, Step
 
 #: Prefix of the derivative of a slot.
 D = "d:"
@@ -51,7 +51,7 @@ def _local_slots(steps: Iterable[Step]) -> Iterator[str]:
             yield from (slot for slot in (step.to, *dict(step.given).values()) if _is_local(slot))
         elif isinstance(step, (Gather, Copy)) and _is_local(step.to):
             yield step.to
-        elif isinstance(step, EachSpeed):
+        elif isinstance(step, (Each, EachSpeed)):
             yield from _local_slots(step.steps)
 
 
@@ -72,7 +72,7 @@ def _step(step: Step, wanted: set[str]) -> Iterator[Step]:
     elif isinstance(step, (Gather, Evaluate)):
         yield step
         yield replace(step, to=D + step.to)
-    elif isinstance(step, EachSpeed):
+    elif isinstance(step, (Each, EachSpeed)):
         yield replace(step, steps=tuple(part for s in step.steps for part in _step(s, wanted)))
     elif isinstance(step, Do):
         assert step.whole is not None

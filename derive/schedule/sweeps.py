@@ -14,6 +14,7 @@ from .loops import (
     CARRIED,
     CLOSURES,
     CLOSURES_ANSWERED,
+    CLOSURES_LOADED,
     RESTATED,
     ROW_CLOSED,
     ROW_FOUND,
@@ -95,6 +96,7 @@ INVERSE_DYNAMICS = Sweep(
         Run(whole=STRAIN, when="balance flexible"),
         Run(whole=POSES, when="posed"),
         *_APPLIED,
+        Run(whole=CLOSURES_LOADED, when="looped residual"),
         Run(whole=REQUIRED),
     ),
 )  # fmt: skip

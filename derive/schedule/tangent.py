@@ -14,6 +14,7 @@ from . import placed
 from .flexible import DRAG, MODAL_OWN, SECTION_MOTION
 from .inverse import REQUIRED
 from .loads import EFFORTS, FORCES, LAWS, LOADS
+from .loops import CLOSURES_LOADED
 from .motion import BODY, CONNECTION, COORDINATES, DRIVES, FORWARD, HINGE, POSES, PRESCRIBED
 from .slope import SLOPE, D, Sloped, sloped, still
 from .steps import (
@@ -76,6 +77,7 @@ _ACTING = (
     Run(whole=sloped(LOADS), when="posed"),
     Run(whole=sloped(FORCES), when="posed"),
 )
+_CLOSED = Run(whole=sloped(_without_hinges(CLOSURES_LOADED)), when="looped")
 DIRECTIONAL = Sweep(
     "required_slope", "Derivative of the efforts that given accelerations need.",
     (
@@ -84,6 +86,7 @@ DIRECTIONAL = Sweep(
         Run(whole=sloped(LAWS)),
         _POSED,
         *_ACTING,
+        _CLOSED,
         Run(whole=sloped(_without_hinges(REQUIRED))),
     ),
 )  # fmt: skip
@@ -96,8 +99,9 @@ def _across(whole: Pass, own: str) -> Run:
     return Run(whole=replace(sloped(whole), name=f"{whole.name}_across", skip=own), when="posed")
 
 
-#: What acts on a body by what others do: springs between bodies, loads in axes of other bodies and
-#: the values of expressions reach across the tree, so that the elimination does not see them.
+#: What acts on a body by what others do: springs between bodies, loads in axes of other bodies, the
+#: values of expressions and hinges that close loops reach across the tree, so that the elimination
+#: does not see them.
 APPLIED_SLOPE = Sweep(
     "applied_slope", "Derivative of what acts across the tree, and of the values of expressions.",
     (
@@ -106,6 +110,9 @@ APPLIED_SLOPE = Sweep(
         Run(whole=_NO_LOADS, when="posed"),
         _across(LOADS, "own_load"),
         _across(FORCES, "own_force"),
+        Run(whole=sloped(EFFORTS), when="looped"),
+        Run(whole=sloped(LAWS), when="looped"),
+        _CLOSED,
     ),
 )  # fmt: skip
 
@@ -324,12 +331,12 @@ _ELIMINATED = (
 TANGENT_CONDENSE = Pass(
     "tangent_condense", "body", "Unknowns of a body eliminated, the rest carried to the parent.",
     (*_COLUMNS, *_ELIMINATED),
-    order=TIPS_TO_ROOT, skip="idle",
+    order=TIPS_TO_ROOT, skip="aside",
 )  # fmt: skip
 
 #: The same in two, where many tangents are made of one state: what bodies bring is made once.
 TANGENT_BROUGHT = Pass(
-    "tangent_brought", "body", "What a body brings to the elimination.", _COLUMNS, skip="idle"
+    "tangent_brought", "body", "What a body brings to the elimination.", _COLUMNS, skip="aside"
 )
 TANGENT_ELIMINATED = replace(
     TANGENT_CONDENSE, name="tangent_eliminated",
@@ -406,7 +413,7 @@ TANGENT_CARRIED = Pass(
         ),
         _STILL,
     ),
-    order=TIPS_TO_ROOT, skip="idle",
+    order=TIPS_TO_ROOT, skip="aside",
 )  # fmt: skip
 
 _MOVED = Copy(to=D + "body.motion", source="local.z")
@@ -445,7 +452,7 @@ TANGENT_ANSWERED = Pass(
         *placed.HINGE_DISPLACED,
         *_behind_modes(),
     ),
-    skip="idle",
+    skip="aside",
 )  # fmt: skip
 
 TANGENT_SOLUTION = Sweep(
@@ -508,7 +515,7 @@ KNOWN_CARRIED = Pass(
         ),
         _STILL,
     ),
-    order=TIPS_TO_ROOT, skip="idle",
+    order=TIPS_TO_ROOT, skip="aside",
 )  # fmt: skip
 
 KNOWN_ANSWERED = Pass(
@@ -526,7 +533,7 @@ KNOWN_ANSWERED = Pass(
             *only("section placed", placed.KNOWN_MOVED),
         ),
     ),
-    skip="idle",
+    skip="aside",
 )  # fmt: skip
 
 TANGENT_BEYOND = Sweep(

@@ -337,6 +337,7 @@ TRAITS: dict[str, str] = {
     "looped": "loops are closed",
     "cut": "the hinge closes a loop",
     "aside": "the hinge closes a loop, or the body is idle",
+    "residual": "what accelerations need is asked for with the multipliers of closed loops",
     "corrected": "a gap or a slip is to be corrected",
     "soft": "the row is that of a rotor",
     "refined": "what an answer before leaves over is answered, and added to it",

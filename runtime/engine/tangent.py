@@ -1,7 +1,8 @@
 """The residual of a packed scene and its tangent, by the looped engine in O(bodies).
 
 R(t, q, u, a) are the efforts that the accelerations a need beyond everything that acts; where
-R = 0, a are the accelerations.  What an implicit step, an equilibrium or a linear model asks for is
+R = 0, a are the accelerations.  Where loops are closed the loads of their multipliers act too, and
+of hinges that close them R are the accelerations that their speeds lack.  What an implicit step, an equilibrium or a linear model asks for is
 R and its tangent, eliminated from the tips to the root (derive/equations/tangent.py).
 """
 
@@ -14,8 +15,6 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
-
-from ..pack.loops.refusal import INSTEAD, refuse
 
 if TYPE_CHECKING:
     from .engine import Engine
@@ -31,7 +30,6 @@ class Tangent:
     def __init__(self, engine: Engine, memory: Array | None = None) -> None:
         self.engine = engine
         packed, ffi = engine.packed, engine.ffi
-        refuse(packed, "the tangent of the equations", INSTEAD)
         self.nq, self.nu = engine.nq, engine.nu
         self.state = np.zeros(self.nq), np.zeros(self.nu)
         slopes = packed.slopes()
@@ -49,12 +47,20 @@ class Tangent:
         for name in ("workspace", "memory", "work", "numbers", "answers", "closure"):
             setattr(record, name, engine.pointer(getattr(self, name)))
 
-    def residual(self, t: float, q: Array, u: Array, a: Array) -> Array:
-        """R (nu,) at a state, to which the other calls refer from now on."""
-        r = np.empty(self.nu)
+    def residual(self, t: float, q: Array, u: Array, a: Array | None = None) -> Array:
+        """R (nu,) at a state, to which the other calls refer from now on; without `a` with the
+        accelerations there.  Multipliers of closed loops are those of the state."""
+        r, null = np.empty(self.nu), self.engine.ffi.NULL
         self.state = np.array(q, float), np.array(u, float)
-        self._call("residual", float(t), q, u, a, r, self.engine.ffi.NULL)
+        self._call("residual", float(t), q, u, null if a is None else a, r, null)
         return r
+
+    def accelerations_rate(self) -> Array:
+        """Derivative (nu,) of the accelerations by the time at given coordinates and speeds, at the
+        state of a residual without `a`; a tangent is factored anew behind it."""
+        found = np.empty(self.nu)
+        self._call("accelerations_rate", found)
+        return found
 
     def slope(self, d_t: float, d_q: Array, d_u: Array, d_a: Array) -> Array:
         """Derivative (nu,) of R along a direction of time, coordinates, speeds, accelerations."""
@@ -160,7 +166,7 @@ def tangent_of(engine: Engine) -> Tangent:
 
 def _couplings(engine: Engine) -> tuple[list[Any], int]:
     """The record of what reaches across the tree with what keeps it, and how many numbers it is."""
-    ffi, reach = engine.ffi, engine.packed.written.reach
+    ffi, reach, rows = engine.ffi, engine.packed.written.reach, _rows_of_loops(engine)
     record = ffi.new("mstmm_couplings *")
     kept = [record]
     values, speeds = [v for v, _ in reach.efforts], [j for _, j in reach.efforts]
@@ -168,8 +174,23 @@ def _couplings(engine: Engine) -> tuple[list[Any], int]:
         array = ffi.new("int[]", list(numbers) or [0])
         kept.append(array)
         setattr(record, name, array)
+    record.rows = ffi.new("mstmm_coupled_row[]", rows or [(0, 0, -1, -1)])
+    kept.append(record.rows)
     record.n_bodies, record.n_efforts = len(reach.across), len(reach.efforts)
-    return kept, 6 * len(reach.across) + len(reach.efforts)
+    record.n_rows = len(rows)
+    return kept, 6 * len(reach.across) + len(reach.efforts) + len(rows)
+
+
+def _rows_of_loops(engine: Engine) -> list[tuple[int, int, int, int]]:
+    """(frame, direction, speed, row) of what hinges that close loops leave unknown: accelerations of
+    their speeds, and multipliers of their rows; -1 for the other of the two."""
+    packed, loops = engine.packed, engine.packed.written.loops
+    first, found = packed.system.places["u"], list[tuple[int, int, int, int]]()
+    for one in () if loops is None else loops.closures:
+        speeds = range(packed.system.body(one.frame).nu)
+        found += [(one.frame, k, int(first[one.frame]) + k, -1) for k in speeds]
+        found += [(one.frame, direction, -1, row) for direction, row in one.rows.items()]
+    return found
 
 
 def _laid(engine: Engine) -> int:

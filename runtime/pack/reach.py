@@ -2,7 +2,8 @@
 
 A load in the axes of space, a force element to the ground and drag change with where their body is
 and how fast it goes: the tangent of the sweep takes them along.  Loads in axes of other bodies,
-springs between bodies and what expressions of the state give reach across the tree.
+springs between bodies, hinges that close loops and what expressions of the state give reach across
+the tree.
 """
 
 from __future__ import annotations
@@ -48,6 +49,8 @@ def reach_of(system: System) -> Reach:
             across.add(load.body)
     for force, alone in zip(system.forces, forces, strict=True):
         (own if alone else across).update(body for body, _, _ in force.ends)
+    for closure in system.closures:
+        across.update((int(system.parents[closure.frame]), closure.outboard))
     return Reach(
         loads, forces, _to_the_root(system, own | set(system.dragged)),
         tuple(sorted(across - {GROUND})), tuple(_efforts_of_state(system, depends)),

@@ -10,12 +10,30 @@ static int failed(mstmm_scene_run *run, const mstmm_tangent *at, int code)
     return code;
 }
 
+/* With closed loops: what accelerations are beyond those that the constrained motion has. */
+static int beyond(mstmm_scene_run *run, double t, const double *y, const double *a, double *r,
+                  mstmm_balance *balance)
+{
+    const mstmm_model *model = run->model;
+    real *qdot = run->known, *f = qdot + model->nq;
+    const int code = mstmm_accelerations(model, run->workspace, t, y, y + model->nq, run->memory,
+                                         NULL, qdot, f, balance, &run->failure);
+    for (int j = 0; !code && j < model->nu; j++) r[j] = a[j] - f[j];
+    if (!code) mstmm_tangent_free(run->base, r);
+    return code;
+}
+
 static int residual(void *context, double t, const double *y, const double *a, double *r,
                     double *work)
 {
     mstmm_scene_run *run = context;
     mstmm_balance balance;
     const int wanted = work && run->with_power;
+    if (run->model->looped) {
+        const int code = beyond(run, t, y, a, r, wanted ? &balance : NULL);
+        if (wanted) *work = code ? 0 : balance.power;
+        return code;
+    }
     const int code = mstmm_residual(run->stage, t, y, y + run->model->nq, a, r,
                                     wanted ? &balance : NULL);
     if (wanted) *work = code ? 0 : balance.power;
@@ -26,6 +44,7 @@ static int residual(void *context, double t, const double *y, const double *a, d
 static int at_base(mstmm_scene_run *run, double t, const double *y, const double *a)
 {
     const real *u = y + run->model->nq;
+    if (run->model->looped) a = NULL; /* slopes are those of the accelerations there */
     if (mstmm_residual_is_at(run->base, t, y, u, a)) return 0;
     return failed(run, run->base, mstmm_residual(run->base, t, y, u, a, run->known, NULL));
 }
@@ -39,6 +58,11 @@ static int residual_rate(void *context, double t, const double *y, const double 
     if (run->steady) return 0;
     const int code = at_base(run, t, y, a);
     if (code) return code;
+    if (model->looped) {
+        const int failure = mstmm_accelerations_rate(run->base, r_t);
+        for (int j = 0; j < model->nu; j++) r_t[j] = -r_t[j];
+        return failed(run, run->base, failure);
+    }
     memset(still, 0, (size_t)(model->nq + 2 * model->nu) * sizeof(real));
     return failed(run, run->base, mstmm_residual_slope(run->base, 1, still, still + model->nq,
                                                        still + model->nq + model->nu, r_t));
@@ -106,15 +130,17 @@ static int solve(void *context, const double *r, const double *rho_q, const doub
     if (base->laws_alone) return solve_by_laws(run, r, rho_q, rho_u, dq, du, da);
     real *known_q = run->known, *still = known_q + nq, *known_a = still + nu;
     const mstmm_known known = {.q = known_q, .a = known_a};
-    const int some = rho_q || rho_u;
+    const int evaluated = run->implicit.evaluated, some = rho_q || rho_u || evaluated;
     int code = 0;
     if (some) {
         memset(still, 0, (size_t)nu * sizeof(real));
-        for (int j = 0; j < nu; j++) known_a[j] = rho_u ? -rho_u[j] : 0;
+        for (int j = 0; j < nu; j++)
+            known_a[j] = -((rho_u ? rho_u[j] : 0) + (evaluated ? r[j] : 0));
         mstmm_tangent_free(base, known_a);
         code = mstmm_tangent_coordinates(base, still, rho_q, known_q);
     }
-    if (!code) code = mstmm_tangent_solve(base, r, some ? &known : NULL, du);
+    /* What a residual of accelerations asks for is known of them; efforts are in balance. */
+    if (!code) code = mstmm_tangent_solve(base, evaluated ? still : r, some ? &known : NULL, du);
     if (!code) code = mstmm_tangent_coordinates(base, du, rho_q, dq);
     for (int j = 0; !code && j < nu; j++) da[j] = base->s * du[j] - (rho_u ? rho_u[j] : 0);
     if (!code) mstmm_tangent_free(base, da);
@@ -171,9 +197,10 @@ void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system)
             run->coordinates[body->modal->u + j] = body->modal->q + j;
     }
     run->implicit = (mstmm_implicit){
-        .n_q = model->nq, .n_u = model->nu, .coordinates = run->coordinates, .residual = residual,
+        .n_q = model->nq, .n_u = model->nu, .evaluated = model->looped != NULL, .coordinates = run->coordinates, .residual = residual,
         .residual_rate = residual_rate, .rates = is_straight(model) ? NULL : rates,
-        .tangent = tangent, .laws = laws, .laws_spare = 1, .solve = solve, .slope = slope,
+        .tangent = tangent, .laws = model->looped ? NULL : laws,
+        .laws_spare = 1, .solve = solve, .slope = slope,
         .impose = somebody_imposes(model) ? impose : NULL,
     };
     system->implicit = &run->implicit;

@@ -390,10 +390,10 @@ static inline int mstmm_idle(int observed, const mstmm_body *body)
 }
 
 /* Has the sweep from tips to root nothing to do with this body? */
-static inline int mstmm_aside(const mstmm_state *state, int index)
+static inline int mstmm_aside(const mstmm_model *model, int observed, int index)
 {
-    const mstmm_model *model = state->model;
-    return model->looped[index].closure || mstmm_idle(state->observed, &model->bodies[index]);
+    return (model->looped && model->looped[index].closure)
+           || mstmm_idle(observed, &model->bodies[index]);
 }
 
 /* The modes that a body or its section belongs to; NULL: none. */

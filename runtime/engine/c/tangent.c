@@ -4,9 +4,9 @@
 
 #include <string.h>
 
+#include "across.h"
 #include "aim.h"
 #include "hinge.h"
-#include "solve_lu.c.jinja"
 #include "sweep_steps.h"
 
 int64_t mstmm_bend_numbers(int n);
@@ -40,31 +40,6 @@ int64_t mstmm_tangent_lay(mstmm_model *model)
     return place;
 }
 
-/* Parts of `work`: state, accelerations and the rest of what a sweep writes, then a second
- * workspace and the direction. */
-typedef struct {
-    real *q, *u, *a, *required, *qdot, *shadow, *d_q, *d_u, *d_a, *d_qdot, *answer, *column;
-    real *still, *change;
-    int64_t used, used_by_residual;
-} mstmm_parts;
-
-static mstmm_parts cut(const mstmm_model *model, int64_t slots, real *work)
-{
-    mstmm_parts at = {.used = 0};
-    const int64_t nq = model->nq, nu = model->nu;
-    const struct { real **to; int64_t count; } all[] = {
-        {&at.q, nq}, {&at.u, nu}, {&at.a, nu}, {&at.required, nu}, {&at.qdot, nq},
-        {&at.d_q, nq}, {&at.d_u, nu}, {&at.d_a, nu}, {&at.d_qdot, nq}, {&at.answer, nu},
-        {&at.column, nu}, {&at.still, nq}, {&at.change, nq}, {&at.shadow, model->workspace + slots},
-    };
-    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
-        if (work) *all[i].to = work + at.used;
-        if (all[i].to == &at.shadow) at.used_by_residual = at.used;
-        at.used += all[i].count;
-    }
-    return at;
-}
-
 int64_t mstmm_tangent_work(const mstmm_model *model, int64_t slots)
 {
     return cut(model, slots, NULL).used;
@@ -73,11 +48,6 @@ int64_t mstmm_tangent_work(const mstmm_model *model, int64_t slots)
 int64_t mstmm_residual_work(const mstmm_model *model)
 {
     return cut(model, 0, NULL).used_by_residual;
-}
-
-static mstmm_parts parts_of(const mstmm_tangent *at)
-{
-    return cut(at->model, at->slots, at->work);
 }
 
 /* Rows of speeds that somebody imposes are no equations. */
@@ -110,14 +80,6 @@ static real power_of_imposed(const mstmm_state *state, const real *required)
     return power;
 }
 
-static mstmm_state state_of(mstmm_tangent *at, const mstmm_parts *parts)
-{
-    return (mstmm_state){.model = at->model, .workspace = at->workspace, .t = at->t, .q = parts->q,
-                         .u = parts->u, .memory = at->memory, .given = parts->a,
-                         .required = parts->required, .qdot = parts->qdot,
-                         .failure = &at->failure, .residual = 1};
-}
-
 int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, const real *a, real *r,
                    mstmm_balance *balance)
 {
@@ -126,14 +88,20 @@ int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, cons
     at->t = t;
     memcpy(parts.q, q, (size_t)model->nq * sizeof(real));
     memcpy(parts.u, u, (size_t)model->nu * sizeof(real));
-    memcpy(parts.a, a, (size_t)model->nu * sizeof(real));
+    at->known = 0;
+    int code = 0;
+    if (!a || model->looped) /* leaves the multipliers of closed loops in the workspace */
+        code = mstmm_accelerations(model, at->workspace, t, parts.q, parts.u, at->memory, NULL,
+                                   parts.qdot, parts.a, NULL, &at->failure);
+    if (a) memcpy(parts.a, a, (size_t)model->nu * sizeof(real));
+    if (model->looped) mstmm_set_own_apart(at, parts.a, parts.answer);
     mstmm_state state = state_of(at, &parts);
     state.balance = balance;
     if (balance) balance->power = balance->potential = 0;
     mstmm_ground(&state);
-    at->known = 0;
-    const int code = mstmm_run_inverse_dynamics(&state);
+    if (!code) code = mstmm_run_inverse_dynamics(&state);
     if (code) return code;
+    mstmm_lacking(at, at->workspace, parts.answer, parts.required);
     at->known = 1;
     if (balance) balance->power += power_of_imposed(&state, parts.required);
     memcpy(r, parts.required, (size_t)model->nu * sizeof(real));
@@ -152,31 +120,7 @@ int mstmm_residual_is_at(const mstmm_tangent *at, real t, const real *q, const r
     const mstmm_model *model = at->model;
     const mstmm_parts parts = parts_of(at);
     return at->known && !(at->t < t) && !(at->t > t) && same(parts.q, q, model->nq)
-           && same(parts.u, u, model->nu) && same(parts.a, a, model->nu);
-}
-
-/* The state of the last residual: driven coordinates have been filled in. */
-static mstmm_state known_state(mstmm_tangent *at, const mstmm_parts *parts)
-{
-    mstmm_state state = state_of(at, parts);
-    if (at->model->n_drives) {
-        state.q = mstmm_filled_q(&state);
-        state.u = mstmm_filled_u(&state);
-    }
-    return state;
-}
-
-static mstmm_state slope_of(mstmm_tangent *at, const mstmm_parts *parts, real *required)
-{
-    mstmm_state slope = state_of(at, parts);
-    slope.workspace = parts->shadow;
-    slope.t = 0;
-    slope.q = parts->d_q;
-    slope.u = parts->d_u;
-    slope.given = parts->d_a;
-    slope.required = required;
-    slope.qdot = parts->d_qdot;
-    return slope;
+           && same(parts.u, u, model->nu) && (!a || same(parts.a, a, model->nu));
 }
 
 int mstmm_hook_drive_slopes(mstmm_state *state)
@@ -238,120 +182,19 @@ int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const rea
 {
     const mstmm_parts parts = parts_of(at);
     mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, d_r);
+    memmove(parts.d_a, d_a, (size_t)at->model->nu * sizeof(real));
+    mstmm_set_own_apart(at, parts.d_a, parts.answer);
     slope.t = d_t;
     slope.q = d_q;
     slope.u = d_u;
-    slope.given = d_a;
     state.slope = &slope;
     memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real)); /* the ground's */
+    mstmm_keep_multipliers(at->model, slope.workspace);
     const int code = mstmm_run_required_slope(&state);
-    if (!code) without_imposed(at->model, at->memory, d_r);
-    return code;
-}
-
-/* --- across the tree --- */
-
-/* Number k of what the couplings change, in the derivatives' workspace. */
-static real *coupled(const mstmm_tangent *at, const mstmm_state *slope, int k)
-{
-    const mstmm_couplings *all = at->couplings;
-    const mstmm_model *model = at->model;
-    if (k < 6 * all->n_bodies)
-        return mstmm_block(model, slope->workspace, all->bodies[k / 6]) + MSTMM_BLOCK_E + k % 6;
-    return mstmm_values(slope) + all->values[k - 6 * all->n_bodies];
-}
-
-/* The change of every coupling along the direction in `parts`. */
-static int changes_of(mstmm_tangent *at, const mstmm_parts *parts, real *changes)
-{
-    mstmm_state state = known_state(at, parts), slope = slope_of(at, parts, parts->answer);
-    state.slope = &slope;
-    memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real));
-    const int code = mstmm_run_applied_slope(&state);
-    for (int k = 0; !code && k < at->n_coupled; k++) changes[k] = *coupled(at, &slope, k);
-    return code;
-}
-
-/* The same along x and increments that are known (NULL: none). */
-static int coupled_along(mstmm_tangent *at, const real *x, const mstmm_known *known, real *changes)
-{
-    const mstmm_model *model = at->model;
-    const mstmm_parts parts = parts_of(at);
-    const int code = mstmm_tangent_coordinates(at, x, NULL, parts.change);
     if (code) return code;
-    memcpy(parts.d_q, parts.change, (size_t)model->nq * sizeof(real));
-    for (int j = 0; j < model->nu; j++) {
-        parts.d_u[j] = at->rate * x[j];
-        parts.d_a[j] = at->s * x[j];
-    }
-    for (int i = 0; known && i < model->nq; i++) parts.d_q[i] += known->q[i];
-    for (int j = 0; known && j < model->nu; j++) parts.d_a[j] += known->a[j];
-    return changes_of(at, &parts, changes);
-}
-
-int mstmm_coupled_along(mstmm_tangent *at, const real *x, const real *d_u, const real *d_a,
-                        real *changes)
-{
-    const mstmm_parts parts = parts_of(at);
-    const int code = mstmm_tangent_coordinates(at, x, NULL, parts.change);
-    if (code) return code;
-    memcpy(parts.d_q, parts.change, (size_t)at->model->nq * sizeof(real));
-    memcpy(parts.d_u, d_u, (size_t)at->model->nu * sizeof(real));
-    memcpy(parts.d_a, d_a, (size_t)at->model->nu * sizeof(real));
-    return changes_of(at, &parts, changes);
-}
-
-int mstmm_hook_unit_load(mstmm_state *state)
-{
-    *state->tangents->unit = 1;
+    mstmm_lacking(at, slope.workspace, parts.answer, d_r);
+    without_imposed(at->model, at->memory, d_r);
     return 0;
-}
-
-/* x to r beside increments that are known (NULL: none), and to a unit of coupling k (-1: of none),
- * the couplings left out. */
-static int solve_alone(mstmm_tangent *at, const real *r, const mstmm_known *known, int k, real *x)
-{
-    const mstmm_parts parts = parts_of(at);
-    mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq, .kappa = at->kappa};
-    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
-    const int loads = at->n_coupled - at->couplings->n_efforts;
-    state.slope = &slope;
-    state.tangents = &step;
-    state.column = r;
-    state.answer = x;
-    if (k >= 0 && k < loads) step.unit = coupled(at, &slope, k);
-    if (k >= loads) parts.column[at->couplings->speeds[k - loads]] = 1;
-    memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real));
-    if (known) {
-        memset(parts.d_u, 0, (size_t)at->model->nu * sizeof(real));
-        slope.q = known->q;
-        slope.given = known->a;
-    }
-    const int code =
-        known ? mstmm_run_tangent_beyond(&state) : mstmm_run_tangent_solution(&state);
-    if (k >= loads) parts.column[at->couplings->speeds[k - loads]] = 0;
-    return code;
-}
-
-/* With couplings c = G du and answers Y to each: du = du_0 + Y c, (1 - G Y) c = G du_0. */
-static int close_couplings(mstmm_tangent *at, int negative)
-{
-    const int m = at->n_coupled, nu = at->model->nu;
-    const mstmm_parts parts = parts_of(at);
-    memset(parts.column, 0, (size_t)nu * sizeof(real));
-    for (int k = 0; k < m; k++) {
-        real *answer = at->answers + (int64_t)k * nu, *changes = at->closure + 2 * m * m;
-        int code = solve_alone(at, parts.column, NULL, k, answer);
-        if (!code) code = coupled_along(at, answer, NULL, changes);
-        if (code) return code;
-        for (int i = 0; i < m; i++) at->closure[i * m + k] = (i == k) - changes[i];
-    }
-    real *work = at->closure + m * m, *none = work + m * m;
-    memset(none, 0, (size_t)m * sizeof(real));
-    const int code = mstmm_solve_lu(m, 1, at->closure, none, none + m, work, 1e-13);
-    if (code != 1 && (at->counts || (code == 2) == negative)) return 0;
-    return mstmm_fail(&(mstmm_state){.failure = &at->failure}, MSTMM_FAILED_TANGENT, -1,
-                      code == 1 ? 1 : MSTMM_NEGATIVE);
 }
 
 static void take_steps(mstmm_tangent *at, real rate, real s, real sq, real kappa)
@@ -393,7 +236,7 @@ int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kap
     int negative = 0;
     const int code = run_tangent(at, mstmm_run_tangent,
                                  at->n_coupled || at->counts ? &negative : NULL);
-    return code || !at->n_coupled ? code : close_couplings(at, negative);
+    return code || !at->n_coupled ? code : mstmm_across_factor(at, negative);
 }
 
 int mstmm_tangent_pivot(const mstmm_tangent *at, int body, int shapes, real *pivot)
@@ -463,17 +306,27 @@ static int solve_by_laws(mstmm_tangent *at, const real *r, real *du)
 
 int mstmm_tangent_solve(mstmm_tangent *at, const real *r, const mstmm_known *known, real *x)
 {
-    if (at->laws_alone) return solve_by_laws(at, r, x);
-    const int m = at->n_coupled, nu = at->model->nu;
-    int code = solve_alone(at, r, known, -1, x);
-    if (code || !m) return code;
-    real *work = at->closure + m * m, *changes = work + m * m, *amounts = changes + m;
-    code = coupled_along(at, x, known, changes);
+    return at->laws_alone ? solve_by_laws(at, r, x) : mstmm_across_solve(at, r, known, NULL, x);
+}
+
+/* An inverse time so large that coordinates stay within rounding. */
+#define STILL 1e200
+
+int mstmm_accelerations_rate(mstmm_tangent *at, real *rate)
+{
+    const int nq = at->model->nq, nu = at->model->nu;
+    const mstmm_parts parts = parts_of(at);
+    real *missing = mstmm_across_missing(at);
+    memset(parts.d_q, 0, (size_t)nq * sizeof(real));
+    memset(parts.d_u, 0, (size_t)nu * sizeof(real));
+    memset(parts.d_a, 0, (size_t)nu * sizeof(real));
+    int code = mstmm_residual_slope(at, 1, parts.d_q, parts.d_u, parts.d_a, parts.still_efforts);
     if (code) return code;
-    mstmm_solve_lu(m, 1, at->closure, changes, amounts, work, 1e-13); /* regular: see above */
-    for (int k = 0; k < m; k++)
-        for (int j = 0; j < nu; j++) x[j] += at->answers[(int64_t)k * nu + j] * amounts[k];
-    return 0;
+    mstmm_rows_along(at, parts.shadow, parts.answer, missing);
+    for (int j = 0; j < nu; j++) parts.still_efforts[j] = -parts.still_efforts[j];
+    for (int k = 0; k < at->couplings->n_rows; k++) missing[k] = -missing[k];
+    code = mstmm_tangent_factor(at, 0, 1, STILL, 0);
+    return code ? code : mstmm_across_solve(at, parts.still_efforts, NULL, missing, rate);
 }
 
 /* Coordinates and speeds that somebody imposes do not change, and have no rates of their own. */

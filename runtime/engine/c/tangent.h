@@ -6,12 +6,20 @@
 #include "sweep.h"
 
 /* cdef begin */
-/* What the elimination does not see, as it reaches across the tree: loads on bodies that change with
- * what other bodies do, and efforts that expressions of the state give. */
+/* An unknown of a hinge that closes a loop: the acceleration of a speed of its own, or the multiplier
+ * of a row. */
 typedef struct {
-    int n_bodies, n_efforts;
+    int frame, direction; /* the hinge's frame, and which of its six directions */
+    int speed, row;       /* -1: the other is meant */
+} mstmm_coupled_row;
+
+/* What the elimination does not see, as it reaches across the tree: loads on bodies that change with
+ * what other bodies do, efforts that expressions of the state give, and hinges that close loops. */
+typedef struct {
+    int n_bodies, n_efforts, n_rows;
     const int *bodies; /* on which such loads act: 6 numbers each */
     const int *values, *speeds; /* an expression's value, and the speed that it acts on */
+    const mstmm_coupled_row *rows;
 } mstmm_couplings;
 
 /* A scene at one state with its derivatives: everything is the caller's.  `work` has
@@ -39,15 +47,20 @@ int64_t mstmm_tangent_work(const mstmm_model *model, int64_t slots);
 /* Numbers of `work` for one that knows mstmm_residual and mstmm_tangent_rates alone. */
 int64_t mstmm_residual_work(const mstmm_model *model);
 /* R (nu) at a state, which the next calls refer to; zero on speeds that somebody imposes.
- * `balance` may be NULL; its power is that of everything that is not stored. */
+ * `balance` may be NULL; its power is that of everything that is not stored.  `a` NULL: the
+ * accelerations there.  With closed loops their multipliers are those there, whatever `a`; where a
+ * hinge closes one, R are the accelerations that its speeds lack. */
 int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, const real *a, real *r,
                    mstmm_balance *balance);
-/* Is this the state of the last residual, under the same memory? */
+/* Is this the state of the last residual, under the same memory?  `a` NULL: whatever they were. */
 int mstmm_residual_is_at(const mstmm_tangent *at, real t, const real *q, const real *u,
                          const real *a);
 /* Derivative of R (nu) along d_t, d_q, d_u, d_a. */
 int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const real *d_u,
                          const real *d_a, real *d_r);
+/* Derivative of the accelerations (nu) by the time at given coordinates and speeds, at the state of
+ * the last residual, which was one without `a`.  Spoils the tangent. */
+int mstmm_accelerations_rate(mstmm_tangent *at, real *rate);
 /* Change of the coordinates' rates (nq) along the direction of the last mstmm_residual_slope. */
 void mstmm_rates_slope(const mstmm_tangent *at, real *d_rates);
 /* Factors dR along unknowns x: du = rate x, da = s x, dq = (sq - kappa g_q)^-1 N x, where g_q are the

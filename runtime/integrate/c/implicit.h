@@ -8,6 +8,9 @@
  * K, C, M are the slopes of R in q, u, a.  Functions return 0 or a failure code. */
 typedef struct mstmm_implicit {
   int n_q, n_u;
+  /* R are accelerations beyond those of the right-hand side, a - f(t, q, u): nothing is gained by
+   * carrying a along as an unknown of its own. */
+  int evaluated;
   /* n_u: a coordinate that each speed changes, whose tolerance weighs the speed's error.  NULL,
    * where there are as many coordinates as speeds: the one of the same number. */
   const int *coordinates;

@@ -161,7 +161,7 @@ static int carried_well(const mstmm_work *work) {
  * steps are made in the second. */
 static int choose(const mstmm_work *work) {
   mstmm_run_count *count = &work->run->count;
-  if (by_laws(work)) return make(work, evaluated);
+  if (by_laws(work) || work->implicit->evaluated) return make(work, evaluated);
   if (count->evaluated_left > 0) {
     count->evaluated_left--;
     return make(work, evaluated);
