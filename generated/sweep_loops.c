@@ -35,6 +35,8 @@ int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restr
     const real *restrict l, const real *restrict delta, real *restrict x);
 int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *restrict L_p,
     const real *restrict x_p, real *restrict x);
+int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
+    const real *restrict x, real *restrict l);
 int mstmm_sweep_loops_loaded(const real *restrict K, const real *restrict x, real *restrict e);
 int mstmm_sweep_loops_gap_slope(const real *restrict A_C, const real *restrict x_C,
     const real *restrict A_B, const real *restrict x_B, const real *restrict R_e,
@@ -1784,6 +1786,39 @@ static const mstmm_port mstmm_sweep_loops_multiplier_less_inputs[] = {
 
 static const mstmm_port mstmm_sweep_loops_multiplier_less_outputs[] = {
     {"x", 1, "", 1, 0},
+};
+
+/* the row of a rotor with a multiplier
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  softness[1] 1 / J of the rotor on the row
+ * in  s[1] acceleration of the speed that it turns with
+ * in  x[1] (N, N*m) multiplier
+ * out l[1] known part of the row, added to what is there
+ */
+int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
+    const real *restrict x, real *restrict l)
+{
+    const real t0 = softness[0] * x[0];
+    const real t1 = s[0] - t0;
+    l[0] += t1;
+    return 0;
+}
+
+static int mstmm_sweep_loops_yielded_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_yielded(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_yielded_inputs[] = {
+    {"softness", 1, "", 0, 0},
+    {"s", 1, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_yielded_outputs[] = {
+    {"l", 1, "", 1, 0},
 };
 
 /* load of a multiplier
@@ -4299,6 +4334,18 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "yielded",
+        .function = (void (*)(void))mstmm_sweep_loops_yielded,
+        .call = mstmm_sweep_loops_yielded_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_yielded_inputs,
+        .outputs = mstmm_sweep_loops_yielded_outputs,
+        .ir_hash = "baaae1f5fc4da35685307e2a7b399631d64e8f5994e34c7bf54b7d71f1494e5d",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "loaded",
         .function = (void (*)(void))mstmm_sweep_loops_loaded,
         .call = mstmm_sweep_loops_loaded_call,
@@ -4388,7 +4435,7 @@ const mstmm_element mstmm_sweep_loops = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "loops",
-    .hash = "1723808e4f5e56b4e21a3eeecb05fc2f3ea430cd193f9cd03d1a6dab5af1c816",
+    .hash = "b934f78693f6064ccc1193ce50d86cc5f2c59501d0649753f67f7ea306ae49a9",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4398,6 +4445,6 @@ const mstmm_element mstmm_sweep_loops = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 18,
+    .n_kernels = 19,
     .kernels = mstmm_sweep_loops_kernels,
 };

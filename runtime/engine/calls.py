@@ -98,7 +98,8 @@ class Calls:
         model = self.ffi.new("mstmm_model *", self.packed.model[0])
         model.gravity = list(gravity)
         model.n_laws = model.n_drives = model.n_values = 0
-        model.n_loads = model.n_forces = model.needs_pose = 0
+        model.n_loads = model.n_forces = 0
+        model.needs_pose = int(bool(self.packed.system.closures))
         model.product = self.ffi.NULL
         return type(self)(replace(self.packed, model=model))
 

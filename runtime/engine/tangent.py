@@ -2,8 +2,9 @@
 
 R(t, q, u, a) are the efforts that the accelerations a need beyond everything that acts; where
 R = 0, a are the accelerations.  Where loops are closed the loads of their multipliers act too, and
-of hinges that close them R are the accelerations that their speeds lack.  What an implicit step, an equilibrium or a linear model asks for is
-R and its tangent, eliminated from the tips to the root (derive/equations/tangent.py).
+of hinges that close them R are the accelerations that their speeds lack.  What an implicit step, an
+equilibrium or a linear model asks for is R and its tangent, eliminated from the tips to the root
+(derive/equations/tangent.py).
 """
 
 from __future__ import annotations
@@ -18,6 +19,10 @@ from mstmm.errors import SceneError
 
 if TYPE_CHECKING:
     from .engine import Engine
+
+
+#: An inverse time so large that coordinates stay within rounding.
+_STILL = 1e200
 
 
 class Tangent:
@@ -87,6 +92,11 @@ class Tangent:
         dq = (sq - kappa g_q)^-1 N x, where N u are the rates of the coordinates and g_q their
         slopes by the coordinates."""
         self._call("tangent_factor", float(rate), float(s), float(sq), float(kappa))
+
+    def factor_inertia(self) -> None:
+        """Factor the change of R along accelerations x alone, loops kept closed: x of `solve` are
+        those that answer efforts."""
+        self.factor(1.0, _STILL, 0.0, 0.0)
 
     def factor_laws(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:
         """The same with inertia and the slopes of laws and modes alone, of these no more than their
@@ -174,16 +184,16 @@ def _couplings(engine: Engine) -> tuple[list[Any], int]:
         array = ffi.new("int[]", list(numbers) or [0])
         kept.append(array)
         setattr(record, name, array)
-    record.rows = ffi.new("mstmm_coupled_row[]", rows or [(0, 0, -1, -1)])
-    kept.append(record.rows)
+    kept.append(ffi.new("mstmm_coupled_row[]", rows or [(0, 0, -1, -1)]))
+    record.rows = kept[-1]
     record.n_bodies, record.n_efforts = len(reach.across), len(reach.efforts)
     record.n_rows = len(rows)
     return kept, 6 * len(reach.across) + len(reach.efforts) + len(rows)
 
 
 def _rows_of_loops(engine: Engine) -> list[tuple[int, int, int, int]]:
-    """(frame, direction, speed, row) of what hinges that close loops leave unknown: accelerations of
-    their speeds, and multipliers of their rows; -1 for the other of the two."""
+    """(frame, direction, speed, row) of what hinges that close loops leave unknown: accelerations
+    of their speeds, and multipliers of their rows; -1 for the other of the two."""
     packed, loops = engine.packed, engine.packed.written.loops
     first, found = packed.system.places["u"], list[tuple[int, int, int, int]]()
     for one in () if loops is None else loops.closures:

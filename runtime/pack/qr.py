@@ -71,8 +71,6 @@ def _least(matrix: Array) -> float:
 def refuse_steps(packed: Packed) -> None:
     """SceneError for steps that are not made from accelerations: the tangent of an implicit method
     and the classical matrices lose the digits again that this sweep keeps."""
-    instead = "use an explicit one (dop853, dopri5, rk4)"
-    refuse(packed, "an implicit or classical method", instead)
     if packed.qr:
         raise SceneError(
             'sweep = "qr" makes accelerations, which implicit and classical methods do not ask '

@@ -28,6 +28,7 @@ from ..host.interruptible import interruptible
 from ..integrate.loop import Samples, Statistics, Status
 from ..integrate.settings import Settings
 from ..pack.flexible.expansion import HELD
+from ..pack.loops.refusal import refuse
 from ..pack.qr import refuse_steps
 from .simulate import LARGEST, SLICE, split
 from .system import SceneSystem
@@ -57,6 +58,7 @@ def integrate(
             f'controller "{one.name}": method "{settings.method}" has no samples; take another one'
         )
     scheme_of(settings.scheme)
+    refuse(model.packed, f'method "{settings.method}"', "genalpha and rodas4p2 do")
     refuse_steps(model.packed)
     return _Run(model, settings, tell).run(q, u)
 

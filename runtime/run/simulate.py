@@ -15,6 +15,7 @@ from ..host.interruptible import interruptible
 from ..integrate.loop import Run, Samples, Statistics, Status
 from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO, check_steps, get
+from ..pack.loops.refusal import refuse_method
 from .endings import message_of
 from .method_choice import Choice
 from .notes import endless, unresolved
@@ -40,6 +41,7 @@ def make_run(
     """The integrator at the start of the run, with room for so many samples at a time."""
     tableau = get(settings.first_method, settings.radius)
     if tableau.implicit:
+        refuse_method(system.engine.packed, settings.method, settings.tangent)
         system.offer_tangent()
     check_steps(tableau, settings.step)
     start = system.begin(settings.t_start, q, u)

@@ -26,3 +26,17 @@ def refuse(packed: Packed, what: str, instead: str) -> None:
         f"scene: {named_loop(packed.described, plan)} is closed, and {what} cannot follow that "
         f"yet; {instead}"
     )
+
+
+#: Methods that take increments of loads or an exponential of the whole motion, which closed loops
+#: are not brought into.
+_ALIEN = ("dttmm", "exprb32")
+
+
+def refuse_method(packed: Packed, method: str, tangent: str) -> None:
+    """SceneError where loops are closed, for an implicit method that cannot follow them, and for
+    the tangent of laws alone."""
+    if method in _ALIEN:
+        refuse(packed, f'method "{method}"', "genalpha and rodas4p2 do")
+    if tangent == "laws":
+        refuse(packed, 'tangent = "laws"', 'take tangent = "exact"')
