@@ -1309,6 +1309,12 @@ static int mstmm_at_closures_answered(mstmm_state *state, int index)
     for (int k = 0; k < body->nu; k++) {
         (state->udot + body->u + k)[0] += (along + k)[0];
     }
+    if (state->refined) {
+        for (int c = 0; c < 6; c++) {
+            if (closure->rows[c] < 0) continue;
+            (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X)[0] += (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_TOLD)[0];
+        }
+    }
     if ((state->observed || state->balance)) {
         memset(block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
         for (int k = 0; k < body->nu; k++) {
@@ -1318,9 +1324,6 @@ static int mstmm_at_closures_answered(mstmm_state *state, int index)
         }
         for (int c = 0; c < 6; c++) {
             if (closure->rows[c] < 0) continue;
-            if (state->refined) {
-                (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X)[0] += (loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_TOLD)[0];
-            }
             mstmm_loops_act(
                 .J = closed + MSTMM_CLOSURE_W + 6 * c,
                 .tau = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
@@ -6109,6 +6112,10 @@ int mstmm_run_accelerations(mstmm_state *state)
         if (code) return code;
     }
     if (model->looped) {
+        code = mstmm_hook_rows_asked(state);
+        if (code) return code;
+    }
+    if (model->looped) {
         code = mstmm_pass_carried(state);
         if (code) return code;
     }
@@ -6227,6 +6234,8 @@ int mstmm_run_correction(mstmm_state *state)
     code = mstmm_hook_rows_begun(state);
     if (code) return code;
     code = mstmm_pass_closures(state);
+    if (code) return code;
+    code = mstmm_hook_rows_asked(state);
     if (code) return code;
     code = mstmm_pass_carried(state);
     if (code) return code;

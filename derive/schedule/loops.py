@@ -237,6 +237,7 @@ CLOSURES_ANSWERED = Pass(
              c="local.along"),
         Copy(to="body.udot", source="body.s"),
         EachSpeed(steps=(Add(to="body.udot[k]", source="local.along[k]"),)),
+        Each(of="rows", when="refined", steps=(Add(to="line.x", source="line.told"),)),
         *only(
             "kept",
             Copy(to="body.e"),
@@ -245,10 +246,7 @@ CLOSURES_ANSWERED = Pass(
             ),
             Each(
                 of="rows",
-                steps=(
-                    Add(to="line.x", source="line.told", when="refined"),
-                    call("loops.act", J="closure.W[6 * c]", tau="line.x", e="body.e"),
-                ),
+                steps=(call("loops.act", J="closure.W[6 * c]", tau="line.x", e="body.e"),),
             ),
         ),
     ),

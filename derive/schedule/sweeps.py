@@ -52,6 +52,7 @@ _APPLIED = (
 _CLOSED = (
     Run(hook="rows_begun"),
     Run(whole=CLOSURES),
+    Run(hook="rows_asked"),
     Run(whole=CARRIED),
     Run(whole=ROW_CLOSED),
     Run(whole=ROW_FOUND),

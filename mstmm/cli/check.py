@@ -14,6 +14,7 @@ from .options import Json, python_file, quoted
 
 if TYPE_CHECKING:
     from mstmm.bridge.crosscheck import Report as Crosscheck
+    from mstmm.runtime.engine.loops.closed import Loops
     from mstmm.scene import Scene
     from mstmm.scene.checks.topology import Topology
 
@@ -104,8 +105,8 @@ def _scene(path: str) -> Report:
     notes = [f"{name}: {note}" for name, body in model.flexible.items() for note in body.notes]
     warnings = [*scene.warnings, *(w for body in model.flexible.values() for w in body.warnings)]
     report = {"ok": True, "kind": "scene", **sizes, "warnings": warnings, "choices": notes}
-    text = _scene_text(path, scene, sizes, warnings, notes)
-    return {**report, "toml": scene.to_toml(), "text": text}
+    lines = [_scene_text(path, scene, sizes, warnings, notes), *_loop_lines(model.loops)]
+    return {**report, "toml": scene.to_toml(), "text": "\n".join(lines)}
 
 
 _ONE = {
@@ -165,6 +166,20 @@ def _tree_lines(scene: Scene) -> list[str]:
         lines.append(f"  {cut.name}: {cut.type} closes a loop: {cut.inboard} - {cut.outboard}")
     if len(tree.cut) > _SHOWN:
         lines.append(f"  ... and {len(tree.cut) - _SHOWN} more loops")
+    return lines
+
+
+def _loop_lines(loops: Loops) -> list[str]:
+    """What closed loops leave free, and which loads they leave open."""
+    if not loops.rows:
+        return []
+    lines = [f"  loops: {loops.rank} of {len(loops.rows)} rows count, {loops.mobility} speeds left"]
+    if loops.redundant:
+        told = ", ".join(f"{word} of {name}" for name, word in loops.redundant[:_SHOWN])
+        more = " ..." if len(loops.redundant) > _SHOWN else ""
+        lines.append(f"  loops: rows that repeat others: {told}{more}")
+    if loops.not_unique:
+        lines.append(f"  loops: loads that rigid bodies leave open: {loops.open_loads}")
     return lines
 
 

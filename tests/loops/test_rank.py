@@ -7,6 +7,7 @@ import pytest
 
 import mstmm
 
+from .linkages import bricard
 from .scenes import Scene, four_bars, rod, scissors
 from .test_four_bar import linkage
 
@@ -48,6 +49,8 @@ def test_pins_of_a_plane_in_space(count: int, rows: int) -> None:
         assert len(loops.redundant) == 3 * count
         assert {word for _, word in loops.redundant} == {"z", "mx", "my"}
         assert loops.mobility == 1 and not loops.singular and loops.width <= 4
+        assert len(loops.not_unique) == 3 * count + 1
+        assert set(loops.not_unique.values()) == {("fz", "mx", "my")}
 
 
 def test_an_oblique_plane_changes_no_motion() -> None:
@@ -65,6 +68,11 @@ def test_a_ball_cut_leaves_one_row_too_many() -> None:
     loops = loops_of(scene)
     assert (len(loops.rows), loops.rank) == (3, 2)
     assert loops.redundant == (("closing_pin", "z"),)
+    # One state: a force across the plane at the ball, which the bars carry to the ground.
+    assert loops.not_unique == {
+        "crank_pin": ("fz", "mx", "my"), "coupler_pin": ("fz", "my"), "rocker_pin": ("fz", "my"),
+        "closing_pin": ("fz",),
+    }  # fmt: skip
 
 
 def test_a_third_crank_repeats_a_row_of_its_own() -> None:
@@ -81,6 +89,8 @@ def test_a_third_crank_repeats_a_row_of_its_own() -> None:
     loops = loops_of(scene)
     assert (len(loops.rows), loops.rank, loops.mobility) == (10, 3, 1)
     assert not loops.singular
+    # Along its own crank, besides what the plane leaves open.
+    assert loops.not_unique["foot"] == loops.not_unique["foot0"] == ("fx", "fz", "mx", "my")
 
 
 @pytest.mark.parametrize("count", [1, 2, 6])
@@ -115,6 +125,15 @@ def test_an_axis_a_little_off_does_not_lock() -> None:
     scene["hinge"][3]["orientation"] = [1e-4, 0.0, 0.0]
     loops = loops_of(scene)
     assert (loops.rank, loops.mobility) == (2, 1)
+
+
+def test_rows_are_called_by_axes_of_their_own() -> None:
+    """Five directions of a pin along no axis have five names; its load is open but about it."""
+    loops = loops_of(bricard())
+    assert (loops.rank, len(set(loops.rows))) == (4, 5)
+    about = {"pin0": "my", "pin1": "mz", "pin2": "mx", "pin3": "my", "pin4": "mz", "pin5": "mx"}
+    for name, words in loops.not_unique.items():
+        assert len(words) == 5 and about[name] not in words
 
 
 def test_a_tree_closes_nothing() -> None:

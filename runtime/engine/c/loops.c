@@ -42,6 +42,29 @@ int mstmm_hook_rows_begun(mstmm_state *state)
     return 0;
 }
 
+int mstmm_hook_rows_asked(mstmm_state *state)
+{
+    for (int r = 0; state->asked && r < state->model->n_rows; r++)
+        row_numbers(state, r)[MSTMM_ROW_KNOWN] = state->asked[r];
+    return 0;
+}
+
+int mstmm_stressed(const mstmm_model *model, real *workspace, real give, const real *asked,
+                   const real *q, const real *memory, real *multipliers, mstmm_failure *failure)
+{
+    mstmm_state state = {.model = model, .workspace = workspace, .q = q, .memory = memory,
+                         .observed = 1, .level = MSTMM_SLIP, .give = give, .asked = asked,
+                         .failure = failure};
+    real *still = mstmm_spare_udot(&state);
+    memset(still, 0, (size_t)model->nu * sizeof(real));
+    state.u = state.given = state.udot = still;
+    state.qdot = mstmm_spare_qdot(&state);
+    mstmm_ground(&state);
+    const int code = mstmm_run_correction(&state);
+    for (int r = 0; r < model->n_rows; r++) multipliers[r] = row_numbers(&state, r)[MSTMM_ROW_X];
+    return code;
+}
+
 int mstmm_refine(mstmm_state *state, const real *q, const real *u)
 {
     const mstmm_model *model = state->model;

@@ -263,6 +263,11 @@ int mstmm_solve(const mstmm_model *model, real *workspace, int64_t n, const real
 int mstmm_correction(const mstmm_model *model, real *workspace, int level, real give, real t,
                      const real *q, const real *u, const real *memory, real *change,
                      real *missing, mstmm_failure *failure);
+/* Multipliers (n_rows) of rows that lack `asked` and yield by `give` of their mobility, at rest:
+ * with a small share those of self-stress states are all that is left.  Their loads stay in the
+ * workspace. */
+int mstmm_stressed(const mstmm_model *model, real *workspace, real give, const real *asked,
+                   const real *q, const real *memory, real *multipliers, mstmm_failure *failure);
 /* Driven coordinates and speeds filled in, in place. */
 int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q, real *u,
                       const real *memory, mstmm_failure *failure);
@@ -322,6 +327,7 @@ typedef struct mstmm_state {
     int hinges_known; /* hinges have their motion already */
     int level;        /* MSTMM_GAP, MSTMM_SLIP; 0: accelerations */
     real give;        /* see mstmm_correction */
+    const real *asked; /* what the rows lack, in place of gap or slip; NULL: that */
     int refined;      /* `given` is an answer, its multipliers are kept: what is left is answered */
     int residual;     /* drives give accelerations though others are given */
     struct mstmm_state *slope; /* where derivatives along a direction lie; NULL: none are wanted */

@@ -65,6 +65,18 @@ class LoopCalls:
             raise engine.failed(failure, t, q, u)
         return change, missing[: self.count]
 
+    def stressed(self, q: Array, asked: Array, give: float) -> Array:
+        """Multipliers (rows,) of rows that lack `asked` and yield by `give`; see sweep.h."""
+        engine, found = self.engine, np.zeros(max(1, self.count))
+        failure = engine.ffi.new("mstmm_failure *")
+        code = engine.lib.mstmm_stressed(
+            self.model, engine.workspace(), give, engine.pointer(asked), engine.pointer(q),
+            engine.pointer(self.memory), engine.pointer(found), failure,
+        )  # fmt: skip
+        if code:
+            raise engine.failed(failure, 0.0, q, np.zeros(engine.nu))
+        return found[: self.count]
+
     def moved(self, q: Array, change: Array, t: float = 0.0) -> Array:
         """q (nq,) moved by a change along the speeds (nu,)."""
         engine, result = self.engine, q.copy()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from .assembly import Assembly
 from .calls import LoopCalls
 from .rank import REPEATED, rank_at
 from .refinement import loses_digits
+from .stress import outboard_axes
 
 #: Directions of a hinge that closes a loop, as its rows are called.
 _DIRECTIONS = ("x", "y", "z", "mx", "my", "mz")
@@ -35,9 +36,12 @@ class Loops:
     Attributes:
         cut: hinges that close loops; which of a loop's hinges does changes nothing but the work.
         rows: (hinge, direction) of every row, in the order in which they are closed: "x" to "mz"
-            along and about the outboard axes of the hinge, "u1", ... for its own speeds.
+            for the outboard axis of the hinge along or about which it lies, or nearly so, "u1",
+            ... for its own speeds.
         rank: how many rows say something of their own.
         redundant: rows that repeat others, so that the loads along them are not determined.
+        not_unique: components of the loads of hinges, "fx" to "mz" along and about their outboard
+            axes, by name: rigid bodies do not determine them, results show one of many shares.
         mobility: speeds that are left free.
         width: most rows that are open across one hinge at a time.
         singular: whether the start is a singular pose, where fewer rows count than nearby.
@@ -50,6 +54,18 @@ class Loops:
     mobility: int = 0
     width: int = 0
     singular: bool = False
+    not_unique: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def open_loads(self) -> str:
+        """`not_unique` in words, the first hinges by name."""
+        alike: dict[tuple[str, ...], list[str]] = {}
+        for name, words in self.not_unique.items():
+            alike.setdefault(words, []).append(name)
+        return "; ".join(
+            f"{' '.join(words)} of {', '.join(names[:_NAMED])}{' ...' if names[_NAMED:] else ''}"
+            for words, names in list(alike.items())[:_NAMED]
+        )
 
 
 class Closed:
@@ -113,6 +129,7 @@ class Closed:
             tuple(cut.hinge for cut in packed.expanded.cuts), tuple(names), rows,
             tuple(names[row] for row in sorted(rank.here)),
             free_speeds - self._shared() - rows, records.width, rank.singular,
+            rank.not_unique,
         )  # fmt: skip
         return told, {row: names[row] for row in sorted(rank.going)}
 
@@ -153,9 +170,20 @@ class Closed:
         names, system = [("", "")] * calls.count, self.engine.packed.system
         for one in calls.records.closures:
             hinge, speeds = calls.engine.hinge_name(one.frame), system.body(one.frame).nu
-            directions = calls.numbers_of(one, "W")
+            held = [direction for direction in range(6) if direction >= speeds]
+            axes = outboard_axes(calls, one.frame)
+            W = calls.numbers_of(one, "W")[held].reshape(-1, 2, 3) @ axes
+            words = dict(zip(held, _words(np.abs(W.reshape(-1, 6))), strict=True))
             for direction, row in one.rows.items():
-                along = int(np.abs(directions[direction]).argmax())
-                word = f"u{direction + 1}" if direction < speeds else _DIRECTIONS[along]
-                names[row] = (hinge, word)
+                names[row] = (hinge, words.get(direction, f"u{direction + 1}"))
         return names
+
+
+def _words(sizes: Array) -> list[str]:
+    """A word for each of n directions (n, 6), none twice: the largest components choose first."""
+    words, left = [""] * len(sizes), sizes.copy()
+    for _ in words:
+        row, column = np.unravel_index(left.argmax(), left.shape)
+        words[row] = _DIRECTIONS[column]
+        left[row], left[:, column] = -1.0, -1.0
+    return words

@@ -9,6 +9,7 @@ closed states nearby is no repetition but a singular pose.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -21,6 +22,7 @@ from ...pack.loops.variants import by_hinges, geometric
 from ...pack.pack import packed_system
 from ..engine import Engine
 from .calls import LoopCalls
+from .stress import not_unique
 
 #: A pivot below this share of the mobility of its row repeats others: misfits up to 4e-3 rad.
 REPEATED = 1e-6
@@ -38,12 +40,15 @@ _STEPS, _CLOSED, _GIVE, _SHARE = 60, 1e-9, 1e-6, 1e-2
 class Rank:
     """Rows that repeat others here, those of them that do so in closed states nearby too, and those
     of these that go: the others take the place of another row of their hinge where that one says
-    nothing, at a pose farther away.  `states` are those that were looked at, this one first."""
+    nothing, at a pose farther away.  `states` are those that were looked at, this one first,
+    `not_unique` the components of loads that rows which always repeat others leave open.
+    """
 
     here: frozenset[int]
     always: frozenset[int]
     going: frozenset[int]
     states: tuple[Array, ...]
+    not_unique: Mapping[str, tuple[str, ...]]
 
     @property
     def singular(self) -> bool:
@@ -57,7 +62,7 @@ def rank_at(engine: Engine, q: Array) -> Rank:
     level = REPEATED * calls.mobility
     here = _repeating(calls, q, level)
     if not here:
-        return Rank(here, here, here, (q,))
+        return Rank(here, here, here, (q,), {})
     raised = _RAISED * np.abs(calls.pivots()) + _ROUNDING * calls.mobility
     level[list(here)] = np.minimum(level, raised)[list(here)]
     always, draw, states = here, np.random.default_rng(0), [q]
@@ -67,9 +72,10 @@ def rank_at(engine: Engine, q: Array) -> Rank:
             always &= _repeating(calls, near, level)
             states.append(near)
     gaps = calls.correction(calls.gap, q, np.zeros(engine.nu))[1]
-    if np.abs(gaps).max() > _CLOSED:
-        return Rank(here, always, always, tuple(states))
-    return Rank(here, always, always - _stand_ins(calls, q, always), tuple(states))
+    closed = np.abs(gaps).max() <= _CLOSED
+    going = always - _stand_ins(calls, q, always) if closed else always
+    loads = not_unique(calls, q if here == always else states[-1]) if always else {}
+    return Rank(here, always, going, tuple(states), loads)
 
 
 def _calls(engine: Engine, q: Array) -> LoopCalls:
