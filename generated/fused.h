@@ -17,12 +17,15 @@ typedef struct {
 } mstmm_batch;
 
 typedef struct {
-    int abi, nq, nu, np, n_memory, lanes;
+    int abi, nq, nu, np, n_memory, lanes, n_closures;
     const char *key;
     int n_failures;
     const int *failures;
     int (*accelerations)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *qdot, double *udot);
     int (*accelerations_power)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *qdot, double *udot, double *power, double *potential);
+    /* Where loops are closed; see derive/fuse/closing.py. */
+    int (*gaps)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *dq, double *gap, double *apart);
+    int (*slips)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *du);
     int (*accelerations_lanes)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *qdot, double *udot, int *codes);
     /* Fills codes (n); returns the number of states that failed. */
     long long (*accelerations_many)(const mstmm_batch *batch);

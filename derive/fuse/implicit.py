@@ -19,7 +19,7 @@ from ..schedule.sweeps import INVERSE_DYNAMICS
 from .inline import Nodes
 from .passes.balance import balance
 from .replay import Replay
-from .scene import Fused, gathered, inputs_of
+from .scene import Fused, inputs_of
 from .state import FusionState, Kernels
 
 Matrix = list[Nodes]
@@ -169,7 +169,7 @@ class _Moving:
         self._structure = structure
         state = FusionState(structure, kernels, None)
         self._graph, self._lag = state.graph, _Lag(state)
-        self._rates = gathered(self._lag.replay, "qdot")
+        self._rates = self._lag.replay.gathered("qdot")
         for place in _driven(structure):
             self._rates[place] = state.zero
 
@@ -203,7 +203,7 @@ class _Residual:
         self._a, self._lag = state.given, _Lag(state)
         replay = Replay(state, staged=False, inverse=True)
         replay.sweep(INVERSE_DYNAMICS)
-        required = gathered(replay, "required")
+        required = replay.gathered("required")
         driven = zip(required, state.u, self._imposed, strict=True)
         self._power = sum(
             (felt * speed for felt, speed, imposed in driven if imposed),

@@ -19,7 +19,7 @@ from .implicit import RATES
 from .inline import Nodes
 from .passes.balance import balance
 from .replay import Replay
-from .scene import Fused, fuse, gathered, inputs_of
+from .scene import Fused, fuse, inputs_of
 from .state import FusionState, Kernels
 
 #: Guard code: the looped engine names what fails.
@@ -72,7 +72,7 @@ def fuse_required(structure: Structure, kernels: Kernels) -> KernelIR:
     """Kernel "required": the efforts R (nu) by inverse dynamics, of the same inputs."""
     state = FusionState(structure, kernels, None)
     outputs = [Port("required", (structure.nu,))]
-    values: dict[str, object] = {"required": gathered(_required(state), "required")}
+    values: dict[str, object] = {"required": _required(state).gathered("required")}
     return state.graph.kernel("required", _inputs(structure), outputs, values, as_made=True)
 
 
@@ -85,11 +85,11 @@ class _About:
         self._q, self._u, self._a = list(state.q), list(state.u), list(state.given)
         rates = Replay(state, staged=False)
         rates.sweep(RATES)
-        self._rates = gathered(rates, "qdot")
+        self._rates = rates.gathered("qdot")
         self.moves = [derivatives(self._rates, {self._u[j]: 1}) for j in free]
         replay = _required(state)
         self.conditions = replay.conditions
-        required = gathered(replay, "required")
+        required = replay.gathered("required")
         self.r = [required[j] for j in free]
 
     def along(self, port: str, place: int, one: Node) -> Node:

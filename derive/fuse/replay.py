@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from fractions import Fraction
 
 from mstmm.border.failures import Failed
@@ -20,10 +21,12 @@ from ..schedule.steps import (
     ChooseBias,
     Copy,
     Do,
+    Each,
     EachSpeed,
     Evaluate,
     Gather,
     JudgePivots,
+    Move,
     Pass,
     Pick,
     Spread,
@@ -33,7 +36,8 @@ from ..schedule.steps import (
 from ..schedule.words import SLOTS
 from .inline import Nodes
 from .known import along_a_screw, screw_axis, unit_row
-from .slots import GROUND, Slots, Subject
+from .rows import RowSlots, closure_at, row_subject
+from .slots import GROUND, Subject
 from .state import FusionState
 
 #: Lengths of the local slots that start from zeros.
@@ -42,13 +46,16 @@ _LOCAL_SIZES = {"local.e_I": 6, "local.S_I": 21, "local.effort": 1}
 PIVOT_FLOOR = Fraction(1, 10**14)
 
 
-class Replay(Slots):
+class Replay(RowSlots):
     """One replay of sweeps.  `staged`: transport goes stage by stage, where what is known folds;
-    `inverse`: accelerations are given."""
+    `inverse`: accelerations are given; `level`: "gaping" or "slipping", what is corrected of closed
+    loops."""
 
-    def __init__(self, state: FusionState, staged: bool = True, inverse: bool = False) -> None:
+    def __init__(
+        self, state: FusionState, staged: bool = True, inverse: bool = False, level: str = ""
+    ) -> None:
         super().__init__(state)
-        self.staged, self.inverse = staged, inverse
+        self.staged, self.inverse, self.level = staged, inverse, level
         #: Conditions of guards, which code without failure codes asks for as a whole.
         self.conditions: list[Node] = []
         self._values: Nodes = []
@@ -77,10 +84,12 @@ class Replay(Slots):
         s = self.state.structure
         if whole.subject == "body":
             return [
-                Subject({"body": i, "parent": body.parent})
-                for i, body in enumerate(s.bodies)
+                self.body_subject(i)
+                for i in range(len(s.bodies))
                 if whole is not POSES or i in self._posed
             ]
+        if whole.subject == "row":
+            return [row_subject(s.rows, i) for i, row in enumerate(s.rows) if row.body == GROUND]
         if whole.subject == "law":
             return [Subject({"body": x.body}, law=x, index=i) for i, x in enumerate(s.laws)]
         if whole.subject == "load":
@@ -97,12 +106,19 @@ class Replay(Slots):
             return [Subject({"body": body}, index=k) for k, (body, _) in enumerate(s.driven)]
         return [Subject({"body": GROUND}, index=k) for k in range(s.nu)]
 
+    def body_subject(self, index: int) -> Subject:
+        s, closure = self.state.structure, closure_at(self.state.structure, index)
+        roles = {"body": index, "parent": s.bodies[index].parent}
+        return Subject(roles if closure is None else roles | {"outboard": closure.outboard})
+
     def _bodies_with_poses(self) -> set[int]:
-        """Bodies that loads and force elements need, and those between them and the ground."""
+        """Bodies that loads, force elements and closures need, and those between them and the
+        ground."""
         s = self.state.structure
         asked = [x for load in s.loads for x in (load.body, load.axes)]
         asked += [x for force in s.forces for x in (force.body_f, force.body_t)]
         asked += [i for i, body in enumerate(s.bodies) if body.modal and body.modal.drag]
+        asked += [x for closure in s.closures for x in (closure.frame, closure.outboard)]
         found: set[int] = set()
         for index in asked:
             while index >= 0 and index not in found:
@@ -136,11 +152,10 @@ class Replay(Slots):
     def _scene_has(self, trait: str) -> bool:
         s = self.state.structure
         known = {
-            "linked": False, "product": False, "qr": False, "looped": False, "refined": False,
-            "residual": False,
-            "balance": True, "efforts": True,
+            "linked": False, "product": False, "qr": False, "refined": False, "residual": False,
+            "looped": bool(s.closures), "balance": not self.level, "efforts": True,
             "inverse": self.inverse,
-            "driving": True,
+            "driving": not self.level,
             "laws": bool(s.laws), "driven": s.drives is not None,
             "valued": s.values is not None, "posed": bool(self._posed),
             "flexible": any(body.modal for body in s.bodies),
@@ -151,6 +166,8 @@ class Replay(Slots):
         """Whether the subject has a trait; see `schedule.words`."""
         if trait in ("balance", "efforts", "inverse", "driving"):
             return self._scene_has(trait)
+        if trait in ("gaping", "slipping"):
+            return self.level == trait
         if trait == "coordinate":
             return self.at.law is not None and not self.at.law.axes
         if trait == "effort":
@@ -182,6 +199,19 @@ class Replay(Slots):
     def _do(self, step: Do) -> None:
         assert step.whole is not None
         self._steps(step.whole.steps)
+
+    def _each(self, step: Each) -> None:
+        at, local = self.at, self.local
+        for subject in self.met(step.of):
+            self.at = subject
+            self._steps(_at_entry(inner, "c", subject.direction) for inner in step.steps)
+        self.at, self.local = at, local
+
+    def _rows_begun(self) -> None:
+        """Slots of rows begin with what `RowSlots` gives."""
+
+    def _rows_asked(self) -> None:
+        """Rows are asked for nothing but to be met."""
 
     def _call(self, step: Call) -> None:
         kernel, ports = self._kernel(step.kernel), dict(step.ports)
@@ -229,7 +259,7 @@ class Replay(Slots):
 
         return guard
 
-    def _copy(self, step: Copy) -> None:
+    def _copy(self, step: Copy | Move) -> None:
         if step.source:
             self.fill(step.to, list(self.get(step.source, 0)))
         else:
@@ -294,7 +324,7 @@ class Replay(Slots):
     def _each_speed(self, step: EachSpeed) -> None:
         for k in range(self.body.nu):
             if self.body.imposed[k] or not step.imposed:
-                self._steps(_at_speed(inner, k) for inner in step.steps)
+                self._steps(_at_entry(inner, "k", k) for inner in step.steps)
 
     def _by_screw(self, step: ByScrew) -> None:
         rotation, position = self.get(step.rotation, 9), self.get(step.position, 3)
@@ -343,17 +373,22 @@ def _total(own: Nodes, whole: Nodes, places: tuple[int, int, int]) -> Node:
     return total if total.value != 0 else whole[a] + whole[b] + whole[c]
 
 
-def _at_speed(step: Step, k: int) -> Step:
-    """The step with the entry of speed k in place of "[k]"."""
+def _at_entry(step: Step, letter: str, number: int) -> Step:
+    """The step with the entry `number` in place of "[k]", row `number` in place of "[6 * k]"."""
 
     def at(slot: str) -> str:
-        return slot.replace("[k]", f"[{k}]")
+        name, _, place = slot.partition("[")
+        width, times, found = place.rstrip("]").rpartition(" * ")
+        if found != letter:
+            return slot
+        first, count = (int(width) * number, int(width)) if times else (number, 1)
+        return f"{name}[{' '.join(map(str, range(first, first + count)))}]"
 
     if isinstance(step, Call):
-        ports = tuple((port, at(slot)) for port, slot in step.ports)
-        return Call(step.when, step.kernel, ports, step.fails)
-    assert isinstance(step, Add)
-    return Add(step.when, at(step.to), at(step.source), step.times)
+        return replace(step, ports=tuple((port, at(slot)) for port, slot in step.ports))
+    if isinstance(step, (Add, Copy, Move)):
+        return replace(step, to=at(step.to), source=at(step.source))
+    return step
 
 
 def _axial(replay: Replay, body: BodyStructure) -> bool:
@@ -377,10 +412,19 @@ _TRAITS: dict[str, Callable[[Replay, BodyStructure], bool]] = {
     "section": lambda replay, body: body.section is not None,
     "outward": lambda replay, body: body.section is not None and not body.section.inward,
     "drag": lambda replay, body: body.modal is not None and bool(body.modal.drag),
+    "moving": lambda replay, body: body.section is None and bool(replay.free()),
+    "cut": lambda replay, body: replay.closure() is not None,
+    "aside": lambda replay, body: body.idle or replay.closure() is not None,
+    "refined": lambda replay, body: False,
+    "kept": lambda replay, body: not replay.level,
+    "corrected": lambda replay, body: bool(replay.level),
+    "soft": lambda replay, body: bool(replay.row().soft),
+    "unmoved": lambda replay, body: replay.get("row.pivot", 1)[0].value == 0,
 }
 
 _DO: dict[type, Callable[..., None]] = {
     Do: Replay._do, Call: Replay._call, Copy: Replay._copy, Add: Replay._add,
+    Each: Replay._each, Move: Replay._copy,
     Pick: Replay._pick, Spread: Replay._spread, Gather: Replay._gather,
     Evaluate: Replay._evaluate, EachSpeed: Replay._each_speed, ByScrew: Replay._by_screw,
     ChooseBias: Replay._choose_bias, JudgePivots: Replay._judge_pivots,

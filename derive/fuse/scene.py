@@ -14,7 +14,7 @@ from mstmm.ir import KernelIR, Port
 from mstmm.ir.structure import Structure
 
 from ..schedule.sweeps import ACCELERATIONS, FACTORISATION, SOLUTION
-from .inline import Nodes
+from .closing import gaps, slips
 from .passes.balance import balance
 from .replay import Replay
 from .state import FusionState, Kernels
@@ -38,7 +38,8 @@ def inputs_of(structure: Structure) -> list[Port]:
 
 
 def fuse(structure: Structure, kernels: Kernels, numbers: Sequence[float] | None = None) -> Fused:
-    """Kernel "accelerations" of a scene, and "accelerations_power" where there are laws or loads.
+    """Kernel "accelerations" of a scene, and "accelerations_power" where there are laws or loads;
+    where loops are closed "gaps" and "slips" besides (see `closing`).
 
     Inputs p, t, q, u, memory, efforts; outputs qdot, udot, and with power the power of everything
     that is not stored and the potential of springs and laws.  With `numbers` the parameters are
@@ -50,7 +51,7 @@ def fuse(structure: Structure, kernels: Kernels, numbers: Sequence[float] | None
     outputs = [Port("qdot", (s.nq,)), Port("udot", (s.nu,))]
     sums = [Port("power", (1,)), Port("potential", (1,))]
     values: dict[str, object] = {
-        "qdot": gathered(replay, "qdot"), "udot": gathered(replay, "udot"),
+        "qdot": replay.gathered("qdot"), "udot": replay.gathered("udot"),
     }  # fmt: skip
     power: dict[str, object] = {port.name: replay.get(f"sums.{port.name}", 1) for port in sums}
     found = [state.graph.kernel("accelerations", inputs_of(s), outputs, values, as_made=True)]
@@ -62,6 +63,8 @@ def fuse(structure: Structure, kernels: Kernels, numbers: Sequence[float] | None
                 as_made=True,
             )
         )  # fmt: skip
+    for close in (gaps, slips) if s.closures else ():
+        found.append(close(FusionState(s, kernels, numbers, state.failures), inputs_of(s)))
     return Fused({kernel.name: balance(kernel) for kernel in found}, tuple(state.failures))
 
 
@@ -82,21 +85,7 @@ def fuse_solution(structure: Structure, kernels: Kernels) -> KernelIR:
         "solution",
         [*inputs_of(s), Port("column", (s.nu,))],
         [Port("answer", (s.nu + 1,))],
-        {"answer": [*gathered(replay, "answer"), holds]},
+        {"answer": [*replay.gathered("answer"), holds]},
         as_made=True,
     )
     return balance(answer)
-
-
-def gathered(replay: Replay, name: str) -> Nodes:
-    """What every body and its modes have in the slot `name`, in the order of the state."""
-    structure = replay.state.structure
-    found = replay.state.zeros(structure.nq if name == "qdot" else structure.nu)
-    for index, body in enumerate(structure.bodies):
-        first = body.q if name == "qdot" else body.u
-        own = replay.filled(index, f"body.{name}") or []
-        found[first : first + len(own)] = own
-        if body.modal is not None:
-            first = body.modal.q if name == "qdot" else body.modal.u
-            found[first : first + body.modal.n] = replay.filled(index, f"modes.{name}") or []
-    return found

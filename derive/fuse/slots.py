@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
 from mstmm.ir.graph import Node
@@ -26,13 +26,18 @@ GROUND = -1
 
 @dataclass(frozen=True)
 class Subject:
-    """What a pass is at: a body (by its roles), and the law, load, force or drive if it is one."""
+    """What a pass is at: a body (by its roles), and the law, load, force, drive or row if it is
+    one; of rows those met with it, and the direction of its hinge whose row it is."""
 
     roles: dict[str, int]
     law: LawStructure | None = None
     load: LoadStructure | None = None
     force: ForceStructure | None = None
     index: int = 0
+    row: int = -1
+    other: int = -1
+    second: int = -1
+    direction: int = -1
 
 
 class Slots:
@@ -40,7 +45,7 @@ class Slots:
 
     def __init__(self, state: FusionState) -> None:
         self.state = state
-        self._filled: dict[tuple[int, str], Nodes] = {}
+        self._filled: dict[Hashable, Nodes] = {}
         self.local: dict[str, Nodes] = {}
         self.at = Subject({})
         gravity = [-g for g in state.entries(state.structure.gravity)]
@@ -129,7 +134,20 @@ class Slots:
         """What a slot of a body holds; None if nothing was put there."""
         return self._filled.get((index, slot))
 
-    def _key(self, slot: str) -> tuple[int, str]:
+    def gathered(self, name: str) -> Nodes:
+        """What every body and its modes have in the slot `name`, in the order of the state."""
+        s = self.state.structure
+        found = self.state.zeros(s.nq if name == "qdot" else s.nu)
+        for index, body in enumerate(s.bodies):
+            first = body.q if name == "qdot" else body.u
+            own = self.filled(index, f"body.{name}") or []
+            found[first : first + len(own)] = own
+            if body.modal is not None:
+                first = body.modal.q if name == "qdot" else body.modal.u
+                found[first : first + body.modal.n] = self.filled(index, f"modes.{name}") or []
+        return found
+
+    def _key(self, slot: str) -> Hashable:
         owner, _, name = slot.partition(".")
         if owner in ROLES:
             return self.at.roles[owner], f"body.{name}"

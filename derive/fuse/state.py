@@ -15,16 +15,21 @@ Kernels = Callable[[Key, str], KernelIR]
 
 
 class FusionState:
-    """Graph, numbers and inputs of a scene that is being fused."""
+    """Graph, numbers and inputs of a scene that is being fused; `failures` are those of other
+    kernels of the same library, which go on here."""
 
     def __init__(
-        self, structure: Structure, kernels: Kernels, numbers: Sequence[float] | None
+        self,
+        structure: Structure,
+        kernels: Kernels,
+        numbers: Sequence[float] | None,
+        failures: list[tuple[int, int, int]] | None = None,
     ) -> None:
         self.structure, self.kernels, self.numbers = structure, kernels, numbers
         self.graph = Graph()
         self.inline = Inliner(self.graph)
         self.zero, self.one = self.inline.zero, self.inline.one
-        self.failures: list[tuple[int, int, int]] = []
+        self.failures = [] if failures is None else failures
         self.t = self.graph.element("t", 0)
         self.q = self.graph.vector("q", structure.nq)
         self.u = self.graph.vector("u", structure.nu)

@@ -31,7 +31,7 @@ from .conditions import condition, condition_needs
 from .storage import VARIABLES, Place, place, size_of
 
 #: Traits that only code for one scene has.
-NEVER = frozenset({"staged", "link", "turned"})
+NEVER = frozenset({"staged", "link", "turned", "unmoved"})
 #: Kernels' pointers in the records.
 #: Directions: how many, what points the derivatives along number c, variables that both read.
 _ALONG = {

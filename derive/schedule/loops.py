@@ -1,14 +1,24 @@
 """Closed loops: rows of the hinges that close them, carried as columns through the sweep.
 
 In place of `condense` and `recover` the elimination of a hinge is kept, as for several right-hand
-sides, and the columns of the rows that are open yet follow the load across it.  See
-derive/equations/loops.py.
+sides, and the columns of the rows that are open yet follow the load across it; in code for one
+scene stage by stage, as the load does there.  See derive/equations/loops.py.
 """
 
 from __future__ import annotations
 
 from .motion import HINGE_MOTION
-from .riccati import BODY, FREE, FREE_EFFORTS
+from .riccati import (
+    BODY,
+    FREE,
+    FREE_EFFORTS,
+    HANDED_ON,
+    JUDGED,
+    ONWARD,
+    RECOVERED,
+    eliminated,
+    reached,
+)
 from .steps import (
     TIPS_TO_ROOT,
     Add,
@@ -35,6 +45,8 @@ def _rows(relative: str, when: str) -> Call:
 
 _MEETING = (
     Do(whole=HINGE_MOTION, when="own"),
+    call("frames.pose", when="staged", A_I="connection.R", x_I="connection.r", Rc="hinge.R",
+         r="hinge.d", A="body.R", x="body.r"),
     call("generic{nu}.complement", fails="hinge", H="hinge.H", W="closure.W"),
     call("loops.gap", A_C="body.A", x_C="body.x", A_B="outboard.A", x_B="outboard.x",
          R_e="closure.turn", r_e="closure.end", **BODY, R_C="closure.R_C",
@@ -106,7 +118,9 @@ _ROW = {"inverse": "row.inverse", "K": "row.K", "l": "row.known"}
 ROW_CLOSED = Pass(
     "row_closed", "row", "A row closed on the body where its ends meet.",
     (
-        call("loops.close", **_ROW, L="row.pivot", floor="row.floor", S="meeting.S", e="meeting.e"),
+        Copy(to="row.inverse", when="unmoved"),
+        call("loops.close", when="!unmoved", **_ROW, L="row.pivot", floor="row.floor",
+             S="meeting.S", e="meeting.e"),
         Each(
             of="others",
             steps=(
@@ -169,6 +183,61 @@ UNLOADED = Pass(
 
 _ACROSS = {"H": "hinge.H_free", "G": "hinge.G"}
 
+#: How a row's column, moved by the hinge, is coupled with the load and with other columns.
+_COUPLED = only(
+    "moving",
+    call("generic{free}.divide", F="hinge.F", y="pending.y", z="local.z"),
+    call("generic{free}.answered", y="hinge.g", z="local.z", l="pending.known"),
+    Each(
+        of="before",
+        steps=(call("generic{free}.couple", y="before.y", z="local.z", L_ij="pair.L"),),
+    ),
+)
+
+
+def _felt(load: str, effort: str, rest: str) -> Call:
+    """What is left of an effort by a load, where the hinge's speeds are eliminated."""
+    return call("generic{free}.push", when="moving", Rc="identity", r="zero", H="hinge.H_free",
+                G="zero", e=load, tau=effort, y=rest)  # fmt: skip
+
+
+_ALONE = only(
+    "!staged",
+    call("generic{free}.factor", fails="undetermined", **BODY, H="hinge.H_free",
+         J="hinge.J_free", W="zero", floor="body.floor", S="body.S", F="hinge.F",
+         G="hinge.G", S_I="parent.S"),
+    call("generic{free}.push", **BODY, **_ACROSS, e="body.e", tau="hinge.tau_free",
+         y="hinge.g", e_I="parent.e"),
+    Each(
+        of="pending",
+        steps=(
+            call("generic{free}.push", **BODY, **_ACROSS, e="pending.K", tau="zero",
+                 y="pending.y", e_I="pending.onward"),
+            *_COUPLED,
+        ),
+    ),
+)  # fmt: skip
+_BY_STAGES = only(
+    "staged",
+    *reached("body.e"),
+    _felt("local.e", "hinge.tau_free", "hinge.g"),
+    *eliminated("hinge.tau_free", "hinge.z"),
+    JUDGED,
+    *ONWARD,
+    *HANDED_ON,
+    Each(
+        of="pending",
+        steps=(
+            *reached("pending.K"),
+            _felt("local.e", "zero", "pending.y"),
+            *eliminated("zero", "pending.z"),
+            *ONWARD,
+            Add(to="pending.onward", source="local.e", when="hung"),
+            *_COUPLED,
+        ),
+    ),
+)
+
 CARRIED = Pass(
     "carried", "body", "S, e and the columns of open rows carried across the hinge to the parent.",
     (
@@ -176,56 +245,44 @@ CARRIED = Pass(
         Do(whole=HINGE_MOTION, when="own"),
         *FREE,
         FREE_EFFORTS,
-        call("generic{free}.factor", fails="undetermined", **BODY, H="hinge.H_free",
-             J="hinge.J_free", W="zero", floor="body.floor", S="body.S", F="hinge.F",
-             G="hinge.G", S_I="parent.S"),
-        call("generic{free}.push", **BODY, **_ACROSS, e="body.e", tau="hinge.tau_free",
-             y="hinge.g", e_I="parent.e"),
-        Each(
-            of="pending",
-            steps=(
-                call("generic{free}.push", **BODY, **_ACROSS, e="pending.K", tau="zero",
-                     y="pending.y", e_I="pending.onward"),
-                *only(
-                    "moving",
-                    call("generic{free}.divide", F="hinge.F", y="pending.y", z="local.z"),
-                    call("generic{free}.answered", y="hinge.g", z="local.z", l="pending.known"),
-                    Each(
-                        of="before",
-                        steps=(
-                            call("generic{free}.couple", y="before.y", z="local.z",
-                                 L_ij="pair.L"),
-                        ),
-                    ),
-                ),
-            ),
-        ),
+        *_ALONE,
+        *_BY_STAGES,
     ),
     order=TIPS_TO_ROOT, skip="aside",
 )  # fmt: skip
 
+
+def _pulled(column: str, offset: str) -> Each:
+    """Efforts that the multipliers of open rows add."""
+    return Each(
+        of="pending",
+        steps=(
+            call("generic{free}.pull", when="moving", y=column, x="pending.x", y_0=offset),
+            call("loops.loaded", when="kept", K="pending.K", x="pending.x", e="body.e"),
+        ),
+    )
+
+
 ANSWERED = Pass(
     "answered", "body", "Accelerations of a hinge under the multipliers of its open rows.",
     (
-        Each(
-            of="pending",
-            steps=(
-                call("generic{free}.pull", when="moving", y="pending.y", x="pending.x",
-                     y_0="hinge.g"),
-                call("loops.loaded", when="kept", K="pending.K", x="pending.x", e="body.e"),
-            ),
+        *only(
+            "!staged",
+            _pulled("pending.y", "hinge.g"),
+            call("generic{free}.answer", **BODY, **_ACROSS, F="hinge.F", y="hinge.g",
+                 delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
         ),
-        call("generic{free}.answer", **BODY, **_ACROSS, F="hinge.F", y="hinge.g",
-             delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
+        *only("staged", _pulled("pending.z", "hinge.z"), *RECOVERED),
         Spread(to="body.udot", free="hinge.rates", imposed="body.s", when="!refined"),
         *only(
             "refined",
             Spread(to="body.udot", free="hinge.rates"),
             Add(to="body.udot", source="body.s"),
         ),
+        Add(to="body.udot", source="body.chosen", when="staged !corrected"),
         Each(of="openings", steps=(Do(whole=ROW_FOUND),)),
         # The elimination lay where H was.
-        Do(whole=HINGE_MOTION, when="imposed balance"),
+        Do(whole=HINGE_MOTION, when="!staged imposed balance"),
     ),
     skip="aside",
 )  # fmt: skip
@@ -236,11 +293,13 @@ CLOSURES_ANSWERED = Pass(
         call("loops.told", **_ROWS, delta_A="parent.delta", delta_B="outboard.delta",
              c="local.along"),
         Copy(to="body.udot", source="body.s"),
+        Add(to="body.udot", source="body.chosen", when="staged !corrected"),
         EachSpeed(steps=(Add(to="body.udot[k]", source="local.along[k]"),)),
         Each(of="rows", when="refined", steps=(Add(to="line.x", source="line.told"),)),
         *only(
             "kept",
             Copy(to="body.e"),
+            Copy(to="body.delta", when="staged"),  # what has no mass asks for none
             EachSpeed(
                 steps=(call("loops.loaded", K="closure.W[6 * k]", x="body.tau[k]", e="body.e"),),
             ),

@@ -73,25 +73,51 @@ def carried(stage: str, place: str, when: str) -> Step:
 #: Elimination apart from the transport.  Behind a screw about z that leaves H as it is, it is done
 #: in inboard axes, which takes the turn out of the chain of divisions.
 _ELIMINATED = {
-    **_CARRIED, "tau": "hinge.tau_free", "F": "hinge.F", "Z": "hinge.Z", "z": "hinge.z",
-    "W": "hinge.W", "S_Q": "local.S", "e_Q": "local.e", "D_ii": "local.pivots",
+    **_CARRIED, "F": "hinge.F", "Z": "hinge.Z", "W": "hinge.W", "S_Q": "local.S",
+    "e_Q": "local.e", "D_ii": "local.pivots",
 }  # fmt: skip
-_BY_STAGES = only(
-    "staged",
-    Copy(to="local.S", source="body.S"),
-    Copy(to="local.e", source="body.e"),
-    carried("hinge", "hinge.d", when="axial"),
-    call("hinge.eliminate", when="free special", fails="undetermined", **COORDINATES,
-         **_ELIMINATED),
-    call("generic{free}.eliminate", when="free !special", fails="undetermined", H="hinge.H_free",
-         J="hinge.J_free", **_ELIMINATED),
-    JudgePivots(pivots="local.pivots", subspace="hinge.H_free", own="body.own", whole="body.S",
-                fails="undetermined", when="free"),
+
+
+def reached(load: str) -> tuple[Step, ...]:
+    """S and a load where the hinge's free speeds are eliminated."""
+    return (
+        Copy(to="local.S", source="body.S"),
+        Copy(to="local.e", source=load),
+        carried("hinge", "hinge.d", when="axial"),
+    )
+
+
+def eliminated(effort: str, offset: str) -> tuple[Step, ...]:
+    """S and a load without the hinge's free speeds, on which an effort acts."""
+    ports = {**_ELIMINATED, "tau": effort, "z": offset}
+    return (
+        call("hinge.eliminate", when="free special", fails="undetermined", **COORDINATES, **ports),
+        call("generic{free}.eliminate", when="free !special", fails="undetermined",
+             H="hinge.H_free", J="hinge.J_free", **ports),
+    )  # fmt: skip
+
+
+#: To the parent, where it is a body.
+ONWARD = (
     carried("hinge", "hinge.d", when="hung !axial"),
     carried("connection", "connection.r", when="hung"),
+)
+JUDGED = JudgePivots(
+    pivots="local.pivots", subspace="hinge.H_free", own="body.own", whole="body.S",
+    fails="undetermined", when="free",
+)  # fmt: skip
+HANDED_ON = (
     Add(to="parent.S", source="local.S", when="hung"),
     Add(to="parent.e", source="local.e", when="hung"),
-)  # fmt: skip
+)
+_BY_STAGES = only(
+    "staged",
+    *reached("body.e"),
+    *eliminated("hinge.tau_free", "hinge.z"),
+    JUDGED,
+    *ONWARD,
+    *HANDED_ON,
+)
 
 _GAINS = {"G": "hinge.G", "g": "hinge.g"}
 _OWN = {"floor": "body.floor", "S": "body.S", "e": "body.e"}
@@ -117,6 +143,20 @@ _FACTORED = {"H": "hinge.H_free", "F": "hinge.F", "Z": "hinge.Z", "z": "hinge.z"
 _RATES = {"udot": "hinge.rates"}
 _STILL = {"H": "none", "G": "none", "g": "none"}
 
+#: Behind `eliminated`, stage by stage.
+RECOVERED = (
+    call("generic0.recover", Rc="connection.R", r="connection.r", **_STILL,
+         delta_I="parent.delta", delta="local.delta"),
+    call("generic{free}.recover_factored", when="free axial", Rc="identity", r="zero",
+         **_FACTORED, delta_I="local.delta", **_RATES, delta="local.delta"),
+    call("generic0.recover", when="free axial", Rc="hinge.R", r="hinge.d", **_STILL,
+         delta_I="local.delta", delta="body.delta"),
+    call("generic{free}.recover_factored", when="free !axial", Rc="hinge.R", r="hinge.d",
+         **_FACTORED, delta_I="local.delta", **_RATES, delta="body.delta"),
+    call("generic0.recover", when="!free", Rc="hinge.R", r="hinge.d", **_STILL,
+         delta_I="local.delta", delta="body.delta"),
+)  # fmt: skip
+
 RECOVER = Pass(
     "recover", "body", "Accelerations of a hinge and deviation of the body from its bias motion.",
     (
@@ -124,19 +164,7 @@ RECOVER = Pass(
              delta_I="parent.delta", udot="body.udot", delta="body.delta"),
         call("generic{free}.recover", when="parts !staged", **BODY, H="hinge.H_free", **_GAINS,
              delta_I="parent.delta", **_RATES, delta="body.delta"),
-        *only(
-            "staged",
-            call("generic0.recover", Rc="connection.R", r="connection.r", **_STILL,
-                 delta_I="parent.delta", delta="local.delta"),
-            call("generic{free}.recover_factored", when="free axial", Rc="identity", r="zero",
-                 **_FACTORED, delta_I="local.delta", **_RATES, delta="local.delta"),
-            call("generic0.recover", when="free axial", Rc="hinge.R", r="hinge.d", **_STILL,
-                 delta_I="local.delta", delta="body.delta"),
-            call("generic{free}.recover_factored", when="free !axial", Rc="hinge.R", r="hinge.d",
-                 **_FACTORED, delta_I="local.delta", **_RATES, delta="body.delta"),
-            call("generic0.recover", when="!free", Rc="hinge.R", r="hinge.d", **_STILL,
-                 delta_I="local.delta", delta="body.delta"),
-        ),
+        *only("staged", *RECOVERED),
         Spread(to="body.udot", free="hinge.rates", imposed="body.s", when="parts"),
         Add(to="body.udot", source="body.chosen", when="staged"),
         call("modal.recover", when="modal", Gg="modes.gain", delta_I="body.delta",

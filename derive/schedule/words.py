@@ -162,7 +162,6 @@ row.known | 1 | known part
 row.pivot | 1 | its own entry of L
 row.inverse | 1 | 1 / L, zero for a row that nothing moves
 row.x | 1 | multiplier
-row.told | 1 | multiplier in the answer before
 row.floor | 1 | largest pivot that is rounding
 other.K | 6 | column of a row that stays
 other.known | 1 | its known part
@@ -173,6 +172,7 @@ both.L | 1 | entry of L of the two that stay
 pending.K | 6 | column of a row that is open
 pending.onward | 6 | its column on the parent
 pending.y | free | -H^T K
+pending.z | free | diag(d)^-1 L^-1 y
 pending.known | 1 | its known part
 pending.x | 1 | its multiplier
 before.y | free | -H^T K of another open row
@@ -341,6 +341,7 @@ TRAITS: dict[str, str] = {
     "corrected": "a gap or a slip is to be corrected",
     "soft": "the row is that of a rotor",
     "refined": "what an answer before leaves over is answered, and added to it",
+    "unmoved": "nothing moves the row in any position: code for one scene goes without it",
     "gaping": "a gap",
     "slipping": "a slip",
     "qr": "the sweep is that of least squares",

@@ -86,7 +86,7 @@ class Fusion:
         self._insisted = False  # engine="fused": batches too
         self.inputs: Places = ()
         if not self.obstacle:
-            self.structure, self.numbers = structure_of(packed.system, known, bake)
+            self.structure, self.numbers = structure_of(packed.system, known, bake, packed.floors)
             self.inputs = self.structure.inputs
 
     def find(self) -> FusedLibrary | None:
@@ -153,7 +153,7 @@ class Fusion:
     def ready_implicit(self, evaluations: float) -> FusedLibrary | None:
         """The same for what implicit methods ask of small scenes, where nobody knows how many
         evaluations there will be (inf) only after `build`.  None where the looped engine serves:
-        for other scenes, and where it cannot be made.
+        for other scenes, with closed loops too, and where it cannot be made.
         """
         pays = self._break_even() < evaluations < math.inf
         return self._of_small("implicit", pays)
@@ -163,7 +163,7 @@ class Fusion:
         return self._of_small("linear", pays)
 
     def _of_small(self, part: str, pays: bool) -> FusedLibrary | None:
-        if self.obstacle or not 0 < self.structure.nu <= _MOST_UNKNOWNS:
+        if self.obstacle or not 0 < self.structure.nu <= _MOST_UNKNOWNS or self.structure.closures:
             return None
         try:
             return self._get(part, build=self._insisted or pays)
@@ -244,8 +244,9 @@ class Fusion:
         return opened(recipe, open_columns)[0]
 
     def solution(self, build: bool) -> ColumnsLibrary | None:
-        """The library that solves with the scene's mass matrix; errors as for `columns`."""
-        if self.obstacle:
+        """The library that solves with the scene's mass matrix, which is that of a tree; errors as
+        for `columns`."""
+        if self.obstacle or self.structure.closures:
             return None
 
         def kernels() -> Sequence[KernelIR]:
@@ -323,8 +324,8 @@ def _obstacle(packed: Packed, most: int) -> str:
         return "the product of classical matrices is looped"
     if packed.qr:
         return "the sweep as least squares is looped"
-    if packed.system.closures:
-        return "closed loops are looped"
+    if packed.model.refines:
+        return "heavy bodies behind light ones cost digits, which refinement mends: it is looped"
     hinges = {body.hinge for body in packed.system.distinct}
     if any(packed.elements[key].tape is not None for key in hinges):
         return "a hinge is interpreted because it was generated without a compiler"

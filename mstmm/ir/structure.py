@@ -67,7 +67,8 @@ class BodyStructure:
     rotation, position: inboard hinge axes in the parent (9, row by row) and its point Q (3).
     link: instead of both, cosine, sine and shift of a screw about x, then the constant angle and
     shift of the hinge's own screw about z; empty where the connection is none.
-    `imposed[k]` marks a driven speed; `rotor` is the reflected inertia per speed.
+    `imposed[k]` marks a driven speed; `rotor` is the reflected inertia per speed.  `pending` are
+    the rows of closed loops that are open across the hinge.
     """
 
     parent: int
@@ -87,6 +88,7 @@ class BodyStructure:
     modal: ModalStructure | None = None
     section: SectionStructure | None = None
     idle: bool = False  #: an end that nothing hangs on or acts on
+    pending: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -132,9 +134,35 @@ class ForceStructure:
 
 
 @dataclass(frozen=True)
+class ClosureStructure:
+    """A hinge that closes a loop: body `frame`, without mass, is to be where an end of `outboard`
+    is, which lies in that body by `turn` (9, row by row) and `end` (3).  `rows` are those of its
+    six directions, own speeds first; -1 where a direction has none."""
+
+    frame: int
+    outboard: int
+    turn: Entries
+    end: Entries
+    rows: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class RowStructure:
+    """A row that is closed on a body, coupled with `others` that are open yet; a pivot up to
+    `floor` is rounding.  `soft` is the rotor inertia of the speed whose row it is; empty: the row
+    is met."""
+
+    body: int
+    others: tuple[int, ...]
+    floor: Entries
+    soft: Entries
+
+
+@dataclass(frozen=True)
 class Structure:
     """A scene without its numbers.  `values` gives efforts and load components, `drives` each
-    drive's value, rate and acceleration (three in a row; `driven` says whose: body, coordinate)."""
+    drive's value, rate and acceleration (three in a row; `driven` says whose: body, coordinate).
+    `closures` stand in the order of their frames, `rows` in that in which they are closed."""
 
     nq: int
     nu: int
@@ -148,6 +176,8 @@ class Structure:
     values: ExpressionStructure | None = None
     drives: ExpressionStructure | None = None
     driven: tuple[tuple[int, int], ...] = ()
+    closures: tuple[ClosureStructure, ...] = ()
+    rows: tuple[RowStructure, ...] = ()
     elements: Mapping[Key, str] = field(default_factory=dict)  #: hashes of users' elements
     #: (place among the numbers of inputs, place in p) of those that are read: they change with time
     inputs: tuple[tuple[int, int], ...] = field(default=(), repr=False, compare=False)

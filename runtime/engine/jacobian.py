@@ -95,7 +95,7 @@ def _tape(
     packed, known = model.packed, model.known or {}
     if packed.releases or packed.system.count > MOST_BODIES:
         return None, _nothing
-    structure, numbers = structure_of(packed.system, known)
+    structure, numbers = structure_of(packed.system, known, floors=packed.floors)
     try:
         kernels = model.fusion.fused(structure).kernels
     except (ElementError, EnvironmentFailure):

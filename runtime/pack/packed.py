@@ -48,6 +48,11 @@ class Packed(Frames):
         """Inputs and signals over time by their names, as this system has them."""
         return dict(zip(self.layout.inputs, self.system.inputs, strict=True))
 
+    @property
+    def floors(self) -> list[float]:
+        """Up to where pivots of the rows of closed loops are rounding."""
+        return [] if self.written.loops is None else self.written.loops.floors
+
     def time_map(self, start: float, end: float) -> TimeMap:
         """Where the steps of a run from `start` to `end` (s) end, and how long they may be."""
         span = (start, end)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +18,7 @@ from mstmm.numbers.dual import real, value_of
 
 from . import system as given
 from .elements import Elements, Known
+from .loops.structure import with_loops
 from .system import System
 from .values import MOVING
 
@@ -26,23 +27,25 @@ _STRUCTURAL = frozenset({"0", "1", "-1", "pi"})
 
 
 def structure_of(
-    system: System, known: Known, bake: bool = False
+    system: System, known: Known, bake: bool = False, floors: Sequence[float] = ()
 ) -> tuple[Structure, NDArray[np.float64]]:
     """(structure, p) of a system; `known` are elements beyond the prebuilt ones.
 
-    With `bake` every number but those of inputs is part of the structure.
+    With `bake` every number but those of inputs is part of the structure.  `floors` are those of
+    the rows of closed loops: up to them pivots are rounding.
     """
-    structure, numbers = structure_and_numbers(system, known, bake)
+    structure, numbers = structure_and_numbers(system, known, bake, floors)
     return structure, np.array(numbers)
 
 
 def structure_and_numbers(
-    system: System, known: Known, bake: bool = False
+    system: System, known: Known, bake: bool = False, floors: Sequence[float] = ()
 ) -> tuple[Structure, list[Any]]:
     """The same with p as a list of floats and Duals."""
     sorting, elements = _Sorting(system, bake), Elements(known)
     gravity = sorting.entries(system.gravity)
     bodies = tuple(body for run in system.bodies for body in sorting.bodies(run))
+    bodies, closures, rows = with_loops(bodies, system, sorting.entries, floors)
     laws = tuple(law for run in system.laws for law in sorting.laws(run))
     loads = tuple(map(sorting.load, system.loads))
     forces = tuple(map(sorting.force, system.forces))
@@ -52,7 +55,7 @@ def structure_and_numbers(
     read = tuple(sorted(sorting.inputs.items()))
     structure = Structure(
         system.nq, system.nu, len(sorting.numbers), system.held.first, gravity, bodies, laws, loads,
-        forces, values, prescribed, system.driven,
+        forces, values, prescribed, system.driven, closures, rows,
         {key: elements[key].hash for key in sorted(used)}, read,
     )  # fmt: skip
     return structure, sorting.numbers

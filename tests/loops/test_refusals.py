@@ -61,9 +61,15 @@ def test_a_structure() -> None:
         mstmm.compile(mstmm.Scene(**scene))
 
 
-def test_no_fused_code(model: mstmm.Model) -> None:
-    assert model.engine_choice.startswith("looped: closed loops")
-    with pytest.raises(mstmm.SceneError, match="no fused code: closed loops"):
+def test_no_fused_code() -> None:
+    scene = linkage("closing_pin", laws=False)
+    held = scene["hinge"][3]
+    start = held.pop("initial")["q"]
+    scene["hinge"][0]["initial"].pop("u")
+    held |= {"drive": f"{start!r}", "release": "t >= 0.2"}
+    model = mstmm.compile(mstmm.Scene(**scene))
+    assert model.engine_choice.startswith('looped: hinge "closing_pin" is released')
+    with pytest.raises(mstmm.SceneError, match='no fused code: hinge "closing_pin" is released'):
         mstmm.compile(model.scene, engine="fused")
 
 

@@ -1,15 +1,24 @@
 /* A scene whose accelerations come from code compiled for it: the integrator's right-hand side, for
  * one state and for several side by side.  Events and settling stay with the looped engine. */
+#include <math.h>
 #include <string.h>
 
 #include "compiled.h"
+#include "loops.h"
+
+/* Numbers that what closes loops gives: a change of the coordinates or speeds, and gaps. */
+static int64_t closing_size(const mstmm_fused *one)
+{
+    return one->n_closures ? one->nq + one->nu + 12 * (int64_t)one->n_closures : 0;
+}
 
 /* Numbers that compiled code reads besides the state: the efforts, which are zero here; and for
- * lanes, where entry i stands `lanes` times, the parameters and the memory. */
+ * lanes, where entry i stands `lanes` times, the parameters and the memory.  Between them stands
+ * what closes loops. */
 int64_t mstmm_compiled_size(const mstmm_fused *one, const mstmm_fused *lanes)
 {
     const int64_t width = lanes ? lanes->lanes : 0;
-    return one->nu + width * (one->nu + one->np + one->n_memory);
+    return one->nu + closing_size(one) + width * (one->nu + one->np + one->n_memory);
 }
 
 static void repeat(int64_t count, int lanes, const real *from, real *to)
@@ -20,7 +29,7 @@ static void repeat(int64_t count, int lanes, const real *from, real *to)
 
 static real *lanes_efforts(const mstmm_scene_run *run)
 {
-    return run->fused_numbers + run->fused->nu;
+    return run->fused_numbers + run->fused->nu + closing_size(run->fused);
 }
 
 static real *lanes_p(const mstmm_scene_run *run)
@@ -96,6 +105,77 @@ void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system)
     if (!run->fused_lanes) return;
     system->lanes = run->fused_lanes->lanes;
     system->rhs_lanes = accelerations_in_lanes;
+}
+
+/* --- closed loops ----------------------------------------------------------------------------- */
+
+typedef struct {
+    mstmm_scene_run *run;
+    double t, *y;
+} compiled_state;
+
+/* Where an open loop is named: the frame of closure number k. */
+static int frame_of(const mstmm_model *model, int k)
+{
+    int i = 0;
+    for (; i < model->n_bodies; i++)
+        if (model->looped[i].closure && k-- == 0) break;
+    return i;
+}
+
+static real largest(const mstmm_scene_run *run, const real *gaps, int *where)
+{
+    real found = 0;
+    int at = 0;
+    for (int k = 0; k < 6 * run->fused->n_closures; k++) {
+        if (fabs(gaps[k]) <= found) continue;
+        found = fabs(gaps[k]);
+        at = k / 6;
+    }
+    if (found > 0) *where = frame_of(run->model, at);
+    return found;
+}
+
+static int compiled_gaps(void *context, mstmm_gaps *found)
+{
+    const compiled_state *at = context;
+    mstmm_scene_run *run = at->run;
+    const mstmm_fused *fused = run->fused;
+    real *dq = run->fused_numbers + fused->nu, *gap = dq + fused->nq + fused->nu;
+    real *apart = gap + 6 * fused->n_closures;
+    const int code = fused->gaps(run->fused_p, &at->t, at->y, at->y + fused->nq, run->memory,
+                                 run->fused_numbers, dq, gap, apart);
+    if (code) return failed(run, fused, code);
+    found->met = largest(run, gap, &found->where_met);
+    found->repeated = largest(run, apart, &found->where_repeated);
+    for (int i = 0; i < fused->nq; i++) at->y[i] += dq[i];
+    mstmm_unit_quaternions(run->n_quaternions, run->quaternions, at->y);
+    return 0;
+}
+
+static int compiled_slips(void *context)
+{
+    const compiled_state *at = context;
+    mstmm_scene_run *run = at->run;
+    const mstmm_fused *fused = run->fused;
+    real *du = run->fused_numbers + fused->nu, *u = at->y + fused->nq;
+    const int code = fused->slips(run->fused_p, &at->t, at->y, u, run->memory,
+                                  run->fused_numbers, du);
+    if (code) return failed(run, fused, code);
+    for (int i = 0; i < fused->nu; i++) u[i] += du[i];
+    return 0;
+}
+
+int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y)
+{
+    const mstmm_model *model = run->model;
+    if (!run->fused)
+        return mstmm_close_loops(model, run->workspace, t, y, y + model->nq, run->memory,
+                                 run->n_quaternions, run->quaternions, &run->failure);
+    compiled_state at = {run, t, y};
+    mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
+    return mstmm_closed(&(mstmm_closing){&at, compiled_gaps, compiled_slips}, model,
+                        &run->failure);
 }
 
 /* --- trajectories side by side ---------------------------------------------------------------- */

@@ -174,31 +174,66 @@ static real largest(const mstmm_state *state, int repeated, int *where)
     return found;
 }
 
+typedef struct {
+    const mstmm_model *model;
+    real *workspace, *q, *u, *change;
+    real t;
+    const real *memory;
+    int n_quaternions;
+    const int *quaternions;
+    mstmm_failure *failure;
+} looped_state;
+
+static int looped_gaps(void *context, mstmm_gaps *found)
+{
+    const looped_state *at = context;
+    const mstmm_state state = {.model = at->model, .workspace = at->workspace,
+                               .memory = at->memory};
+    int code = mstmm_correction(at->model, at->workspace, MSTMM_GAP, 0, at->t, at->q, at->u,
+                                at->memory, at->change, NULL, at->failure);
+    if (code) return code;
+    found->met = largest(&state, 0, &found->where_met);
+    found->repeated = largest(&state, 1, &found->where_repeated);
+    return mstmm_moved(at->model, at->workspace, at->t, at->q, at->change, at->memory,
+                       at->n_quaternions, at->quaternions, at->failure);
+}
+
+static int looped_slips(void *context)
+{
+    const looped_state *at = context;
+    const int code = mstmm_correction(at->model, at->workspace, MSTMM_SLIP, 0, at->t, at->q, at->u,
+                                      at->memory, at->change, NULL, at->failure);
+    for (int i = 0; i < at->model->nu && !code; i++) at->u[i] += at->change[i];
+    return code;
+}
+
+int mstmm_closed(const mstmm_closing *by, const mstmm_model *model, mstmm_failure *failure)
+{
+    const real close = model->refines ? CLOSE_REFINED : CLOSE;
+    const int slips = model->refines ? SLIPS_REFINED : 1;
+    mstmm_gaps gaps = {.met = 1};
+    for (int k = 0; k < STEPS && !(gaps.met < close); k++) {
+        gaps = (mstmm_gaps){0};
+        const int code = by->gaps(by->context, &gaps);
+        if (code) return code;
+    }
+    const int met = gaps.met < OPEN;
+    if (!met || !(gaps.repeated < model->loops_apart)) {
+        const int where = met ? gaps.where_repeated : gaps.where_met;
+        *failure = (mstmm_failure){MSTMM_FAILED_LOOP, where, 0};
+        return MSTMM_FAILED_LOOP;
+    }
+    int code = 0;
+    for (int k = 0; k < slips && !code; k++) code = by->slips(by->context);
+    return code;
+}
+
 int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q, real *u,
                       const real *memory, int n_quaternions, const int *quaternions,
                       mstmm_failure *failure)
 {
-    mstmm_state state = {.model = model, .workspace = workspace, .memory = memory,
-                         .failure = failure};
-    real *change = mstmm_spare_udot(&state), gap = 1;
-    const real close = model->refines ? CLOSE_REFINED : CLOSE;
-    int where = 0;
-    for (int k = 0; k < STEPS && !(gap < close); k++) {
-        int code = mstmm_correction(model, workspace, MSTMM_GAP, 0, t, q, u, memory, change, NULL,
-                                    failure);
-        gap = code ? 0 : largest(&state, 0, &where);
-        if (!code)
-            code = mstmm_moved(model, workspace, t, q, change, memory, n_quaternions, quaternions,
-                               failure);
-        if (code) return code;
-    }
-    if (!(gap < OPEN) || !(largest(&state, 1, &where) < model->loops_apart))
-        return mstmm_fail(&state, MSTMM_FAILED_LOOP, where, 0);
-    for (int k = 0; k < (model->refines ? SLIPS_REFINED : 1); k++) {
-        const int code = mstmm_correction(model, workspace, MSTMM_SLIP, 0, t, q, u, memory, change,
-                                          NULL, failure);
-        if (code) return code;
-        for (int i = 0; i < model->nu; i++) u[i] += change[i];
-    }
-    return 0;
+    const mstmm_state state = {.model = model, .workspace = workspace};
+    looped_state at = {model, workspace, q, u, mstmm_spare_udot(&state), t, memory, n_quaternions,
+                       quaternions, failure};
+    return mstmm_closed(&(mstmm_closing){&at, looped_gaps, looped_slips}, model, failure);
 }

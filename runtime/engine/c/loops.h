@@ -11,4 +11,22 @@ void mstmm_missing(const mstmm_state *state, real *missing);
 /* Quaternions in q, by the first entry of each, brought back to length 1. */
 void mstmm_unit_quaternions(int count, const int *first, real *q);
 
+/* How far loops are open before a step that closes them (m, rad): what is met, and what repeats
+ * others; where each is most, as the frame of its hinge. */
+typedef struct {
+    real met, repeated;
+    int where_met, where_repeated;
+} mstmm_gaps;
+
+/* What brings a state back to where its loops are closed: one step of its coordinates, and its
+ * speeds; both in place.  Nonzero = failure code. */
+typedef struct {
+    void *context;
+    int (*gaps)(void *context, mstmm_gaps *found);
+    int (*slips)(void *context);
+} mstmm_closing;
+
+/* Gaps closed and slips stopped as well as the model asks for. */
+int mstmm_closed(const mstmm_closing *by, const mstmm_model *model, mstmm_failure *failure);
+
 #endif

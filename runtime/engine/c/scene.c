@@ -228,8 +228,7 @@ int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y)
                                          &run->failure);
     if (driven) return driven;
     if (model->looped) {
-        const int code = mstmm_close_loops(model, run->workspace, t, y, y + model->nq, run->memory,
-                                           run->n_quaternions, run->quaternions, &run->failure);
+        const int code = mstmm_scene_close_loops(run, t, y);
         if (code) return code;
     }
     remember_twists(run, y);

@@ -115,6 +115,9 @@ int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, cons
                             real *memory, real *y);
 /* cdef end */
 
+/* Gaps of closed loops closed and slips stopped in place, by compiled code where there is some. */
+int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y);
+
 /* The integrator's view of `run`, evaluated by the looped engine. */
 void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system);
 

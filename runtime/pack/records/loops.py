@@ -57,6 +57,11 @@ class LoopRecords:
         """Up to where pivots of a row are rounding."""
         return float(self._rows[row].floor)
 
+    @property
+    def floors(self) -> list[float]:
+        """The same of every row."""
+        return [self.floor(row) for row in range(self.count)]
+
 
 def attach_loops(
     model: Any, system: System, memory: Memory, lib: Any, place: int

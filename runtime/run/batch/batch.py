@@ -101,8 +101,9 @@ def simulate_batch(
         np.zeros(n, dtype=bool), [""] * n, np.zeros(n, dtype=np.int64), [()] * n,
     )  # fmt: skip
     alike = _of_equal_times(model, models, settings)
+    closing = bool(model.packed.system.closures)  # by numbers that all share
     ours = np.array([library is not None and alike[id(m)] and m.fusion.lanes is library
-                     for m in models], bool)  # fmt: skip
+                     and (m is model or not closing) for m in models], bool)  # fmt: skip
     if library is not None and ours.any():
         which = np.flatnonzero(ours)
         _side_by_side(model, library, models, given, settings, q, u, which, rows, count)
@@ -174,7 +175,8 @@ def _side_by_side(
     settings: Settings, q: Array, u: Array, which: NDArray[np.int64], rows: _Rows, threads: int,
 ) -> None:  # fmt: skip
     engine = given.timed(model).looped
-    systems = [SceneSystem(engine, with_power=False) for _ in range(threads)]
+    code = _scalar(model, settings) if model.packed.system.closures else None
+    systems = [SceneSystem(engine, code, with_power=False) for _ in range(threads)]
     start = np.ascontiguousarray(np.concatenate([q[which], u[which]], axis=1))
     start, _ = settled(systems[0], np.zeros(len(start)), start, np.zeros((len(start), 1)))
     numbers = np.ascontiguousarray([models[i].fusion.numbers for i in which])

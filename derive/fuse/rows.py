@@ -1,0 +1,113 @@
+"""Slots of closed loops as nodes: columns, known parts and entries of L of the rows.
+
+A column is kept body by body, since every hinge that it crosses makes another of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator
+from dataclasses import replace
+
+from mstmm.ir.structure import ClosureStructure, RowStructure, Structure
+
+from .inline import Nodes
+from .slots import Slots, Subject
+
+#: Whose entry of L a slot is: fields of the subject.
+_PAIRS = {
+    "row.pivot": ("row", "row"), "other.L": ("row", "other"), "second.L": ("row", "second"),
+    "both.L": ("other", "second"), "pair.L": ("row", "other"),
+}  # fmt: skip
+#: On which body a slot has a column, and of which row.
+_COLUMNS = {
+    "row.K": ("meeting", "row"), "other.K": ("meeting", "other"), "pending.K": ("body", "row"),
+    "pending.onward": ("parent", "row"), "side.inner": ("parent", "row"),
+    "side.outer": ("outboard", "row"),
+}  # fmt: skip
+#: Numbers of one row, by the owner that tells which.
+_OF_ROW = {"row": "row", "line": "row", "pending": "row", "other": "other", "before": "other"}
+
+
+class RowSlots(Slots):
+    """Slots, those of rows among them; `level` is what is corrected of closed loops, "" nothing."""
+
+    level = ""
+
+    def closure(self) -> ClosureStructure | None:
+        """The closure whose frame the body at hand is."""
+        return closure_at(self.state.structure, self.index)
+
+    def row(self) -> RowStructure:
+        """The row at hand."""
+        return self.state.structure.rows[self.at.row]
+
+    def met(self, of: str) -> Iterator[Subject]:
+        """The subjects of `Each`."""
+        at, rows = self.at, self.state.structure.rows
+        if of in ("closings", "openings"):
+            here = [number for number, row in enumerate(rows) if row.body == self.index]
+            for number in here if of == "closings" else reversed(here):
+                yield row_subject(rows, number)
+        elif of == "pending":
+            yield from (replace(at, row=number) for number in self.body.pending)
+        elif of == "before":
+            up_to = self.body.pending.index(at.row) + 1
+            yield from (replace(at, other=number) for number in self.body.pending[:up_to])
+        elif of == "others":
+            yield from (replace(at, other=number) for number in self.row().others)
+        elif of == "seconds":
+            up_to = self.row().others.index(at.other) + 1
+            yield from (replace(at, second=number) for number in self.row().others[:up_to])
+        else:
+            closure = self.closure()
+            assert closure is not None
+            for direction, number in enumerate(closure.rows):
+                if number >= 0:
+                    yield replace(at, row=number, direction=direction)
+
+    def _key(self, slot: str) -> Hashable:
+        at = self.at
+        if slot in _PAIRS:
+            return ("L", *sorted(getattr(at, whose) for whose in _PAIRS[slot]))
+        if slot in _COLUMNS:
+            role, whose = _COLUMNS[slot]
+            return "K", at.roles[role], getattr(at, whose)
+        owner, _, name = slot.partition(".")
+        if owner in _OF_ROW:
+            body = self.index if name in ("y", "z") else None
+            return name, body, getattr(at, _OF_ROW[owner])
+        return super()._key(slot)
+
+    def _given(self, slot: str) -> Nodes:
+        f = self.state
+        if slot in _PAIRS:
+            return self._entry(*(getattr(self.at, whose) for whose in _PAIRS[slot]))
+        if slot == "row.floor":
+            return f.entries(self.row().floor) or f.zeros(1)
+        if slot in _COLUMNS:
+            return f.zeros(6)
+        if slot.partition(".")[0] in _OF_ROW:
+            return f.zeros(1)
+        return super()._given(slot)
+
+    def _entry(self, one: int, other: int) -> Nodes:
+        """An entry of L before anything is added: a rotor gives way on its own row."""
+        f = self.state
+        soft = f.entries(f.structure.rows[one].soft) if one == other else []
+        return [f.one / soft[0]] if soft else f.zeros(1)
+
+    def _closure(self, name: str) -> Nodes:
+        closure = self.closure()
+        assert closure is not None
+        return self.state.entries(closure.turn if name == "turn" else closure.end)
+
+
+def closure_at(structure: Structure, index: int) -> ClosureStructure | None:
+    """The closure whose frame the body at a place is; None for other bodies."""
+    return next((one for one in structure.closures if one.frame == index), None)
+
+
+def row_subject(rows: tuple[RowStructure, ...], number: int) -> Subject:
+    """A row, on the body where it closes."""
+    body = rows[number].body
+    return Subject({"body": body, "meeting": body}, row=number)

@@ -1,0 +1,65 @@
+"""Closed loops of a system -> their part of the structure of fused code."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+from mstmm.graph.mechanism import Rows
+from mstmm.ir.structure import BodyStructure, ClosureStructure, Entries, RowStructure
+
+from ..system import ClosureNumbers, System
+from .rows import RowPlan, planned
+
+
+class Sort(Protocol):
+    """Sorts numbers into structural constants and places in p."""
+
+    def __call__(self, values: Iterable[float], axes: bool = False) -> Entries: ...
+
+
+def with_loops(
+    bodies: Sequence[BodyStructure], system: System, sort: Sort, floors: Sequence[float]
+) -> tuple[tuple[BodyStructure, ...], tuple[ClosureStructure, ...], tuple[RowStructure, ...]]:
+    """The bodies with the rows that are open across their hinges, closures in the order of their
+    frames, and rows.  `floors` go by row; without them a pivot counts that is more than zero."""
+    plan = planned(
+        [body.parent for body in bodies],
+        [
+            Rows((bodies[one.frame].parent, one.outboard), len(one.directions))
+            for one in system.closures
+        ],
+    )
+    soft: dict[int, Entries] = {}
+    closures = [
+        _closure(one, plan.of[group], bodies[one.frame], sort, soft)
+        for group, one in enumerate(system.closures)
+    ]
+    rows = tuple(
+        RowStructure(row.body, row.others, sort(floors[number : number + 1]), soft.get(number, ()))
+        for number, row in enumerate(plan.rows)
+    )
+    open_rows = _pending(bodies, plan)
+    return open_rows, tuple(sorted(closures, key=lambda one: one.frame)), rows
+
+
+def _pending(bodies: Sequence[BodyStructure], plan: RowPlan) -> tuple[BodyStructure, ...]:
+    return tuple(
+        replace(body, pending=tuple(plan.pending[place])) if place in plan.pending else body
+        for place, body in enumerate(bodies)
+    )
+
+
+def _closure(
+    one: ClosureNumbers, own: range, frame: BodyStructure, sort: Sort, soft: dict[int, Entries]
+) -> ClosureStructure:
+    """A closure; rows of rotors get their inertia in `soft`."""
+    rows = [-1] * 6
+    for row, direction in zip(own, one.directions, strict=True):
+        rows[direction] = row
+        if direction < frame.nu and not frame.imposed[direction]:
+            soft[row] = (frame.rotor[direction],)
+    return ClosureStructure(
+        one.frame, one.outboard, sort(one.turn, axes=True), sort(one.end), tuple(rows)
+    )
