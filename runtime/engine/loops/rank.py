@@ -41,7 +41,8 @@ class Rank:
     """Rows that repeat others here, those of them that do so in closed states nearby too, and those
     of these that go: the others take the place of another row of their hinge where that one says
     nothing, at a pose farther away.  `states` are those that were looked at, this one first,
-    `not_unique` the components of loads that rows which always repeat others leave open.
+    `not_unique` the components of loads that rows which always repeat others leave open, and
+    `nearby` is how few repeat others in any of the states.
     """
 
     here: frozenset[int]
@@ -49,11 +50,12 @@ class Rank:
     going: frozenset[int]
     states: tuple[Array, ...]
     not_unique: Mapping[str, tuple[str, ...]]
+    nearby: int
 
     @property
     def singular(self) -> bool:
         """Whether the pose is singular."""
-        return self.here != self.always
+        return len(self.here) > self.nearby
 
 
 def rank_at(engine: Engine, q: Array) -> Rank:
@@ -62,20 +64,21 @@ def rank_at(engine: Engine, q: Array) -> Rank:
     level = REPEATED * calls.mobility
     here = _repeating(calls, q, level)
     if not here:
-        return Rank(here, here, here, (q,), {})
+        return Rank(here, here, here, (q,), {}, 0)
     raised = _RAISED * np.abs(calls.pivots()) + _ROUNDING * calls.mobility
     level[list(here)] = np.minimum(level, raised)[list(here)]
-    always, draw, states = here, np.random.default_rng(0), [q]
+    always, draw, states, nearby = here, np.random.default_rng(0), [q], len(here)
     for _ in range(_NEIGHBOURS):
         near = _neighbour(calls, q, draw.uniform(-1.0, 1.0, engine.nu))
         if near is not None:
-            always &= _repeating(calls, near, level)
+            there = _repeating(calls, near, level)
+            always, nearby = always & there, min(nearby, len(there))
             states.append(near)
     gaps = calls.correction(calls.gap, q, np.zeros(engine.nu))[1]
     closed = np.abs(gaps).max() <= _CLOSED
     going = always - _stand_ins(calls, q, always) if closed else always
     loads = not_unique(calls, q if here == always else states[-1]) if always else {}
-    return Rank(here, always, going, tuple(states), loads)
+    return Rank(here, always, going, tuple(states), loads, nearby)
 
 
 def _calls(engine: Engine, q: Array) -> LoopCalls:
