@@ -20,7 +20,9 @@ from .code import Fusing, NotFused
 from .engine import Engine
 from .given import GivenInput, at_once, with_inputs
 from .loops.closed import Closed
+from .loops.freedom import Freedom
 from .renewed import with_values
+from .sizes import speed_sizes
 from .slopes import Slopes
 
 
@@ -117,6 +119,13 @@ class Compiled:
                 unit = slots.u_units[k].removesuffix("/s")
                 found.append((f"{slots.name}.{slots.u_names[k]}_increment", unit))
         return tuple(found)
+
+    @cached_property
+    def freedom(self) -> Freedom | None:
+        """The motions that closed loops leave; None for a tree."""
+        if self.closed is None:
+            return None
+        return Freedom(self.looped, self.free_speeds, speed_sizes(self), self.closed)
 
     @cached_property
     def slopes(self) -> Slopes:

@@ -11,7 +11,6 @@ from mstmm.arrays import Array
 from mstmm.border.failures import Failed
 from mstmm.errors import NumericalFailure, UndeterminedMotion
 
-from ..pack.loops.refusal import INSTEAD, refuse
 from .calls import Calls
 from .culprit import culprit
 
@@ -74,6 +73,17 @@ class Engine(Calls):
             raise self.not_finite(f"the effort of {name}", t, q, u)
         return efforts
 
+    def required_by_inertia(self, q: Array, accelerations: Array) -> Array:
+        """M(q) times n rows of accelerations (n, nu), all speeds as if free; O(bodies) each."""
+        engine, still = self.inertia_alone, np.zeros(self.nu)
+        memory = engine.start_memory()
+        strained = engine.inverse_dynamics(0.0, q, still, still, memory)
+        rows = [
+            engine.inverse_dynamics(0.0, q, still, row, memory) - strained
+            for row in np.ascontiguousarray(accelerations)
+        ]
+        return np.reshape(rows, (len(rows), self.nu))
+
     def kinetic_energies(self, q: Array, speeds: Array) -> Array:
         """(n, bodies) in J by place in the topology, rotors with the hinge's outboard, at q (nq,)
         and n speeds (n, nu), O(bodies) each; drives are left out."""
@@ -92,26 +102,18 @@ class Engine(Calls):
 
     def mass_matrix(self, q: Array) -> Array:
         """(nu, nu) symmetric, of one state; driven coordinates as if free."""
-        refuse(self.packed, "the mass matrix of all speeds", INSTEAD)
-        engine, still = self.inertia_alone, np.zeros(self.nu)
-        memory = engine.start_memory()
-        strained = engine.inverse_dynamics(0.0, q, still, still, memory)
-        columns = [
-            engine.inverse_dynamics(0.0, q, still, unit, memory) - strained
-            for unit in np.eye(self.nu)
-        ]
-        matrix = np.array(columns).reshape(self.nu, self.nu).T
+        matrix = self.required_by_inertia(q, np.eye(self.nu)).T
         return np.asarray((matrix + matrix.T) / 2)
 
     def solve(self, q: Array, columns: Array, memory: Array | None = None) -> Array:
         """M(q)^-1 times n columns of efforts (n, nu), on the speeds that nobody imposes; zero on
         the others.  q (nq,) of one state; S is factored once, each column is O(bodies); of least
-        squares there is no factor to keep, and each column is a sweep at rest with its efforts.
+        squares and with closed loops there is no factor to keep, and each column is a sweep at rest
+        with its efforts.
         Without `memory` nothing is released."""
-        refuse(self.packed, "the solution with columns of efforts", INSTEAD)
         engine = self.inertia_alone
         memory = engine.start_memory() if memory is None else memory
-        if self.packed.qr:
+        if self.packed.qr or self.packed.system.closures:
             n, still = len(columns), np.zeros(columns.shape)
             many = np.tile(q, (n, 1)), still, np.tile(memory, (n, 1))
             return engine.accelerations(0.0, *many, np.ascontiguousarray(columns))[1]

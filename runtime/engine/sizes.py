@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import Protocol
 
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.scene import Scene
 
+from ..flexible.modal_body import ModalBody
 from ..flexible.sizes import modal_sizes, radius_of_gyration
-
-if TYPE_CHECKING:
-    from .compiled import Compiled
+from ..pack.layout import Layout
 
 
-def speed_sizes(model: Compiled) -> Array:
+class Sized(Protocol):
+    """What has sizes: a compiled scene."""
+
+    @property
+    def scene(self) -> Scene: ...
+    @property
+    def layout(self) -> Layout: ...
+    @property
+    def flexible(self) -> Mapping[str, ModalBody]: ...
+    @property
+    def nu(self) -> int: ...
+
+
+def speed_sizes(model: Sized) -> Array:
     """(nu,) of every speed: 1 rad, a length of the scene in m, the size of a modal coordinate."""
     layout, sizes = model.layout, np.ones(model.nu)
     length = scene_length(model)
@@ -26,7 +40,7 @@ def speed_sizes(model: Compiled) -> Array:
     return sizes
 
 
-def scene_length(model: Compiled) -> float:
+def scene_length(model: Sized) -> float:
     """The largest distance within a body or from one hinge to the next, m; 1 if all are zero."""
     scene = model.scene
     places = [hinge.position for hinge in scene.hinge]

@@ -12,7 +12,6 @@ d' as well, which are powers of s apart.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -26,6 +25,7 @@ from ..engine.engine import Engine
 from ..engine.shown import acceleration_name, rate_unit
 from ..engine.tangent import Tangent
 from ..pack.layout import HingeSlots
+from ..pack.loops.variants import undriven
 from ..pack.pack import packed_system
 from .matrices import State
 
@@ -138,5 +138,4 @@ def _columns(engine: Engine, state: State, speed: int) -> Columns:
 
 def _undriven(engine: Engine) -> Engine:
     """The tree with the same numbers, moved by nobody."""
-    system = replace(engine.packed.system, drives=None, driven=())
-    return Engine(packed_system(system, engine.packed))
+    return Engine(packed_system(undriven(engine.packed.system), engine.packed))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,14 +14,13 @@ from numpy.typing import ArrayLike
 from mstmm.arrays import Array, batch, one, one_row, pair, real
 from mstmm.arrays import columns as columns_of
 from mstmm.defaults import ATOL, METHOD, RTOL
-from mstmm.errors import NumericalFailure
+from mstmm.errors import NumericalFailure, SceneError
 from mstmm.risk import Risk
 
 from ..engine.compiled import Compiled
 from ..engine.given import GivenInput
 from ..integrate.settings import Settings, checked, times_of
 from ..pack.layout import refuse_dense
-from ..pack.loops.refusal import INSTEAD, refuse
 
 if TYPE_CHECKING:
     from ..engine.loops.closed import Loops
@@ -71,7 +71,13 @@ class Model(Compiled):
         """What closes in the scene: cut hinges, rows and those that repeat others, mobility."""
         from ..engine.loops.closed import Loops
 
-        return Loops() if self.closed is None else self.closed.loops
+        if self.closed is None:
+            return Loops()
+        return replace(self.closed.loops, decided_by=self._independent)
+
+    def _independent(self) -> tuple[str, ...]:
+        assert self.freedom is not None
+        return tuple(self.layout.u_name(place) for place in self.freedom.places)
 
     def assemble(
         self,
@@ -139,16 +145,34 @@ class Model(Compiled):
         return accelerations(self.looped, self.fusion, states, threads).reshape(*lead, self.nu)
 
     def inverse_dynamics(
-        self, q: ArrayLike, u: ArrayLike, udot: ArrayLike, t: ArrayLike = 0.0
+        self,
+        q: ArrayLike,
+        u: ArrayLike,
+        udot: ArrayLike,
+        t: ArrayLike = 0.0,
+        *,
+        actuators: Sequence[str] | None = None,
     ) -> Array:
         """Efforts (..., nu) beyond the laws' own that give `udot`; for driven coordinates the
         drive's.  q (..., nq), u and udot (..., nu), t (s).
 
-        Newton-Euler inverse dynamics over the tree, O(bodies).  Raises SceneError for a shape that
-        does not fit.
+        Where loops are closed, `actuators` are what acts: hinges, or efforts of some of their
+        speeds ("shoulder.effort"), as many as the mechanism has motions; the efforts of all others
+        are zero.  Without, they are `loops.independent`.  udot may be that of these independent
+        speeds alone, (..., mobility); all of it must go with the loops.
+
+        Newton-Euler inverse dynamics over the tree, O(bodies), and a sweep more for each motion of
+        a mechanism.  Raises SceneError for a shape that does not fit, accelerations that tear a
+        loop, and actuators that are not as many as the motions; NumericalFailure where they do not
+        decide them at the state.
         """
+        if self.freedom is not None:
+            from .actuated import actuated
+
+            return actuated(self, q, u, udot, t, actuators)
+        if actuators is not None:
+            raise SceneError("actuators: no loop is closed in this scene, so that all speeds act")
         engine = self.looped
-        refuse(self.packed, "inverse dynamics", INSTEAD)
         memory, nu = engine.start_memory(), self.nu
         lead, (times, coordinates, speeds, rates) = batch(
             ("t", t, None), ("q", q, self.nq), ("u", u, nu), ("udot", udot, nu)
@@ -161,9 +185,19 @@ class Model(Compiled):
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """Symmetric (..., nu, nu) mass matrix at q (..., nq), kg, kg*m, kg*m2; driven coordinates
-        as if free.  Raises SceneError for a shape that does not fit."""
-        refuse_dense(self.nu, "the mass matrix")
+        as if free.  Where loops are closed it is that of the independent speeds alone, (...,
+        mobility, mobility) in the order of `loops.independent`, driven ones left out.
+
+        Raises SceneError for a shape that does not fit, NumericalFailure where the independent
+        speeds do not decide the others.
+        """
         lead, (states,) = batch(("q", q, self.nq))
+        if self.freedom is not None:
+            from .actuated import reduced_mass
+
+            found = np.array([reduced_mass(self, one_state) for one_state in states])
+            return found.reshape(*lead, *found.shape[1:])
+        refuse_dense(self.nu, "the mass matrix")
         matrices = [self.looped.mass_matrix(one_state) for one_state in states]
         return np.array(matrices).reshape(*lead, self.nu, self.nu)
 

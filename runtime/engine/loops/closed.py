@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -55,6 +55,7 @@ class Loops:
     width: int = 0
     singular: bool = False
     not_unique: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    decided_by: Callable[[], tuple[str, ...]] = field(default=tuple, repr=False, compare=False)
 
     @property
     def open_loads(self) -> str:
@@ -66,6 +67,12 @@ class Loops:
             f"{' '.join(words)} of {', '.join(names[:_NAMED])}{' ...' if names[_NAMED:] else ''}"
             for words, names in list(alike.items())[:_NAMED]
         )
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """Names of speeds that decide all others, as many as the mobility: those over which mass
+        matrices and linear models of the mechanism stand."""
+        return self.decided_by()
 
 
 class Closed:

@@ -51,6 +51,16 @@ def without(system: System, rows: Collection[tuple[int, int]]) -> System:
     return replace(system, closures=closures)
 
 
+def undriven(system: System) -> System:
+    """With the same speeds imposed, but by nobody: they are what a state says."""
+    return replace(system, drives=None, driven=())
+
+
+def torn(system: System) -> System:
+    """With the loops open: a tree in which a hinge that closes one carries a frame without mass."""
+    return replace(system, closures=())
+
+
 def length_of(system: System) -> float:
     """Mean square distance between hinges, m; 1 where all of them meet in one point."""
     squares = [sum(x * x for x in body.connection[9:12]) for body in system.distinct]

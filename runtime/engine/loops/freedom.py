@@ -1,0 +1,108 @@
+"""What closed loops leave free: speeds that decide all others, and how these follow.
+
+Random speeds less what the rows do not allow span the motions of a mechanism, one correction each.
+A few speeds are read off that tell these motions apart, the first in the scene that do so well, and
+u = N v: N is 1 in the rows of v, and no row slips.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
+
+from ...pack.loops.variants import undriven
+from ...pack.pack import packed_system
+from ..engine import Engine
+from .calls import LoopCalls
+from .closed import Closed
+
+#: Motions that are rounding beside others, in sizes of the speeds.
+_ROUNDING = 1e-9
+#: A speed is read off where no other tells more than this many times as much apart.
+_WELL = 4.0
+#: Speeds that decide others this many times their own size decide nothing any more.
+_MOST = 1e8
+
+
+class Freedom:
+    """The motions of one packed scene with closed loops.
+
+    `free` are the places of the speeds that nobody imposes, `sizes` (nu,) motions of order one.
+    """
+
+    def __init__(self, engine: Engine, free: Sequence[int], sizes: Array, closed: Closed) -> None:
+        packed, self._start = engine.packed, closed.start[0]
+        still = Engine(packed_system(undriven(packed.system), packed))
+        self._calls = LoopCalls(still, self._start)
+        self._free, self._sizes = np.array(free, dtype=np.int64), sizes
+        self._loops = closed.loops
+
+    @cached_property
+    def places(self) -> tuple[int, ...]:
+        """Places of the independent speeds, those that are chosen at the start."""
+        return self.chosen(self._start)
+
+    def chosen(self, q: Array) -> tuple[int, ...]:
+        """Places of speeds that decide all others at q (nq,).
+
+        Each is the first in the scene that is told apart from those before it a quarter as well as
+        any other, by motions in sizes.
+        """
+        left = self._motions(q)[self._free] / self._sizes[self._free, None]
+        found = list[int]()
+        for _ in range(left.shape[1]):
+            lengths = np.linalg.norm(left, axis=1)
+            place = int(np.argmax(_WELL * lengths >= lengths.max()))
+            found.append(int(self._free[place]))
+            along = left[place] / lengths[place]
+            left = left - np.outer(left @ along, along)
+        return tuple(sorted(found))
+
+    def following(self, q: Array, places: Sequence[int]) -> Array:
+        """N (nu, n): all speeds for a unit of each of some independent ones.
+
+        Raises NumericalFailure where these decide nothing, at a dead centre, and at singular poses.
+        """
+        found, own = self._motions(q), list(places)
+        scaled = found[own] / self._sizes[own, None]
+        rows, ways = scaled.shape
+        branches = self._loops.singular and ways == self._loops.mobility
+        if rows == ways and not branches and (not ways or np.linalg.cond(scaled) < _MOST):
+            return np.asarray(found @ np.linalg.inv(found[own]))
+        names = ", ".join(self._calls.engine.packed.layout.u_name(k) for k in own)
+        raise NumericalFailure(
+            f"the loops leave {ways} motions here, which {names or 'no speed'} cannot tell apart: "
+            "a dead centre or a singular pose; take a state beside it"
+        )
+
+    def driving(self, q: Array, speed: int) -> Array:
+        """All speeds (nu,) for a unit of one that is imposed, the others of these at rest; nan
+        where the loops do not let it move alone."""
+        moved = self._allowed(q, np.eye(1, len(self._sizes), speed)[0])
+        slips = self._calls.correction(self._calls.slip, q, moved)[1]
+        return moved if np.abs(slips).max(initial=0.0) < _ROUNDING else np.full_like(moved, np.nan)
+
+    def moved(self, q: Array, speeds: Array) -> Array:
+        """q (nq,) after a small motion along speeds (nu,); loops are closed to first order."""
+        return self._calls.moved(q, speeds)
+
+    def _motions(self, q: Array) -> Array:
+        """(nu, n) a basis of the motions at q, orthonormal in sizes."""
+        count = min(len(self._free), self._loops.mobility + 1)  # one more shows at a singular pose
+        draw = np.random.default_rng(0)
+        trials = np.zeros((count, len(self._sizes)))
+        trials[:, self._free] = draw.standard_normal((count, len(self._free)))
+        columns = [self._allowed(q, trial * self._sizes) for trial in trials]
+        scaled = np.reshape(columns, trials.shape).T / self._sizes[:, None]
+        left, lengths, _ = np.linalg.svd(scaled, full_matrices=False)
+        kept = lengths > _ROUNDING * lengths.max(initial=1.0)
+        return np.asarray(left[:, kept] * self._sizes[:, None])
+
+    def _allowed(self, q: Array, speeds: Array) -> Array:
+        """Speeds less their slips."""
+        return speeds + self._calls.correction(self._calls.slip, q, speeds)[0]
