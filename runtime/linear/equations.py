@@ -5,22 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mstmm.arrays import Array
+from mstmm.errors import SceneError
 
 from ..pack.layout import refuse_dense
 from ..run.system import SceneSystem
 from .channels import Channel, columns
 from .drives import columns_of, coordinate
+from .loops.mechanism import Mechanism
 from .matrices import Matrices, State, matrices
 from .pencil import Pencil
 from .standing import standing, with_held_springs, without_laws
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
+    from ..engine.engine import Engine
     from ..engine.slopes import About
     from .symbolic import Symbolic
 
@@ -42,6 +46,8 @@ class Equations:
         turning: (n, n) G of x' = G x + du, how increments of coordinates that are no integrals of
             speeds go along with the motion; None where they do not.
         about: the state by code compiled for the scene, where there is such code.
+        mechanism: how closed loops let the scene move there: x are independent motions then; None
+            for a tree.
     """
 
     model: Compiled
@@ -50,6 +56,7 @@ class Equations:
     others: tuple[Channel, ...] = ()
     turning: Array | None = field(default=None, repr=False)
     about: About | None = field(default=None, repr=False)
+    mechanism: Mechanism | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         return (
@@ -63,17 +70,28 @@ class Equations:
     @property
     def free(self) -> tuple[int, ...]:
         """Places of x among the speeds."""
-        return self.model.free_speeds
+        return self.model.free_speeds if self.mechanism is None else self.mechanism.places
+
+    @property
+    def tree(self) -> Engine:
+        """The scene, its loops torn open."""
+        return self.model.looped if self.mechanism is None else self.mechanism.tree
+
+    @cached_property
+    def _named(self) -> list[tuple[str, str]]:
+        """Name and unit of x."""
+        known = dict(zip(self.model.free_speeds, self.model.increments, strict=True))
+        return [known[place] for place in self.free]
 
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of x."""
-        return tuple(name for name, _ in self.model.increments)
+        return tuple(name for name, _ in self._named)
 
     @property
     def units(self) -> tuple[str, ...]:
         """Units of x."""
-        return tuple(unit for _, unit in self.model.increments)
+        return tuple(unit for _, unit in self._named)
 
     # --- matrices ---------------------------------------------------------------------------------
 
@@ -83,17 +101,21 @@ class Equations:
         if about is not None:
             return self._second_order(Matrices(about.M, about.C, about.K))
         refuse_dense(len(self), "the matrix of a linear model")
-        return self._second_order(matrices(self.model.looped, self.state, list(self.free)))
+        return self._second_order(self._of(self.tree))
 
     @cached_property
     def _held(self) -> Matrices:
-        engine = with_held_springs(self.model.looped, self.state)
-        return self._second_order(matrices(engine, self.state, list(self.free)))
+        return self._second_order(self._of(with_held_springs(self.tree, self.state)))
 
     @cached_property
     def _standing(self) -> Matrices:
-        engine = standing(self.model.looped, self.state)
-        return self._second_order(matrices(engine, self.state, list(self.free)))
+        return self._second_order(self._of(standing(self.tree, self.state)))
+
+    def _of(self, engine: Engine) -> Matrices:
+        """Of the scene's tree, or of it with other elements, along x."""
+        if self.mechanism is not None:
+            return self.mechanism.matrices(engine, self.state)
+        return matrices(engine, self.state, list(self.free))
 
     def _second_order(self, found: Matrices) -> Matrices:
         """From speeds to x': where x' = G x + du, C du = C x' - C G x and M da = M x'' - M G x'."""
@@ -135,8 +157,7 @@ class Equations:
     @cached_property
     def sprung(self) -> Array:
         """(n, n) of `elastic`: slopes of the laws of springs between ends."""
-        engine = without_laws(self.model.looped)
-        lawless = self._second_order(matrices(engine, self.state, list(self.free)))
+        lawless = self._second_order(self._of(without_laws(self.tree)))
         return lawless.K - self._held.K
 
     @property
@@ -194,21 +215,26 @@ class Equations:
     @cached_property
     def V(self) -> Array:
         """(n, inputs): what a unit of each input does."""
-        return self._pushed(self.controls)
+        return self.pushed(self.controls)
 
     @cached_property
     def W(self) -> Array:
         """(n, disturbances): what a unit of each disturbance does."""
-        return self._pushed(self.others)
+        return self.pushed(self.others)
 
-    def _pushed(self, channels: Sequence[Channel]) -> Array:
-        return columns(self.model.looped, self.state, channels, list(self.free))
+    def pushed(self, channels: Sequence[Channel]) -> Array:
+        """(n, channels): what a unit of each push does."""
+        if self.mechanism is None:
+            return columns(self.tree, self.state, channels, list(self.free))
+        return self.mechanism.pushed(self.state, channels)
 
     def _of_shapes(self, matrix: Callable[..., Array]) -> Array:
         """A matrix of the flexible bodies in its place among all."""
         found = np.zeros((self.model.nu, self.model.nu))
         for name, slots in self.model.layout.modal.items():
             found[slots.u_slice, slots.u_slice] = matrix(self.model.flexible[name])
+        if self.mechanism is not None:
+            return self.mechanism.ways.T @ found @ self.mechanism.ways
         return found[np.ix_(self.free, self.free)]
 
     def symbolic(self, keep: Sequence[str]) -> Symbolic:
@@ -224,18 +250,30 @@ class Equations:
         Raises SceneError for a name that is none of these, for numbers of flexible bodies, and for
         scenes and expressions that are too large.
         """
+        if self.mechanism is not None:
+            raise SceneError(
+                "symbolic: linear models of closed loops are numbers; open the loop, or take M, C "
+                "and K as they are"
+            )
         found: Symbolic = self.model.fusion.symbolic(self, keep)
         return found
 
     @cached_property
     def pencil(self) -> Pencil:
-        """M, C and K as operators, O(bodies), without the matrices; of states at rest."""
+        """M, C and K as operators, O(bodies), without the matrices; of states of trees at rest."""
         return Pencil(self.model.looped, self.state, list(self.free))
+
+    def spread(self, x: NDArray[Any]) -> NDArray[Any]:
+        """(nu, ...) increments along all speeds of those of x (n, ...)."""
+        if self.mechanism is not None:
+            return np.asarray(self.mechanism.ways @ x)
+        found = np.zeros((self.model.nu, *x.shape[1:]), dtype=x.dtype)
+        found[list(self.free)] = x
+        return found
 
     def displaced(self, x: Array) -> Array:
         """q (nq,) of the state after increments x (n,)."""
-        model, speeds = self.model, np.zeros(self.model.nu)
-        speeds[list(self.free)] = x
+        model, speeds = self.model, self.spread(x)
         engine, state = model.looped, self.state
         moved = state.q + engine.rates(state.t, state.q, speeds, engine.start_memory())
         return SceneSystem(engine).start(state.t, moved, state.u)[: model.nq]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.errors import SceneError
 
 from ..engine.sizes import speed_sizes
 from ..run.system import SceneSystem
@@ -61,6 +62,19 @@ def warnings_of(linear: Equations, found: Modes) -> Iterator[str]:
     if len(free):
         moved = dict.fromkeys(name for k in free for name in found.moving(int(k)))
         yield f"nothing pushes back {_some(list(moved))}: motions of frequency 0"
+
+
+def refuse_unrest(linear: Equations) -> None:
+    """SceneError for closed loops at a state that does not last: what accelerations make of rows
+    that turn is not in their linear models."""
+    if linear.mechanism is None:
+        return
+    leaving = _accelerating(linear)
+    if leaving:
+        raise SceneError(
+            f"a linear model of closed loops is that of a state at rest, and {_some(leaving)} "
+            "accelerate here; leave q out for the equilibrium, or give one"
+        )
 
 
 def _accelerating(linear: Equations) -> list[str]:

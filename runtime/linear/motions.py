@@ -75,7 +75,9 @@ class Modes:
     @cached_property
     def _units(self) -> Array:
         """(k,) modal masses x* M x of the shapes."""
-        moved = shares.along(self.linear.pencil.mass, self.shapes)
+        linear, x = self.linear, self.shapes
+        loops = linear.mechanism is not None
+        moved = linear.M @ x if loops else shares.along(linear.pencil.mass, x)
         return np.real(np.einsum("ik,ik->k", np.conj(self.shapes), moved))
 
     @cached_property

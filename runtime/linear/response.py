@@ -22,7 +22,7 @@ from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.response import Response
 from . import files
-from .channels import Channel, channel, columns, some_names
+from .channels import Channel, channel, some_names
 from .harmonic.exact import (
     Chosen,
     ExactBeams,
@@ -33,11 +33,15 @@ from .harmonic.exact import (
 from .harmonic.losses import Losses, stiffer
 from .harmonic.prescribed import Ratios, modal_damping
 from .harmonic.refused import given, refuse_drives, refuse_in_motion, refuse_ratios
+from .loops.amplitudes import Amplitudes
+from .loops.mechanism import refuse_motions
+from .matrices import Matrices
 from .output.outputs import outputs_of, read_by, rows_of
 from .output.seen import Seen
 from .pushed import Pushed
 
 if TYPE_CHECKING:
+    from ..engine.engine import Engine
     from .equations import Equations
 
 Complex = NDArray[np.complex128]
@@ -181,6 +185,8 @@ def frequency_response(
     if beams is not None:
         refuse_distributed(beams, pushes)
     refuse_drives(pushes, beams is not None or given(structural))
+    if linear.mechanism is not None:
+        refuse_motions(pushes)
     shown = outputs_of(linear, None if outputs is None else some_names("outputs", outputs))
     values = _Sweep(linear, pushes, shown, structural, modal, beams).values(frequencies)
     return FrequencyResponse(
@@ -220,7 +226,7 @@ def _efforts(linear: Equations, pushes: Sequence[Channel]) -> Array:
         return linear.V
     if pushes is linear.others:
         return linear.W
-    return columns(linear.model.looped, linear.state, pushes, list(linear.free))
+    return linear.pushed(pushes)
 
 
 class _Sweep:
@@ -230,15 +236,11 @@ class _Sweep:
         self, linear: Equations, pushes: Sequence[Channel], outputs: Sequence[Seen],
         structural: Losses, modal: Ratios, beams: ExactBeams | None,
     ) -> None:  # fmt: skip
-        engine, state, free = linear.model.looped, linear.state, list(linear.free)
+        engine, free = linear.tree, list(linear.free)
         refuse_in_motion(linear, structural, modal)
-        lossy = stiffer(linear.model, state, structural) if given(structural) else None
+        lossy = stiffer(linear, structural) if given(structural) else None
         self.modal = modal_damping(linear, modal) if given(modal) else None
-        self.engine = engine
-        self.response = Response(
-            engine, state.t, state.q, state.u, state.a, stiffer=lossy,
-            exact=None if beams is None else beams.bodies,
-        )  # fmt: skip
+        self.engine, self.response = engine, _response(linear, lossy, beams)
         efforts = np.zeros((len(pushes), engine.nu))
         efforts[:, free] = _efforts(linear, pushes).T
         self.pushed = Pushed.of(linear, pushes, efforts)
@@ -302,6 +304,20 @@ class _Sweep:
                 "frequency out"
             )
         return best
+
+
+def _response(
+    linear: Equations, lossy: Engine | None, beams: ExactBeams | None
+) -> Response | Amplitudes:
+    """What solves for amplitudes: of a tree by elimination, else from matrices."""
+    state, loops = linear.state, linear.mechanism
+    if loops is not None:
+        lost = None if lossy is None else loops.matrices(lossy, state)
+        return Amplitudes(loops, Matrices(linear.M, linear.C, linear.K), lost)
+    return Response(
+        linear.tree, state.t, state.q, state.u, state.a, stiffer=lossy,
+        exact=None if beams is None else beams.bodies,
+    )  # fmt: skip
 
 
 def _share(part: Array, whole: Complex) -> float:

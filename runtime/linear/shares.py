@@ -19,6 +19,7 @@ from .pencil import Pencil
 from .standing import with_held_springs, without_laws
 
 if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
     from .equations import Equations
 
 
@@ -37,25 +38,21 @@ def kinetic(linear: Equations, shapes: NDArray[Any]) -> dict[str, Array]:
         parts.append(np.imag(shapes))
     energies = np.zeros((shapes.shape[1], engine.packed.topology.count))
     for part in parts:
-        speeds = np.zeros((shapes.shape[1], engine.nu))
-        speeds[:, list(linear.free)] = part.T
-        energies += engine.kinetic_energies(linear.state.q, speeds)
+        energies += engine.kinetic_energies(linear.state.q, linear.spread(part).T)
     names = [engine.body_name(place).partition("/")[0] for place in range(energies.shape[1])]
     return _parts(names, energies.T)
 
 
 def strain(linear: Equations, shapes: NDArray[Any]) -> dict[str, Array]:
     """Owner of coordinates, or "springs" -> (k,): its part of each shape's elastic energy."""
+    tree, free = linear.tree, list(linear.model.free_speeds)
+    shapes = linear.spread(shapes)[free]
     whole, lawless, held = (
         along(_pressed(linear, engine), shapes)
-        for engine in (
-            linear.model.looped,
-            without_laws(linear.model.looped),
-            with_held_springs(linear.model.looped, linear.state),
-        )
+        for engine in (tree, without_laws(tree), with_held_springs(tree, linear.state))
     )
-    own = np.real(np.conj(shapes) * (whole - lawless + _by_shapes(linear, shapes)))
-    names = [name.rpartition(".")[0] for name in linear.coordinates]
+    own = np.real(np.conj(shapes) * (whole - lawless + _by_shapes(linear.model, shapes)))
+    names = [name.rpartition(".")[0] for name, _ in linear.model.increments]
     if not linear.model.scene.forces:
         return _parts(names, own)
     sprung = np.real(np.conj(shapes) * (lawless - held)).sum(axis=0)
@@ -64,21 +61,21 @@ def strain(linear: Equations, shapes: NDArray[Any]) -> dict[str, Array]:
 
 def _pressed(linear: Equations, engine: Any) -> Callable[[Array], Array]:
     """K x of a scene, x' = G x + du."""
-    pencil, turning = Pencil(engine, linear.state, list(linear.free)), linear.turning
+    pencil = Pencil(engine, linear.state, list(linear.model.free_speeds))
+    turning = linear.turning
     if turning is None:
         return pencil.stiffness
     return lambda x: pencil.stiffness(x) - pencil.damping(turning @ x)
 
 
-def _by_shapes(linear: Equations, x: NDArray[Any]) -> NDArray[Any]:
-    """(n, k): the stiffness of flexible bodies times x."""
-    model = linear.model
+def _by_shapes(model: Compiled, x: NDArray[Any]) -> NDArray[Any]:
+    """(n, k): the stiffness of flexible bodies times increments x of all free speeds."""
     moved = np.zeros((model.nu, x.shape[1]), dtype=x.dtype)
-    moved[list(linear.free)] = x
+    moved[list(model.free_speeds)] = x
     pressed = np.zeros_like(moved)
     for name, slots in model.layout.modal.items():
         pressed[slots.u_slice] = model.flexible[name].K @ moved[slots.u_slice]
-    return pressed[list(linear.free)]
+    return pressed[list(model.free_speeds)]
 
 
 def _parts(names: Iterable[str], energies: Array) -> dict[str, Array]:

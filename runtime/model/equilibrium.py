@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.arrays import Array
-from mstmm.errors import NumericalFailure
+from mstmm.errors import NumericalFailure, SceneError
 
+from ..engine.loops.freedom import Freedom
 from ..engine.rest import Rest, Undetermined, Unsettled, at_rest
 from ..engine.rest_by_sweep import RestBySweep
 from ..engine.sizes import speed_sizes
 from ..engine.tangent import Tangent
-from ..pack.loops.refusal import INSTEAD, refuse
 from ..run.system import SceneSystem
 
 if TYPE_CHECKING:
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 _LISTED = 3
 #: More free speeds than this come to rest by the sweep, without a stiffness matrix.
 _DENSE = 600
+#: Loops are followed in steps no longer than this, in sizes: longer ones may end where they are
+#: closed another way.
+_PART = 0.1
 
 
 class Equilibrium(np.ndarray[Any, np.dtype[np.float64]]):
@@ -42,11 +45,13 @@ class Equilibrium(np.ndarray[Any, np.dtype[np.float64]]):
 
 def equilibrium(model: Compiled, q: Array, t: float, tolerance: float) -> Equilibrium:
     """q at which the free coordinates need no effort at rest; see `Model.equilibrium`."""
-    refuse(model.packed, "an equilibrium", INSTEAD)
-    free = list(model.free_speeds)
-    problem = _problem(model, t, free)
+    free, trees = list(model.free_speeds), model.freedom is None
+    if model.freedom is not None:
+        q, free, problem = _of_mechanism(model, model.freedom, q, t)
+    else:
+        problem = _problem(model, t, free)
     try:
-        if len(free) > _DENSE:
+        if trees and len(free) > _DENSE:
             found = _by_sweep(model, q, t, tolerance)
         else:
             found = at_rest(problem, q, tolerance)
@@ -109,6 +114,37 @@ def _problem(model: Compiled, t: float, free: list[int]) -> Rest:
         return np.asarray(result)
 
     return Rest(needed, moved, speed_sizes(model)[free])
+
+
+def _of_mechanism(
+    model: Compiled, freedom: Freedom, q: Array, t: float
+) -> tuple[Array, list[int], Rest]:
+    """The start with its loops closed, the independent speeds there, and their way to rest: what
+    the tree needs along the motions that the loops leave, which the loads of loops do not see."""
+    engine, still, scene = model.looped, np.zeros(model.nu), SceneSystem(model.looped)
+    memory = engine.start_memory()
+
+    def closed(q: Array) -> Array:
+        try:
+            return scene.start(t, q, still)[: model.nq]
+        except SceneError as error:
+            raise NumericalFailure(str(error)) from None
+
+    q = scene.start(t, q, still)[: model.nq]
+    places = list(freedom.chosen(q))
+
+    def needed(q: Array) -> Array:
+        efforts = engine.inverse_dynamics(t, q, still, still, memory)
+        return np.asarray(freedom.following(q, places).T @ efforts)
+
+    def moved(q: Array, increment: Array) -> Array:
+        parts = max(1, int(np.ceil(float(np.abs(increment / sizes).max(initial=0.0)) / _PART)))
+        for _ in range(parts):
+            q = closed(freedom.moved(q, freedom.following(q, places) @ (increment / parts)))
+        return q
+
+    sizes = speed_sizes(model)[places]
+    return q, places, Rest(needed, moved, sizes)
 
 
 def _straight_places(model: Compiled, free: list[int]) -> NDArray[np.int64] | None:

@@ -13,9 +13,10 @@ from mstmm.errors import NumericalFailure
 
 from ..engine.sizes import speed_sizes
 from ..linear.channels import GROUND, Channel, inputs_of, pushes_of
+from ..linear.judged import refuse_unrest
 from ..linear.linear import Linear
+from ..linear.loops.mechanism import mechanism_at, refuse_motions
 from ..linear.matrices import State, matrices
-from ..pack.loops.refusal import INSTEAD, refuse
 from ..run.start import initial_state
 from ..run.system import SceneSystem
 from .derivatives import Differentiation
@@ -34,12 +35,11 @@ class Linearising:
     """Makes one model linear, at many states."""
 
     def __init__(self, model: Compiled) -> None:
-        refuse(model.packed, "a linear model", INSTEAD)
         self._model = model
         system, layout = model.packed.system, model.layout
         twists = any(law.twist >= 0 for law in system.laws)
         #: Whether states are in order as they are given.
-        self._settled = not (len(layout.quaternions) or system.driven or twists)
+        self._settled = not (len(layout.quaternions) or system.driven or twists or system.closures)
         self._straight = all(h.straight for h in layout.hinges.values() if h.nu)
 
     def __call__(
@@ -57,10 +57,17 @@ class Linearising:
         if disturbances is not None:
             others = pushes_of(self._model, "disturbances", disturbances)
         q, u = self._state(q, u, t)
-        model, about = self._model, self._model.slopes.at(t, q, u)
+        model, about = self._model, None
+        if model.freedom is None:
+            about = model.slopes.at(t, q, u)
         if about is None:
             state = State(t, q, u, self._accelerations(t, q, u))
-            return Linear(model, state, pushes, others, self._turning(state))
+            loops = mechanism_at(model, state)
+            if loops is not None:
+                refuse_motions((*pushes, *others))
+            found = Linear(model, state, pushes, others, self._turning(state), mechanism=loops)
+            refuse_unrest(found)
+            return found
         turning = None if self._straight or not u.any() else about.G
         return Linear(model, State(t, q, u, about.a), pushes, others, turning, about)
 
@@ -113,10 +120,16 @@ def _rest(model: Compiled, t: float) -> Array:
 
 def _at_rest(model: Compiled, q: Array, t: float) -> bool:
     """Whether what is missing at a state is rounding beside the stiffness that there is."""
-    free, still = list(model.free_speeds), np.zeros(model.nu)
+    free, still, engine = list(model.free_speeds), np.zeros(model.nu), model.looped
+    state = State(t, q, still, still)
+    efforts = engine.inverse_dynamics(t, q, still, still, engine.start_memory())
+    loops = mechanism_at(model, state)
+    if loops is not None:
+        free, missing = list(loops.places), loops.ways.T @ efforts
+        stiffness = loops.matrices(loops.tree, state).K
+    else:
+        missing, stiffness = efforts[free], matrices(engine, state, free).K
     sizes = speed_sizes(model)[free]
-    engine = model.looped
-    missing = engine.inverse_dynamics(t, q, still, still, engine.start_memory())[free] * sizes
-    stiffness = matrices(engine, State(t, q, still, still), free).K * np.outer(sizes, sizes)
+    missing, stiffness = missing * sizes, stiffness * np.outer(sizes, sizes)
     scale = float(np.abs(stiffness).max(initial=0))
     return float(np.abs(missing).max(initial=0)) <= _AT_REST * scale

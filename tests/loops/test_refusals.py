@@ -22,13 +22,6 @@ def model() -> mstmm.Model:
 
 
 ASKED: dict[str, Callable[[mstmm.Model], Any]] = {
-    "solve": lambda m: m.solve(m.initial_state()[0], np.ones(m.nu)),
-    "mass matrix": lambda m: m.mass_matrix(m.initial_state()[0]),
-    "inverse dynamics": lambda m: m.inverse_dynamics(*m.initial_state(), np.zeros(m.nu)),
-    "equilibrium": lambda m: m.equilibrium(),
-    "linearize": lambda m: m.linearize(),
-    "modes": lambda m: m.modes(),
-    "frequency response": lambda m: m.frequency_response([1.0]),
     "derivatives": lambda m: m.derivatives(*m.initial_state()),
     "advise": lambda m: mstmm.advise(m, 0.1),
     "chart": lambda m: mstmm.chart(m, 0.1),

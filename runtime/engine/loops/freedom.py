@@ -39,6 +39,9 @@ class Freedom:
         packed, self._start = engine.packed, closed.start[0]
         still = Engine(packed_system(undriven(packed.system), packed))
         self._calls = LoopCalls(still, self._start)
+        assert packed.written.loops is not None
+        for row in range(self._calls.count):  # judged as accelerations judge them
+            self._calls.records.judge(row, packed.written.loops.floor(row))
         self._free, self._sizes = np.array(free, dtype=np.int64), sizes
         self._loops = closed.loops
 

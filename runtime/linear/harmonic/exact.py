@@ -94,6 +94,8 @@ def exact_beams(linear: Equations, chosen: Chosen, losses: Losses) -> ExactBeams
     Raises SceneError for names of no flexible beams and for beams and states that the solution does
     not hold for.
     """
+    if linear.mechanism is not None:
+        raise SceneError("exact: a loop is closed; the solution goes along trees alone")
     if linear.state.u.any():
         raise SceneError("exact: this state moves; the solution is that of beams at rest")
     model, names = linear.model, _names(linear.model, chosen)

@@ -33,6 +33,7 @@ from ..standing import bushing_deflection, spring_length
 
 if TYPE_CHECKING:
     from ...engine.compiled import Compiled
+    from ..equations import Equations
 
 #: Loss factors of all that is elastic, or by the names of hinges, chains, flexible bodies, springs.
 Losses = float | Mapping[str, float]
@@ -43,14 +44,14 @@ _STIFF = {
 }  # fmt: skip
 
 
-def stiffer(model: Compiled, state: State, losses: Losses) -> Engine:
-    """The scene with stiffness larger by what it loses, its elements as they stand at a state.
+def stiffer(linear: Equations, losses: Losses) -> Engine:
+    """The scene with stiffness larger by what it loses, its elements as they stand at the state.
 
     Efforts that expressions give, and elements of a user's own type, lose nothing.
 
     Raises SceneError for a name that has no stiffness and for a loss factor that is below 0.
     """
-    engine = model.looped
+    model, engine, state = linear.model, linear.tree, linear.state
     system, lossy = engine.packed.system, by_name(model, losses)
     bodies = tuple(_stiffer_shapes(model, run, lossy) for run in system.bodies)
     laws = tuple(law for run in system.laws for law in _stiffer_laws(engine, run, lossy))

@@ -123,7 +123,7 @@ def rows_of(linear: Equations, outputs: Sequence[Seen], pushes: Sequence[Channel
     orders = {part.order: np.zeros(shape) for _, part in parts}
     reach = [part.push for _, part in parts if part.push is not None]
     distinct = {one: k for k, one in enumerate(dict.fromkeys(reach))}
-    reached = columns(linear.model.looped, linear.state, list(distinct), list(range(nu)))
+    reached = columns(linear.tree, linear.state, list(distinct), list(range(nu)))
     for k, part in parts:
         row = orders[part.order][k]
         if part.push is not None:
@@ -136,6 +136,8 @@ def rows_of(linear: Equations, outputs: Sequence[Seen], pushes: Sequence[Channel
         for name, slope in one.through:
             if name in places:
                 through[k, places[name]] += slope
+    if linear.mechanism is not None:
+        orders = {order: linear.mechanism.rows(wide) for order, wide in orders.items()}
     return Rows(_with_turning(linear, orders), through)
 
 

@@ -1,0 +1,42 @@
+"""Amplitudes of mechanisms under harmonic pushes, from matrices: they have few motions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arrays import Array
+
+from ..matrices import Matrices
+from .mechanism import Mechanism
+
+Complex = NDArray[np.complex128]
+
+
+class Amplitudes:
+    """Z(s) x = r of a mechanism, as `Response` solves it of a tree: x and r stand in the places of
+    the independent speeds."""
+
+    def __init__(self, mechanism: Mechanism, whole: Matrices, lossy: Matrices | None) -> None:
+        self._places, self._whole = list(mechanism.places), whole
+        self._lost = 0.0 if lossy is None else 1j * (lossy.K - whole.K)
+
+    def amplitudes(self, s: Complex, columns: Array) -> tuple[Complex, Array, NDArray[np.int32]]:
+        """x (k, n, nu) at every s (k,) of n right-hand sides (n, nu), the condition (k,) of Z, and
+        no body."""
+        x = np.zeros((len(s), *columns.shape), dtype=np.complex128)
+        growth, whole = np.zeros(len(s)), self._whole
+        for k, at in enumerate(s):
+            z = at**2 * whole.M + at * whole.C + whole.K + self._lost
+            growth[k] = _condition(z)
+            if np.isfinite(growth[k]):
+                x[k][:, self._places] = np.linalg.solve(z, columns[:, self._places].T).T
+        return x, growth, np.full(len(s), -1, dtype=np.int32)
+
+
+def _condition(z: Complex) -> float:
+    """Of a symmetric matrix beside its own diagonal, infinite where it is singular."""
+    scale = np.sqrt(np.abs(z).max(axis=1, initial=0.0))
+    if not len(z) or not scale.all():
+        return float(np.inf) if len(z) else 1.0
+    return float(np.linalg.cond(z / np.outer(scale, scale)))
