@@ -73,6 +73,18 @@ def attach_loops(
     return _Loops(model, system, memory, lib).write(place)
 
 
+class _Shelf:
+    """Records of one kind side by side, as a sweep meets them: it waits for memory."""
+
+    def __init__(self, memory: Memory, kind: str, count: int) -> None:
+        self.records, self.used = memory.new(f"{kind}[]", max(1, count)), 0
+
+    def take(self, count: int) -> Any:
+        """The next `count` of them."""
+        self.used += count
+        return self.records + (self.used - count)
+
+
 class _Loops:
     """Numbers of loops lie behind the place that the model names, in this order: rows, a dump for
     columns on the ground, entries of L, columns, then what is no sum: y of the columns, closures.
@@ -92,16 +104,27 @@ class _Loops:
         self.entries = {pair: self.dump + 6 + k for k, pair in enumerate(self.plan.pairs)}
         start = self.dump + 6 + len(self.entries)
         self.columns: dict[tuple[int, int], int] = {}
-        for body, rows in self.plan.pending.items():
+        self.pending = sorted(self.plan.pending.items())
+        for body, rows in self.pending:
             for row in rows:
                 self.columns[body, row] = start
                 start += 6
         self.summed = self.end = start
+        passing = [len(rows) for _, rows in self.pending]
+        staying = [len(row.others) for row in self.plan.rows]
+        pairs = sum(n * (n + 1) // 2 for n in (*passing, *staying))
+        self.shelves = {
+            kind: _Shelf(memory, kind, needed)
+            for kind, needed in (
+                ("mstmm_pending", sum(passing)), ("mstmm_other", sum(staying)), ("int64_t", pairs),
+                ("mstmm_closure", len(system.closures)),
+            )
+        }  # fmt: skip
 
     def write(self, place: int) -> tuple[int, LoopRecords]:
         model, memory = self.model, self.memory
         looped = memory.new("mstmm_looped[]", self.system.count)
-        for body, rows in self.plan.pending.items():
+        for body, rows in self.pending:
             looped[body].n_pending = len(rows)
             looped[body].pending = self._pending(body, rows)
         records = memory.new("mstmm_loop_row[]", max(1, len(self.plan.rows)))
@@ -143,10 +166,12 @@ class _Loops:
         return self.entries[min(one, other), max(one, other)]
 
     def _places(self, places: list[int]) -> Any:
-        return self.memory.new("int64_t[]", places or [0])
+        found = self.shelves["int64_t"].take(len(places))
+        found[0 : len(places)] = places
+        return found
 
     def _pending(self, body: int, rows: list[int]) -> Any:
-        records = self.memory.new("mstmm_pending[]", len(rows))
+        records = self.shelves["mstmm_pending"].take(len(rows))
         speeds = self.system.body(body).nu
         for k, row in enumerate(rows):
             records[k].row = row
@@ -157,7 +182,7 @@ class _Loops:
         return records
 
     def _others(self, body: int, others: tuple[int, ...], number: int) -> Any:
-        records = self.memory.new("mstmm_other[]", max(1, len(others)))
+        records = self.shelves["mstmm_other"].take(len(others))
         for k, other in enumerate(others):
             records[k].row = other
             records[k].column = self._column(body, other)
@@ -168,7 +193,7 @@ class _Loops:
     def _closure(
         self, group: int, closure: ClosureNumbers, rows: Any
     ) -> tuple[Any, WrittenClosure]:
-        record = self.memory.new("mstmm_closure *")
+        record = self.shelves["mstmm_closure"].take(1)
         record.outboard = closure.outboard
         record.turn, record.end = list(closure.turn), list(closure.end)
         record.numbers = self._take(int(self.lib.MSTMM_CLOSURE))
