@@ -25,6 +25,7 @@ from common import measure  # noqa: E402
 
 FOLDERS = (
     "forward_dynamics", "batch_throughput", "work_precision", "startup", "long_chains", "flexible",
+    "loops",
 )  # fmt: skip
 Row = tuple[str, str, float, float, bool]  # what, where, measured, target, smaller is better
 
@@ -130,6 +131,13 @@ def flexible() -> list[Row]:
     return rows
 
 
+def loops() -> list[Row]:
+    """Closed loops against those who close them by constraints."""
+    found = module("loops").ratios(record("loops")["results"])
+    return [(f"closed loops, {what}", where, value, asked, True)
+            for what, where, value, asked in found]  # fmt: skip
+
+
 def table(rows: list[Row]) -> str:
     """Markdown."""
     lines = ["| target | where | measured | asked | met |", "|---" * 5 + "|"]
@@ -219,7 +227,7 @@ def main() -> None:
     if options.run:
         for folder in FOLDERS:
             subprocess.run([sys.executable, str(HERE / folder / "run.py")], check=True)
-    rows = forward() + batches() + precision() + starts() + flexible()
+    rows = forward() + batches() + precision() + starts() + flexible() + loops()
     text = table(rows)
     at = record("forward_dynamics")["machine"]
     load = statistics.median([record(folder)["machine"]["load"] for folder in FOLDERS])

@@ -23,15 +23,19 @@ DEFINITIONS = (
 LEVELS = ("O2", "O3")
 
 
-def opened(level: str) -> ctypes.CDLL:
-    """The library at one level of optimisation."""
+def flags(level: str) -> list[str]:
+    """Of the compiler, with the headers of the wheel."""
     prefix = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "include"
     if not (prefix / "pinocchio").is_dir() or not (prefix / "eigen3").is_dir():
         raise SystemExit("this Python lacks pin or cmeel-eigen: pip install pin cmeel-eigen")
-    flags = [f"-{level}", "-std=c++17", "-march=native", "-w", *(f"-D{d}" for d in DEFINITIONS)]
-    flags += [f"-I{prefix}", f"-I{prefix / 'eigen3'}"]
+    given = [f"-{level}", "-std=c++17", "-march=native", "-w", *(f"-D{d}" for d in DEFINITIONS)]
+    return [*given, f"-I{prefix}", f"-I{prefix / 'eigen3'}"]
+
+
+def opened(level: str) -> ctypes.CDLL:
+    """The library at one level of optimisation."""
     text = (native.HERE / "pinocchio.cpp").read_text()
-    found = ctypes.CDLL(str(native.library("pinocchio", text, flags, "g++", ".cpp")))
+    found = ctypes.CDLL(str(native.library("pinocchio", text, flags(level), "g++", ".cpp")))
     found.tree_new.restype = ctypes.c_void_p
     found.tree_new.argtypes = [ctypes.c_void_p]
     found.tree_free.argtypes = found.tree_ready.argtypes = [ctypes.c_void_p]

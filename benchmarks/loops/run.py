@@ -3,9 +3,12 @@
     python benchmarks/loops/run.py [--quick]
 
 CPU time of one evaluation of many, contenders in alternating rounds: windows of four-bars in a row,
-by the number of windows; Stewart's platform beside MuJoCo's equality constraints (if it is there).
-Building what each needs is not counted.  MuJoCo's rows yield by design; `apart` tells how far its
-accelerations are from those of the rigid platform.
+by the number of windows, beside an iteration of Exudyn's Newton method with a new Jacobian and its
+sparse solver; Stewart's platform beside MuJoCo's equality constraints.  MuJoCo's rows yield by
+design; `apart` tells how far its accelerations are from those of the rigid platform.  Andrews'
+squeezer, run for 0.03 s to an error of its crank of 1e-6 rad, by each tool's cheapest setting that
+keeps it: DOP853 in C around Pinocchio's constrained dynamics, Exudyn's generalized alpha; `apart`
+is the error.  Building what each needs is not counted; peers that are not there are left out.
 """
 
 from __future__ import annotations
@@ -27,6 +30,11 @@ from common import measure  # noqa: E402
 import mstmm  # noqa: E402
 
 SIZES = (10, 50, 200, 1000)
+#: Scene, peer, ratio that was asked.
+COMPARED = (
+    (f"{SIZES[-1]} windows", "Exudyn", 0.05), ("platform", "MuJoCo", 0.3),
+    ("Andrews to 1e-6", "Pinocchio", 0.1), ("Andrews to 1e-6", "Exudyn", 0.1),
+)  # fmt: skip
 PLATFORM = HERE.parents[1] / "examples" / "stewart_platform" / "scene.toml"
 
 
@@ -94,6 +102,31 @@ def measured(quick: bool) -> list[dict[str, Any]]:
         times = [us / calls[int(name)] for us in found]
         results.append({"scene": f"{name} windows", "tool": "mstmm", "us": times,
                         "ns a body": [1e3 * us / bodies for us in times]})  # fmt: skip
+    return results + ladder_beside(rounds) + platform_beside(rounds) + squeezer_beside(rounds)
+
+
+def ladder_beside(rounds: int) -> list[dict[str, Any]]:
+    """Exudyn's iterations on the longest row of windows."""
+    try:
+        import exudyn_planar
+    except ImportError:
+        print("Exudyn is not here")
+        return []
+    made, steps, times = exudyn_planar.windows(SIZES[-1]), 10, []
+    for _ in range(max(2, rounds // 3)):
+        count = [0]
+
+        def run(count: list[int] = count) -> None:
+            count[0] = made.run(0.01, steps, sparse=True, modified=False)[0]
+
+        spent = measure.cpu(run)
+        times.append(1e6 * spent / count[0])
+    return [{"scene": f"{SIZES[-1]} windows", "tool": "Exudyn", "us": times,
+             "ns a body": [1e3 * us / (2 * SIZES[-1] + 1) for us in times]}]  # fmt: skip
+
+
+def platform_beside(rounds: int) -> list[dict[str, Any]]:
+    """Stewart's platform by us and by MuJoCo."""
     model = mstmm.compile(platform(), engine="looped")
     count, work = 2000, {"mstmm": evaluations(model, 2000)}
     apart = {"mstmm": 0.0}
@@ -105,14 +138,49 @@ def measured(quick: bool) -> list[dict[str, Any]]:
         apart["MuJoCo"] = measure.disagreement(peer.slides(), slides(model))
     except ImportError:
         print("MuJoCo is not here")
-    for name, found in per_evaluation(work, count, rounds).items():
-        results.append({"scene": "platform", "tool": name, "us": found, "apart": apart[name]})
-    return results
+    return [{"scene": "platform", "tool": name, "us": found, "apart": apart[name]}
+            for name, found in per_evaluation(work, count, rounds).items()]  # fmt: skip
+
+
+def squeezer_beside(rounds: int) -> list[dict[str, Any]]:
+    """Andrews' squeezer to 1e-6 rad."""
+    import squeezer
+
+    model = mstmm.compile(mstmm.load_scene(squeezer.SCENE))
+    data = squeezer.Data(model)
+    makers = {
+        "mstmm": lambda: squeezer.mstmm_runs(model),
+        "Pinocchio": lambda: squeezer.pinocchio_runs(data),
+        "Exudyn": lambda: squeezer.exudyn_runs(data),
+    }
+    settings = {}
+    for name, make in makers.items():
+        try:
+            settings[name] = squeezer.cheapest(make(), 1e-6)
+        except (ImportError, SystemExit) as error:
+            print(f"{name} is not here: {error}")
+    work = {name: run for name, (_, run, _) in settings.items()}
+    return [{"scene": "Andrews to 1e-6", "tool": name, "us": found, "apart": settings[name][2],
+             "setting": settings[name][0]}
+            for name, found in per_evaluation(work, 1, rounds).items()]  # fmt: skip
+
+
+def ratios(results: list[dict[str, Any]]) -> list[tuple[str, str, float, float]]:
+    """(what, where, measured, asked at most), least times over least times."""
+    by = {(row["scene"], row["tool"]): min(row["us"]) for row in results}
+    bodies = {size: by[f"{size} windows", "mstmm"] / (2 * size + 1) for size in SIZES}
+    found = [("a body / one of 50 windows", f"{SIZES[-1]} windows", bodies[SIZES[-1]] / bodies[50],
+              1.2)]  # fmt: skip
+    for scene, tool, asked in COMPARED:
+        if (scene, tool) in by:
+            ratio = by[scene, "mstmm"] / by[scene, tool]
+            found.append((f"mstmm / {tool}", scene, ratio, asked))
+    return found
 
 
 def table(results: list[dict[str, Any]]) -> str:
     """Least times, and ratios."""
-    lines = ["# Closed loops", "", "| scene | tool | us an evaluation | ns a body | apart |",
+    lines = ["# Closed loops", "", "| scene | tool | us an evaluation or run | ns a body | apart |",
              "|---|---|---|---|---|"]  # fmt: skip
     for row in results:
         body = f"{min(row['ns a body']):.0f}" if "ns a body" in row else ""
@@ -120,17 +188,10 @@ def table(results: list[dict[str, Any]]) -> str:
         lines.append(
             f"| {row['scene']} | {row['tool']} | {min(row['us']):.3g} | {body} | {apart} |"
         )
-    own = [row for row in results if row["tool"] == "mstmm"]
-    by = {row["scene"]: min(row.get("ns a body", row["us"])) for row in own}
-    ratio = by["1000 windows"] / by["50 windows"]
-    lines += ["", f"A body of 1000 windows / of 50, where 1.2 was asked at most: {ratio:.2f}."]
-    peers = [min(row["us"]) for row in results if row["tool"] == "MuJoCo"]
-    if peers:
-        ratio = by["platform"] / peers[0]
-        lines += [
-            "", f"Platform, mstmm / MuJoCo, where 0.3 was asked at most: {ratio:.2f}. MuJoCo's "
-            "rows yield, as stiff as it lets them be; `apart` is how far its legs are off.",
-        ]  # fmt: skip
+    for what, where, value, asked in ratios(results):
+        lines += ["", f"{where}: {what}, where {asked} was asked at most: {value:.3g}."]
+    lines += ["", "MuJoCo's rows yield, as stiff as it lets them be; `apart` is how far its legs "
+              "are off. Of Andrews' crank `apart` is the error."]  # fmt: skip
     return "\n".join(lines) + "\n"
 
 
