@@ -98,9 +98,12 @@ class FrequencyResponse:
         """
         from .pictures.curves import bode
 
-        units = {f"{y}/{u}" for y in self.output_units for u in self.input_units}
-        unit = units.pop() if len(units) == 1 else ""
-        return bode(self.frequency, *self._curves(), unit, path)
+        units = [_ratio(y, u) for y in self.output_units for u in self.input_units]
+        values, labels = self._curves()
+        if len(set(units)) > 1:
+            labels = [f"{label}, {unit}" for label, unit in zip(labels, units, strict=True)]
+        unit = units[0] if len(set(units)) == 1 else "units of the curves"
+        return bode(self.frequency, values, labels, unit, path)
 
     def nyquist(self, path: str | Path | None = None) -> Any:
         """`matplotlib.figure.Figure`, Nyquist's: the same in the complex plane."""
@@ -193,6 +196,11 @@ def frequency_response(
         frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
         tuple(one.unit for one in pushes), tuple(one.unit for one in shown), values,
     )  # fmt: skip
+
+
+def _ratio(output: str, pushed: str) -> str:
+    """Unit of one over the other."""
+    return f"{output}/({pushed})" if "*" in pushed else f"{output}/{pushed}"
 
 
 def _frequencies(omega: ArrayLike) -> Array:

@@ -29,7 +29,7 @@ def test_pictures(response: FrequencyResponse, tmp_path: Path) -> None:
     x, y = above.lines[1].get_data()
     np.testing.assert_allclose(x, OMEGA / (2 * np.pi))
     np.testing.assert_allclose(y, response.magnitude[:, 1, 0])
-    assert above.get_legend().get_texts()[0].get_text() == "pin.angle / pin.effort"
+    assert above.get_legend().get_texts()[0].get_text() == "pin.angle / pin.effort, rad/(N*m)"
     assert below.get_xlabel() == "frequency in Hz"
     plane = response.nyquist(tmp_path / "nyquist.svg").axes[0]
     np.testing.assert_allclose(plane.lines[0].get_xdata(), response.values[:, 0, 0].real)

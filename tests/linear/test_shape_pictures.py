@@ -75,6 +75,19 @@ def test_eigenvalues_in_their_plane(tmp_path: Path) -> None:
     assert (tmp_path / "map.svg").stat().st_size > 5_000
 
 
+def test_slow_motions_stand_apart_from_fast_ones() -> None:
+    """Over some decades the slow ones would share a place, and one number."""
+    axis = modes_of(hanging(40)).plot_eigenvalues().axes[0]
+    assert axis.get_yscale() == "symlog"
+    assert {text.get_text() for text in axis.texts} >= {"1", "2", "3", "4"}
+
+
+def test_dots_do_not_hide_a_long_shape() -> None:
+    few, many = (modes_of(masses(n, 1.0, 1.0)).plot(which=[0]).axes[0] for n in (4, 20))
+    dots = [sum(line.get_marker() == "o" for line in panel.lines) for panel in (few, many)]
+    assert dots == [2, 1]
+
+
 def test_matrices_as_maps(tmp_path: Path) -> None:
     linear = mstmm.compile(hanging(3), engine="looped").linearize()
     panels = linear.plot(tmp_path / "matrices.png").axes[:3]

@@ -13,6 +13,12 @@ from mstmm.arrays import Array
 
 from .figure import figure, refuse_none, settled, write
 
+#: Legends of more curves stand beside the picture.
+_INSIDE = 4
+#: Lines of one colour that differ.
+_DASHES = ("-", "--", ":", "-.")
+#: Names of curves at their ends are so far apart at least, in parts of the height.
+_APART = 0.035
 #: Frequencies that reach further than this stand on a logarithmic scale.
 _DECADES = 30.0
 
@@ -33,27 +39,62 @@ def locus(
     axes = made.subplots(len(parts), 1, sharex=True, height_ratios=[2, 1][: len(parts)],
                          squeeze=False)[:, 0]  # fmt: skip
     for axis, (label, columns) in zip(axes, parts, strict=True):
-        for column, growth in zip(columns.T, growths.T, strict=True):
-            axis.plot(x, column, color="0.25", lw=1.2)
-            axis.plot(x[growth > 0], column[growth > 0], ".", color="tab:red", ms=4)
+        for k, (column, growth) in enumerate(zip(columns.T, growths.T, strict=True)):
+            axis.plot(x, column, lw=1.2, **_look(k))
+            axis.plot(x[growth > 0], column[growth > 0], ".", color="tab:red", ms=4, zorder=3)
         axis.set_ylabel(label)
     above = axes[0]
     top = np.nanmax(frequencies, initial=0.0)
     for order in orders:
-        above.plot(x, order * x / (2 * np.pi), color="tab:blue", lw=0.8, ls="--")
+        above.plot(x, order * x / (2 * np.pi), color="0.5", lw=0.8, ls="--")
         inside = x[order * x / (2 * np.pi) <= 1.02 * top]
         if len(inside):
             above.annotate(
-                f"{order:g}x", (inside[-1], order * inside[-1] / (2 * np.pi)), color="tab:blue",
-                fontsize=8, ha="left", va="center", xytext=(4, 0), textcoords="offset points",
+                f"{order:g}x", (inside[-1], order * inside[-1] / (2 * np.pi)), color="0.5",
+                fontsize=8, ha="right", va="center", xytext=(-4, 4), textcoords="offset points",
             )  # fmt: skip
     above.set_ylim(0, 1.05 * top if top > 0 else None)
+    for axis, (_, columns) in zip(axes, parts, strict=True):
+        _numbered(axis, x, columns)
     for below in axes[1:]:
         below.axhline(0, color="0.7", lw=0.8)
     axes[-1].set_xlabel(parameter)
     settled(*axes)
     write(made, path)
     return made
+
+
+def _look(k: int) -> dict[str, Any]:
+    """Colour and dashes of curve `k`; forty differ."""
+    return {"color": f"C{k % 10}", "ls": _DASHES[k // 10 % len(_DASHES)]}
+
+
+def _numbered(axis: Any, x: Array, columns: Array) -> None:
+    """The number of every motion, from 1, at the end of its curve; those too near to one that
+    stands already are left out."""
+    low, high = axis.get_ylim()
+    taken: list[tuple[float, float]] = []
+    for k, column in enumerate(columns.T):
+        known = np.flatnonzero(np.isfinite(column))
+        if not len(known):
+            continue
+        end, y = x[known[-1]], column[known[-1]]
+        if any(end == there and abs(y - other) < _APART * (high - low) for there, other in taken):
+            continue
+        taken.append((end, y))
+        axis.annotate(
+            str(k + 1), (end, y), fontsize=8, color=f"C{k % 10}", va="center", xytext=(4, 0),
+            textcoords="offset points",
+        )  # fmt: skip
+
+
+def _named(made: Any, axis: Any, labels: Sequence[str]) -> None:
+    """A legend where it hides no curve."""
+    if len(labels) > _INSIDE:
+        made.legend(*axis.get_legend_handles_labels(), loc="outside right upper", fontsize=8,
+                    frameon=False)  # fmt: skip
+    elif len(labels) > 1 or labels[0]:
+        axis.legend(fontsize=8, frameon=False)
 
 
 def bode(
@@ -70,15 +111,14 @@ def bode(
     above, below = made.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     order = np.argsort(frequency, kind="stable")
     x = frequency[order]
-    for curve, label in zip(values[order].T, labels, strict=True):
-        above.loglog(x, np.abs(curve), lw=1.2, label=label)
-        below.semilogx(x, np.degrees(np.unwrap(np.angle(curve))), lw=1.2)
+    for k, (curve, label) in enumerate(zip(values[order].T, labels, strict=True)):
+        above.loglog(x, np.abs(curve), lw=1.2, label=label, **_look(k))
+        below.semilogx(x, np.degrees(np.unwrap(np.angle(curve))), lw=1.2, **_look(k))
     above.set_ylabel(f"magnitude in {units}" if units else "magnitude")
     below.set_ylabel("phase in degrees")
     below.set_xlabel("frequency in Hz")
     below.yaxis.set_major_locator(_every_right_angle())
-    if len(labels) > 1 or labels[0]:
-        above.legend(fontsize=8, frameon=False)
+    _named(made, above, labels)
     settled(above, below)
     write(made, path)
     return made
@@ -89,14 +129,14 @@ def nyquist(values: NDArray[Any], labels: Sequence[str], path: str | Path | None
     refuse_none(values)
     made = figure(5.5)
     axis = made.subplots()
-    for curve, label in zip(values.T, labels, strict=True):
-        axis.plot(curve.real, curve.imag, lw=1.2, label=label)
+    for k, (curve, label) in enumerate(zip(values.T, labels, strict=True)):
+        axis.plot(curve.real, curve.imag, lw=1.2, label=label, **_look(k))
     axis.axhline(0, color="0.7", lw=0.8)
     axis.axvline(0, color="0.7", lw=0.8)
     axis.set_aspect("equal", adjustable="datalim")
     axis.set_xlabel("real part")
     axis.set_ylabel("imaginary part")
-    axis.legend(fontsize=8, frameon=False)
+    _named(made, axis, labels)
     settled(axis)
     write(made, path)
     return made

@@ -18,10 +18,12 @@ if TYPE_CHECKING:
 _NAMED = 40
 #: Entries below this part of the largest are as good as zero in a picture.
 _SMALL = 1e-5
+#: And so much smaller is what the marks between its ends stand for.
+_INNER = 1e-2
 
 
 def matrices(linear: Equations, path: str | Path | None) -> Any:
-    """M, C and K side by side, each by its own colours."""
+    """M, C and K side by side, each by its own colours, which go by decades."""
     refuse_none(linear.M)
     named = len(linear) <= _NAMED
     side = float(np.clip(0.2 * len(linear), 2.4, 6.0)) if named else 4.0
@@ -34,9 +36,20 @@ def matrices(linear: Equations, path: str | Path | None) -> Any:
         if named:
             panel.set_xticks(range(len(linear)), linear.coordinates, rotation=90, fontsize=7)
             panel.set_yticks(range(len(linear)), linear.coordinates, fontsize=7)
+        panel.set_xlabel(_unit(linear, name), fontsize=8)
         panel.tick_params(length=0)
     write(made, path)
     return made
+
+
+def _unit(linear: Equations, name: str) -> str:
+    """Of the entries, where all coordinates have the same."""
+    units = set(linear.units)
+    if len(units) > 1:
+        return "rows in N or N*m"
+    per = {"M": "/s^2", "C": "/s", "K": ""}[name]
+    unit = units.pop()
+    return f"{'N' if unit == 'm' else 'N*m'} per {unit}{per}"
 
 
 def _map(made: Any, panel: Any, matrix: Array) -> None:
@@ -49,8 +62,9 @@ def _map(made: Any, panel: Any, matrix: Array) -> None:
     drawn = panel.imshow(matrix, cmap="RdBu_r", norm=scale, interpolation="none")
     panel.spines[:].set_visible(False)
     bar = made.colorbar(drawn, ax=panel, location="bottom", shrink=0.9, pad=0.02)
-    bar.set_ticks([-top, -(top * _SMALL**0.5), 0, top * _SMALL**0.5, top])
-    bar.set_ticklabels([f"{-top:.3g}", "", "0", "", f"{top:.3g}"])
+    inner = top * _INNER
+    bar.set_ticks([-top, -inner, 0, inner, top])
+    bar.set_ticklabels([f"{x:.2g}" for x in (-top, -inner, 0, inner, top)])
     bar.ax.minorticks_off()
     bar.ax.tick_params(labelsize=8)
     bar.ax.set_visible(not none)  # its place is kept, so that all three are of one size

@@ -21,11 +21,14 @@ Complex = NDArray[np.complex128]
 
 #: The largest displacement that is drawn, in parts of the scene's size.
 _PART = 0.15
-#: Scenes of more hinges are drawn without dots at them.
-_DOTTED = 60
+#: Scenes of more hinges are drawn without dots at them; of more than the latter they are small, and
+#: none at rest, for they would hide the shape.
+_DOTTED, _FEW = 60, 12
 _BLUE, _GREY, _RED = "#0072B2", "#9a9a9a", "#D55E00"
 #: Eigenvalues that carry their numbers, and lines of equal damping.
 _NUMBERED, _RATIOS = 40, (0.01, 0.05, 0.2)
+#: Frequencies that reach further than this are drawn by their decades, and growth with them.
+_SPREAD = 50.0
 #: Eigenvalues nearer than this, in parts of the picture, share the number of the first.
 _CLOSE = 0.03
 
@@ -94,8 +97,10 @@ def _draw(
     )
     springs = [line[:, columns] for line in outline.springs]
     axis.add_collection(LineCollection(springs, colors=colour, linestyles=":", linewidths=1.0))
-    if len(outline.joints) <= _DOTTED:
-        hollow: dict[str, Any] = {"mfc": "none", "ms": 6.5} if style == "--" else {"ms": 3.5}
+    few, at_rest = len(outline.joints) <= _FEW, style == "--"
+    if few or (len(outline.joints) <= _DOTTED and not at_rest):
+        size = 3.5 if few else 2.0
+        hollow: dict[str, Any] = {"mfc": "none", "ms": 6.5} if at_rest else {"ms": size}
         axis.plot(*outline.joints[:, columns].T, "o", color=colour, zorder=3, **hollow)
     axis.update_datalim(outline.points[:, columns])
     axis.autoscale_view()
@@ -121,19 +126,40 @@ def eigenvalues(values: Complex, path: str | Path | None) -> Any:
     growing = values.real > 0
     for some, colour in ((~growing, _BLUE), (growing, _RED)):
         axis.plot(values[some].real, values[some].imag, "x", color=colour, ms=7, mew=1.6)
-    _widened(axis, values.real, values.imag)
+    wide = _spread(values.imag) > _SPREAD
+    (_by_decades if wide else _widened)(axis, values.real, values.imag)
     for k in _apart(axis, values[:_NUMBERED]):
         place = values[k].real, values[k].imag
         axis.annotate(str(k + 1), place, xytext=(6, 3), fontsize=8, textcoords="offset points",
                       color="0.35")  # fmt: skip
     if (values.real < 0).any():
-        _rays(axis)
+        _rays(axis, _decade_below(values.imag[values.imag > 0]) if wide else 0.0)
     axis.axvline(0, color="0.4", lw=0.9)
     axis.set_xlabel("growth in 1/s")
     axis.set_ylabel("angular frequency in rad/s")
     settled(axis)
     write(made, path)
     return made
+
+
+def _spread(imaginary: Array) -> float:
+    """The largest frequency over the smallest."""
+    positive = imaginary[imaginary > 0]
+    return float(positive.max() / positive.min()) if len(positive) else 1.0
+
+
+def _by_decades(axis: Any, real: Array, imaginary: Array) -> None:
+    """Both axes by decades but for that below the smallest number on them."""
+    slowest, least = _decade_below(imaginary[imaginary > 0]), _decade_below(np.abs(real[real != 0]))
+    axis.set_xscale("symlog", linthresh=least)
+    axis.set_yscale("symlog", linthresh=slowest)
+    left, right = min(float(real.min()), 0.0), max(float(real.max()), 0.0)
+    axis.set_xlim(2 * left - least, 2 * right + least)
+    axis.set_ylim(-0.3 * slowest, 2 * float(imaginary.max()))
+
+
+def _decade_below(numbers: Array) -> float:
+    return float(10.0 ** np.floor(np.log10(numbers.min(initial=1.0))))
 
 
 def _widened(axis: Any, real: Array, imaginary: Array) -> None:
@@ -147,8 +173,9 @@ def _widened(axis: Any, real: Array, imaginary: Array) -> None:
 
 def _apart(axis: Any, values: Complex) -> list[int]:
     """Those that are not on top of one before them in the picture."""
-    spans = [abs(high - low) for low, high in (axis.get_xlim(), axis.get_ylim())]
-    places = np.column_stack([values.real / spans[0], values.imag / spans[1]])
+    places = (axis.transScale + axis.transLimits).transform(
+        np.column_stack([values.real, values.imag])
+    )
     kept: list[int] = []
     for k, place in enumerate(places):
         if all(np.abs(place - places[j]).max() > _CLOSE for j in kept):
@@ -156,15 +183,17 @@ def _apart(axis: Any, values: Complex) -> list[int]:
     return kept
 
 
-def _rays(axis: Any) -> None:
-    """Lines of equal damping that cross the picture."""
+def _rays(axis: Any, slowest: float) -> None:
+    """Lines of equal damping that cross the picture, `slowest` the frequency above which it shows
+    decades, or 0."""
     left, _ = axis.get_xlim()
     _, top = axis.get_ylim()
     for ratio in _RATIOS:
         slope = ratio / np.sqrt(1 - ratio**2)
         height = min(top, -left / slope)
-        axis.plot([0, -slope * height], [0, height], color="0.8", lw=0.8, ls="--", zorder=0)
-        if 0.12 * -left < slope * height:
+        along = np.geomspace(slowest, height, 60) if slowest else np.array([0.0, height])
+        axis.plot(-slope * along, along, color="0.8", lw=0.8, ls="--", zorder=0)
+        if slowest or 0.12 * -left < slope * height:
             axis.annotate(
                 f"{ratio:.0%}", (-slope * height, height), fontsize=8, color="0.5", ha="left",
                 va="top", xytext=(3, -2), textcoords="offset points",
