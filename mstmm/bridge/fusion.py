@@ -324,11 +324,23 @@ def _obstacle(packed: Packed, most: int) -> str:
         return "the product of classical matrices is looped"
     if packed.qr:
         return "the sweep as least squares is looped"
+    if closed := _looped_closure(packed):
+        return closed
     if packed.model.refines:
         return "heavy bodies behind light ones cost digits, which refinement mends: it is looped"
     hinges = {body.hinge for body in packed.system.distinct}
     if any(packed.elements[key].tape is not None for key in hinges):
         return "a hinge is interpreted because it was generated without a compiler"
+    return ""
+
+
+def _looped_closure(packed: Packed) -> str:
+    """What closes a scene that code for one scene cannot: empty if it can."""
+    loops, of_hinges = packed.written.loops, packed.system.closures
+    if loops is not None and loops.count != sum(len(one.directions) for one in of_hinges):
+        return "rows that belong to no hinge are looped"
+    if of_hinges and packed.flexible:
+        return "closed loops of flexible bodies are looped"
     return ""
 
 
