@@ -21,10 +21,6 @@ if TYPE_CHECKING:
     from .engine import Engine
 
 
-#: An inverse time so large that coordinates stay within rounding.
-_STILL = 1e200
-
-
 class Tangent:
     """Residual and tangent of one scene; each thread needs its own.
 
@@ -45,7 +41,7 @@ class Tangent:
         self.work = np.zeros(engine.lib.mstmm_tangent_work(model, slopes.slots))
         self.couplings, self.coupled = _couplings(engine)
         self.answers = np.zeros(max(1, self.coupled * self.nu))
-        self.closure = np.zeros(self.coupled * (2 * self.coupled + 3) + 1)
+        self.closure = np.zeros(self.coupled * (self.coupled + 3) + 1)
         self.record = record = ffi.new("mstmm_tangent *")
         record.model, record.slots = model, slopes.slots
         record.couplings, record.n_coupled = self.couplings[0], self.coupled
@@ -92,11 +88,6 @@ class Tangent:
         dq = (sq - kappa g_q)^-1 N x, where N u are the rates of the coordinates and g_q their
         slopes by the coordinates."""
         self._call("tangent_factor", float(rate), float(s), float(sq), float(kappa))
-
-    def factor_inertia(self) -> None:
-        """Factor the change of R along accelerations x alone, loops kept closed: x of `solve` are
-        those that answer efforts."""
-        self.factor(1.0, _STILL, 0.0, 0.0)
 
     def factor_laws(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:
         """The same with inertia and the slopes of laws and modes alone, of these no more than their

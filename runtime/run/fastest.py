@@ -129,7 +129,4 @@ class Fastest:
         return np.asarray(answers[best] / math.sqrt(mobile[best]))
 
     def _solved(self, q: Array, columns: Array) -> Array:
-        if not self.engine.packed.system.closures:
-            return self.engine.solve(q, columns, self.memory)
-        self._inertia.factor_inertia()
-        return np.array([self._inertia.solve(column) for column in columns])
+        return self.engine.solve(q, columns, self.memory)

@@ -103,17 +103,3 @@ def test_time(case: tuple[mstmm.Model, float, float]) -> None:
     wanted = differences(lambda e: model.accelerations(q, u, 0.3 + e), 1e-3)
     free = ~np.array([hinge_is_driven(model, j) for j in range(model.nu)])
     assert np.abs(found - wanted)[free].max() < 1e-8 * max(1.0, np.abs(wanted).max())
-
-
-def test_inertia_alone() -> None:
-    """M^-1 of closed loops, by the accelerations that efforts add."""
-    model = mstmm.compile(mstmm.Scene(**legs(law=100.0)))
-    q, u = model.initial_state()
-    efforts = RNG.normal(size=model.nu)
-    for name in model.loops.cut:  # what acts on these acts on their bodies
-        efforts[model.layout.hinges[name].u_slice] = 0.0
-    tangent = Tangent(model.looped)
-    tangent.residual(0.0, q, u)
-    tangent.factor_inertia()
-    wanted = model.accelerations(q, u, efforts=efforts) - model.accelerations(q, u)
-    assert np.abs(tangent.solve(efforts) - wanted).max() < 1e-11 * np.abs(wanted).max()

@@ -2,7 +2,7 @@
  * see across.h. */
 #include "across.h"
 
-#include "solve_lu.c.jinja"
+#include "sparse_lu.h"
 #include "sweep_steps.h"
 
 /* What is not above it in parts of its column is no pivot. */
@@ -193,7 +193,7 @@ static int answer_to(mstmm_tangent *at, int k, real *x, real *changes)
 int mstmm_across_factor(mstmm_tangent *at, int negative)
 {
     const int m = at->n_coupled, nu = at->model->nu, first = n_changes(at);
-    real *work = at->closure + (int64_t)m * m, *changes = mstmm_across_changes(at);
+    real *changes = mstmm_across_changes(at), *exchanges = mstmm_across_exchanges(at);
     memset(parts_of(at).column, 0, (size_t)nu * sizeof(real));
     for (int k = 0; k < m; k++) {
         real *answer = at->answers + (int64_t)k * nu;
@@ -205,8 +205,7 @@ int mstmm_across_factor(mstmm_tangent *at, int negative)
             at->closure[(int64_t)i * m + k] = one - (counts ? changes[i] : 0);
         }
     }
-    memset(changes, 0, (size_t)m * sizeof(real));
-    const int code = mstmm_solve_lu(m, 1, at->closure, changes, changes + m, work, NO_PIVOT);
+    const int code = mstmm_sparse_factor(m, at->closure, exchanges, changes, NO_PIVOT);
     if (code != 1 && (at->counts || (code == 2) == negative)) return 0;
     return mstmm_fail(&(mstmm_state){.failure = &at->failure}, MSTMM_FAILED_TANGENT, -1,
                       code == 1 ? 1 : MSTMM_NEGATIVE);
@@ -216,15 +215,14 @@ int mstmm_across_solve(mstmm_tangent *at, const real *r, const mstmm_known *know
                        const real *missing, real *x)
 {
     const int m = at->n_coupled, nu = at->model->nu, first = n_changes(at);
-    real *work = at->closure + (int64_t)m * m, *changes = mstmm_across_changes(at);
-    real *amounts = changes + m;
+    real *amounts = mstmm_across_changes(at);
     int code = solve_alone(at, r, known, -1, x);
     if (code || !m) return code;
-    code = changes_along(at, x, known, -1, changes);
+    code = changes_along(at, x, known, -1, amounts);
     if (code) return code;
     for (int k = first; k < m; k++)
-        changes[k] = is_unknown(at, k) ? changes[k] - (missing ? missing[k - first] : 0) : 0;
-    mstmm_solve_lu(m, 1, at->closure, changes, amounts, work, NO_PIVOT); /* regular: see above */
+        amounts[k] = is_unknown(at, k) ? amounts[k] - (missing ? missing[k - first] : 0) : 0;
+    mstmm_sparse_solve(m, at->closure, mstmm_across_exchanges(at), amounts);
     for (int k = 0; k < m; k++)
         for (int j = 0; is_unknown(at, k) && j < nu; j++)
             x[j] += at->answers[(int64_t)k * nu + j] * amounts[k];

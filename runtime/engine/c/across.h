@@ -23,14 +23,18 @@ void mstmm_rows_along(const mstmm_tangent *at, real *workspace, const real *own,
 void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *own,
                    real *required);
 
-/* Numbers of `closure` behind the matrices: changes, amounts, and what rows miss. */
+/* `closure`: the factored matrix, its exchanges of rows, changes, what rows miss. */
+static inline real *mstmm_across_exchanges(const mstmm_tangent *at)
+{
+    return at->closure + (int64_t)at->n_coupled * at->n_coupled;
+}
 static inline real *mstmm_across_changes(const mstmm_tangent *at)
 {
-    return at->closure + 2 * (int64_t)at->n_coupled * at->n_coupled;
+    return mstmm_across_exchanges(at) + at->n_coupled;
 }
 static inline real *mstmm_across_missing(const mstmm_tangent *at)
 {
-    return mstmm_across_changes(at) + 2 * at->n_coupled;
+    return mstmm_across_changes(at) + at->n_coupled;
 }
 
 #endif

@@ -90,13 +90,9 @@ int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, cons
     memcpy(parts.u, u, (size_t)model->nu * sizeof(real));
     at->known = 0;
     int code = 0;
-    /* Leaves the multipliers of closed loops in the workspace, whole where somebody asks for more
-     * than accelerations. */
-    mstmm_balance unused;
-    if (!a || model->looped)
+    if (!a || model->looped) /* leaves the multipliers of closed loops in the workspace */
         code = mstmm_accelerations(model, at->workspace, t, parts.q, parts.u, at->memory, NULL,
-                                   parts.qdot, parts.a, model->looped ? &unused : NULL,
-                                   &at->failure);
+                                   parts.qdot, parts.a, NULL, &at->failure);
     if (a) memcpy(parts.a, a, (size_t)model->nu * sizeof(real));
     if (model->looped) mstmm_set_own_apart(at, parts.a, parts.answer);
     mstmm_state state = state_of(at, &parts);

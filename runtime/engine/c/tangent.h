@@ -31,7 +31,7 @@ typedef struct {
     const mstmm_couplings *couplings;
     int n_coupled;        /* numbers that they change by */
     real *answers;        /* n_coupled x nu: to one of each */
-    real *closure;        /* n_coupled x (2 n_coupled + 3) */
+    real *closure;        /* n_coupled x (n_coupled + 3) */
     int known;            /* there has been a residual since the memory changed */
     int laws_alone;       /* the last tangent was that of mstmm_laws_factor */
     int counts;           /* pivots may be negative: somebody counts them */

@@ -34,8 +34,11 @@ _ALIEN = ("dttmm", "exprb32")
 
 
 def refuse_method(packed: Packed, method: str, tangent: str) -> None:
-    """SceneError where loops are closed, for an implicit method that cannot follow them, and for
-    the tangent of laws alone."""
+    """SceneError where loops are closed, for an implicit method that cannot follow them, for the
+    tangent of laws alone, and for rows that are not those of a hinge."""
+    loops = packed.written.loops
+    if loops is not None and loops.count > sum(len(one.rows) for one in loops.closures):
+        refuse(packed, f'method "{method}"', "dop853, dopri5 and rk4 do")
     if method in _ALIEN:
         refuse(packed, f'method "{method}"', "genalpha and rodas4p2 do")
     if tangent == "laws":
