@@ -8,7 +8,8 @@ sparse solver; Stewart's platform beside MuJoCo's equality constraints.  MuJoCo'
 design; `apart` tells how far its accelerations are from those of the rigid platform.  Andrews'
 squeezer, run for 0.03 s to an error of its crank of 1e-6 rad, by each tool's cheapest setting that
 keeps it: DOP853 in C around Pinocchio's constrained dynamics, Exudyn's generalized alpha; `apart`
-is the error.  Building what each needs is not counted; peers that are not there are left out.
+is the error.  Ours is the looped engine, and fused code where it says so, of one state at a time.
+Building what each needs is not counted; peers that are not there are left out.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
-from common import measure  # noqa: E402
+from common import measure, mstmm_engines  # noqa: E402
 
 import mstmm  # noqa: E402
 
@@ -128,8 +129,14 @@ def ladder_beside(rounds: int) -> list[dict[str, Any]]:
 def platform_beside(rounds: int) -> list[dict[str, Any]]:
     """Stewart's platform by us and by MuJoCo."""
     model = mstmm.compile(platform(), engine="looped")
-    count, work = 2000, {"mstmm": evaluations(model, 2000)}
-    apart = {"mstmm": 0.0}
+    fused = mstmm.compile(platform(), engine="fused")
+    q, u = fused.initial_state()
+    subject = mstmm_engines.fused(fused, q[None], u[None])
+    count, work = 2000, {
+        "mstmm": evaluations(model, 2000), "mstmm fused": lambda: subject.time(True, 2000)
+    }  # fmt: skip
+    off = measure.disagreement(slides(fused), slides(model))
+    apart = {"mstmm": 0.0, "mstmm fused": off}
     try:
         from mujoco_platform import MujocoPlatform
 
@@ -146,10 +153,12 @@ def squeezer_beside(rounds: int) -> list[dict[str, Any]]:
     """Andrews' squeezer to 1e-6 rad."""
     import squeezer
 
-    model = mstmm.compile(mstmm.load_scene(squeezer.SCENE))
-    data = squeezer.Data(model)
+    scene = mstmm.load_scene(squeezer.SCENE)
+    looped, fused = (mstmm.compile(scene, engine=engine) for engine in ("looped", "fused"))
+    data = squeezer.Data(looped)
     makers = {
-        "mstmm": lambda: squeezer.mstmm_runs(model),
+        "mstmm": lambda: squeezer.mstmm_runs(looped),
+        "mstmm fused": lambda: squeezer.mstmm_runs(fused),
         "Pinocchio": lambda: squeezer.pinocchio_runs(data),
         "Exudyn": lambda: squeezer.exudyn_runs(data),
     }
@@ -173,8 +182,8 @@ def ratios(results: list[dict[str, Any]]) -> list[tuple[str, str, float, float]]
               1.2)]  # fmt: skip
     for scene, tool, asked in COMPARED:
         if (scene, tool) in by:
-            ratio = by[scene, "mstmm"] / by[scene, tool]
-            found.append((f"mstmm / {tool}", scene, ratio, asked))
+            own = "mstmm fused" if (scene, "mstmm fused") in by else "mstmm"
+            found.append((f"{own} / {tool}", scene, by[scene, own] / by[scene, tool], asked))
     return found
 
 

@@ -49,7 +49,7 @@ def draw(path: Path) -> None:
     """The mechanism at six times; its angles."""
     model = mstmm.compile(mstmm.load_scene(HERE / "scene.toml"))
     result = model.simulate(0.03, rtol=1e-8, output_times=np.linspace(0.0, 0.03, 301))
-    figure = plt.figure(figsize=(10, 5.6))
+    figure = plt.figure(figsize=(10, 5.0))
     grid = figure.add_gridspec(
         2,
         5,
@@ -59,11 +59,17 @@ def draw(path: Path) -> None:
         bottom=0.1,
         top=0.88,
         wspace=0.12,
+        hspace=0.16,
     )
     places = {name: result.position(name) for corners in BODIES.values() for name in corners}
     for number, row in enumerate(ROWS):
         axes = figure.add_subplot(grid[number // 3, number % 3])
         draw_pose(axes, {name: place[row] for name, place in places.items()}, result.t[row])
+        if number == 0:
+            axes.plot([-0.072, -0.052], [-0.024] * 2, color="black", lw=3, solid_capstyle="butt")
+            axes.text(-0.062, -0.021, "20 mm", ha="center", fontsize=8)
+            axes.text(-0.005, 0.056, "spring", ha="right", fontsize=8)
+            axes.text(0.007, -0.012, "crank", ha="center", fontsize=8)
     axes = figure.add_subplot(grid[:, 4])
     for name in ("beta", "Theta", "gamma", "delta", "Phi", "eps"):
         angle = result.q[:, model.layout.hinges[name].q_slice][:, 0]

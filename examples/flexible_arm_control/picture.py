@@ -45,7 +45,7 @@ def draw(path: Path) -> None:
     for row in range(0, 301, 25):
         right.plot(line[row, :, 0], line[row, :, 1], color=plt.colormaps["viridis"](row / 330))
     left.set(xlabel="time, s", ylabel="tip from its goal, m", title="Where the tip is")
-    middle.set(xlabel="time, s", ylabel="N m", title="What the motor does")
+    middle.set(xlabel="time, s", ylabel="torque of the motor, N m", title="What the motor does")
     right.set(xlabel="x, m", ylabel="y, m", title="The arm every 0.125 s, LQR")
     right.set_aspect("equal", adjustable="datalim")
     left.legend(frameon=False)

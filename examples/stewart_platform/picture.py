@@ -40,12 +40,13 @@ def draw(path: Path) -> None:
     left.plot(*ground.T, "-", color="black", lw=1)
     left.set(xlabel="x, m", ylabel="y, m", zlabel="z, m", zlim=(0, 1.2))
     left.set_box_aspect((1.0, 1.0, 0.8))
+    left.set(xticks=[-0.6, 0, 0.6], yticks=[-0.6, 0, 0.6], zticks=[0, 0.4, 0.8, 1.2])
     left.view_init(elev=18, azim=-65)
     right = figure.add_axes((0.6, 0.13, 0.38, 0.75))
     for k in range(6):
         right.plot(result.t, result.quantity(f"slide{k}.effort").values, color="#1d3557", lw=1.6)
     right.set(xlabel="time, s", ylabel="effort of a leg, N", title="All six legs push alike")
-    right.axhline(0.0, color="black", lw=0.6)
+    right.set_ylim(0.0, None)
     figure.savefig(path, dpi=130)
 
 
