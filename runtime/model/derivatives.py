@@ -23,7 +23,6 @@ from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.live import LiveInputs
 from ..engine.tangents import Tangents
-from ..pack.loops.refusal import INSTEAD, refuse
 from ..pack.slopes import slopes
 from ..pack.structure import structure_of
 
@@ -46,6 +45,8 @@ class Derivatives:
     of q, the speeds and the efforts; `efforts` is the inverse of the mass matrix on the free
     coordinates, zero for driven ones.  `t` (..., nu): with respect to time at fixed q and u; driven
     coordinates move with t.  `parameters[name]` (..., nu): with respect to a number of the scene.
+    Where loops are closed, `q` and `u` hold along motions that keep them closed, and `efforts` is
+    what `Model.solve` answers.
     `rate_q`, `rate_u` (..., nu, nu): of the rate of the tangent increments (rate_u is 1 on free
     coordinates, 0 on driven ones; rate_q is zero but for quaternions and users' own speeds).
     """
@@ -72,12 +73,12 @@ class Differentiation:
         self._model = model
         self.names = tuple(names)
         known = model.known or {}
-        refuse(model.packed, "exact derivatives", INSTEAD)
         _refuse(model)
         if names:
-            structure, self.p, self.slopes = slopes(model.scene, known, names)
+            structure, self.p, self.slopes = slopes(model.scene, known, names, model.packed)
         else:
-            structure, self.p = structure_of(model.packed.system, known)
+            packed = model.packed
+            structure, self.p = structure_of(packed.system, known, floors=packed.floors)
             self.slopes = np.zeros((len(self.p), 0))
         self._live = LiveInputs(model.packed.system, structure.inputs)
         self.tangents = Tangents(model.fusion, structure, bool(names))

@@ -12,7 +12,7 @@ import re
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ from . import parameters
 from .elements import Known
 from .frames import Frames
 from .internal import system_of
+from .packed import Packed
 from .structure import structure_and_numbers, structure_of
 from .system import System
 from .values import MOVING
@@ -43,12 +44,14 @@ _ROUNDING = 1e-12
 _PART = re.compile(r"[^.\[\]]+|\[\d+\]")
 
 
-def slopes(scene: Scene, known: Known, names: Sequence[str]) -> tuple[Structure, Array, Array]:
+def slopes(
+    scene: Scene, known: Known, names: Sequence[str], judged: Packed | None = None
+) -> tuple[Structure, Array, Array]:
     """(structure, p, dp/dnames) with p (np,) and its slopes (np, names).
 
     The structure is that of the scene, except that a structural zero or axis that a named number
-    moves is a place in p.  Raises SceneError for a name that the scene does not have, and for the
-    numbers of flexible bodies.
+    moves is a place in p; of closed loops it has the rows that are left where they are `judged`.
+    Raises SceneError for a name that the scene does not have, and for numbers of flexible bodies.
     """
     refuse_folded(scene, names, "exact derivative; take a difference of two models")
 
@@ -56,7 +59,10 @@ def slopes(scene: Scene, known: Known, names: Sequence[str]) -> tuple[Structure,
         return Dual(value_of(value), {**getattr(value, "slope", {}), k: 1.0})
 
     system, _ = seeded(scene, known, names, dual)
-    structure, found = structure_and_numbers(system, known)
+    if judged is not None:
+        system = _with_rows(system, judged.system)
+    floors = [] if judged is None else judged.floors
+    structure, found = structure_and_numbers(system, known, floors=floors)
     values = np.array([value_of(x) for x in found])
     moved = np.zeros((len(found), len(names)))
     for place, dual in enumerate(found):
@@ -64,6 +70,13 @@ def slopes(scene: Scene, known: Known, names: Sequence[str]) -> tuple[Structure,
             for k, slope in dual.slope.items():
                 moved[place, k] = slope
     return structure, values, moved
+
+
+def _with_rows(system: System, judged: System) -> System:
+    """With the rows of closed loops that another one has."""
+    both = zip(system.closures, judged.closures, strict=True)
+    closures = tuple(replace(one, directions=kept.directions) for one, kept in both)
+    return replace(system, closures=closures)
 
 
 def seeded(scene: Scene, known: Known, names: Sequence[str], seed: Seed) -> tuple[System, Frames]:

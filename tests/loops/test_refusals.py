@@ -22,7 +22,6 @@ def model() -> mstmm.Model:
 
 
 ASKED: dict[str, Callable[[mstmm.Model], Any]] = {
-    "derivatives": lambda m: m.derivatives(*m.initial_state()),
     "advise": lambda m: mstmm.advise(m, 0.1),
     "chart": lambda m: mstmm.chart(m, 0.1),
     **{

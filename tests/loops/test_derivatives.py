@@ -1,0 +1,76 @@
+"""Exact derivatives of accelerations of mechanisms, along motions that keep loops closed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from reference.compare import worst
+from reference.jets import Array
+
+import mstmm
+
+from .linkages import OBLIQUE, bricard, four_bar
+from .test_cuts import LAWS, compiled
+from .test_linear import LAWS as SPRINGS
+
+STEP = 1e-5
+
+
+def ways(model: mstmm.Model, q: Array) -> Array:
+    """All speeds for a unit of the first, by inverse masses of a mechanism with one motion."""
+    column = model.solve(q, np.eye(model.nu)[0])
+    return np.asarray(column / column[0])
+
+
+def ring() -> dict[str, Any]:
+    """Bricard's ring beside the pose in which its axes are those of the ground."""
+    scene = bricard()
+    scene["hinge"][0] |= {"initial": {"q": 0.4}, "hold": True}
+    return scene
+
+
+@pytest.mark.parametrize(
+    "scene", [four_bar(laws=LAWS, tilt=OBLIQUE), ring()], ids=["four-bar", "bricard"]
+)
+def test_along_closed_motions(scene: dict[str, Any]) -> None:
+    """By central differences between states in which loops and speeds fit, at some speed."""
+    model = compiled(scene)
+    q, speed = model.initial_state()[0], 1.7
+    found = model.derivatives(q, speed * ways(model, q))
+
+    def ahead(size: float) -> tuple[Array, Array, Array]:
+        moved = model.assemble(q + size * ways(model, q))[0]
+        u = speed * ways(model, moved)
+        return moved, u, model.accelerations(moved, u)
+
+    forward, back = ahead(STEP), ahead(-STEP)
+    d_q, d_u, wanted = (a - b for a, b in zip(forward, back, strict=True))
+    assert worst(found.q @ d_q + found.u @ d_u, wanted) < 1e-6
+    assert worst(found.udot, model.accelerations(q, speed * ways(model, q))) < 1e-11
+    assert worst(found.efforts, model.solve(q, np.eye(model.nu))) < 1e-11
+
+
+def test_by_numbers_of_the_scene() -> None:
+    model = compiled(four_bar(speed=1.0, laws=LAWS))
+    q, u = model.initial_state()
+    names = ["coupler.mass", "tip.law.stiffness[0]", "gravity[1]"]
+    found = model.derivatives(q, u, parameters=names).parameters
+    for name in names:
+        value = model.parameters[name]
+        sides = [
+            model.with_parameters({name: value + s}).accelerations(q, u) for s in (STEP, -STEP)
+        ]
+        assert worst(found[name], (sides[0] - sides[1]) / (2 * STEP)) < 1e-7
+
+
+def test_those_of_linear_models() -> None:
+    """At rest, along the independent motion: -M^-1 K and -M^-1 C."""
+    model = compiled(four_bar(laws=SPRINGS, tilt=OBLIQUE))
+    linear = model.linearize()
+    assert linear.mechanism is not None
+    along, places = linear.mechanism.ways, list(linear.free)
+    found = model.derivatives(linear.state.q, linear.state.u)
+    both = np.hstack([(found.q @ along)[places], (found.u @ along)[places]])
+    assert worst(both, linear.A[1:]) < 1e-10
