@@ -13,6 +13,7 @@
 #define MSTMM_FAILED_TANGENT 9
 #define MSTMM_FAILED_CONTROLLER 10
 #define MSTMM_FAILED_LOOP 11
+#define MSTMM_FAILED_BOUNCE 12
 /* What a kernel returns behind its last result if a determinant is negative (mstmm.ir.statements). */
 #define MSTMM_NEGATIVE 2
 

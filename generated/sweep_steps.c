@@ -1067,16 +1067,15 @@ static int mstmm_at_closures(mstmm_state *state, int index)
             .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = drift,
             .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
             .l = closed + MSTMM_CLOSURE_L);
-        for (int k = 0; k < body->nu; k++) {
-            mstmm_loops_act(
-                .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
-                .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
-                .e = parent + MSTMM_BLOCK_E);
-            mstmm_loops_act(
-                .J = closed + MSTMM_CLOSURE_J_B + 6 * k,
-                .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
-                .e = outboard + MSTMM_BLOCK_E);
-        }
+    }
+    for (int k = 0; k < body->nu; k++) {
+        mstmm_loops_act(
+            .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = parent + MSTMM_BLOCK_E);
+        mstmm_loops_act(
+            .J = closed + MSTMM_CLOSURE_J_B + 6 * k,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
+            .e = outboard + MSTMM_BLOCK_E);
     }
     for (int c = 0; c < 6; c++) {
         if (closure->rows[c] < 0) continue;
@@ -6205,7 +6204,7 @@ int mstmm_run_inverse_dynamics(mstmm_state *state)
     return 0;
 }
 
-/* The least change, by inertia, that closes gaps or stops slips of closed loops. */
+/* The least change, by inertia, that closes gaps or stops slips of closed loops, and what a strike adds to it. */
 int mstmm_run_correction(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -6231,22 +6230,48 @@ int mstmm_run_correction(mstmm_state *state)
         code = mstmm_chain_correction(state);
         if (code) return code;
     }
-    code = mstmm_hook_rows_begun(state);
+    code = mstmm_hook_struck(state);
     if (code) return code;
-    code = mstmm_pass_closures(state);
-    if (code) return code;
-    code = mstmm_hook_rows_asked(state);
-    if (code) return code;
-    code = mstmm_pass_carried(state);
-    if (code) return code;
-    code = mstmm_pass_row_closed(state);
-    if (code) return code;
-    code = mstmm_pass_row_found(state);
-    if (code) return code;
-    code = mstmm_pass_answered(state);
-    if (code) return code;
-    code = mstmm_pass_closures_answered(state);
-    if (code) return code;
+    if (!model->looped) {
+        code = mstmm_pass_condense(state);
+        if (code) return code;
+    }
+    if (!model->looped) {
+        code = mstmm_pass_recover(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_hook_rows_begun(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_closures(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_hook_rows_asked(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_carried(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_row_closed(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_row_found(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_answered(state);
+        if (code) return code;
+    }
+    if (model->looped) {
+        code = mstmm_pass_closures_answered(state);
+        if (code) return code;
+    }
     return 0;
 }
 

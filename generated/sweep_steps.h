@@ -42,6 +42,7 @@ int mstmm_hook_product_before_loads(mstmm_state *state);
 int mstmm_hook_product_compared(mstmm_state *state);
 int mstmm_hook_rows_asked(mstmm_state *state);
 int mstmm_hook_rows_begun(mstmm_state *state);
+int mstmm_hook_struck(mstmm_state *state);
 int mstmm_hook_unit_load(mstmm_state *state);
 
 #endif

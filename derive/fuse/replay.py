@@ -210,6 +210,9 @@ class Replay(RowSlots):
     def _rows_begun(self) -> None:
         """Slots of rows begin with what `RowSlots` gives."""
 
+    def _struck(self) -> None:
+        """Nothing: events strike in the looped engine alone."""
+
     def _rows_asked(self) -> None:
         """Rows are asked for nothing but to be met."""
 

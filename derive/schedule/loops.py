@@ -54,18 +54,18 @@ _MEETING = (
     call("loops.slip", **_MET, d="closure.d", v_C="body.v", w_C="body.w", v_B="outboard.v",
          w_B="outboard.w", slip="closure.slip"),
 )  # fmt: skip
-#: Rows of accelerations, and the load of the hinge's laws.
+#: Rows of accelerations; the load of the hinge's laws.
 _DRIVEN = (
     call("loops.drift", **_MET, d="closure.d", slip="closure.slip", motion_C="body.motion",
          motion_B="outboard.motion", drift="local.drift"),
     _rows("local.drift", ""),
-    EachSpeed(
-        steps=(
-            call("loops.act", J="closure.J_A[6 * k]", tau="body.tau[k]", e="parent.e"),
-            call("loops.act", J="closure.J_B[6 * k]", tau="body.tau[k]", e="outboard.e"),
-        ),
-    ),
 )  # fmt: skip
+_EFFORTS = EachSpeed(
+    steps=(
+        call("loops.act", J="closure.J_A[6 * k]", tau="body.tau[k]", e="parent.e"),
+        call("loops.act", J="closure.J_B[6 * k]", tau="body.tau[k]", e="outboard.e"),
+    ),
+)
 
 CLOSURES = Pass(
     "closures", "body", "Rows of a hinge that closes a loop, and the load of its laws.",
@@ -74,6 +74,7 @@ CLOSURES = Pass(
         _rows("closure.gap", "gaping"),
         _rows("closure.slip", "slipping"),
         *only("!corrected", *_DRIVEN),
+        _EFFORTS,
         Each(
             of="rows",
             steps=(
@@ -102,6 +103,7 @@ CLOSURES_LOADED = Pass(
     (
         *_MEETING,
         *_DRIVEN,
+        _EFFORTS,
         Each(
             of="rows",
             steps=(

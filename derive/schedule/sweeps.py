@@ -104,7 +104,8 @@ INVERSE_DYNAMICS = Sweep(
 
 CORRECTION = Sweep(
     "correction",
-    "The least change, by inertia, that closes gaps or stops slips of closed loops.",
+    "The least change, by inertia, that closes gaps or stops slips of closed loops, and what a"
+    " strike adds to it.",
     (
         Run(whole=PRESCRIBED),
         Run(hook="drive_values", when="driven"),
@@ -112,7 +113,10 @@ CORRECTION = Sweep(
         Run(whole=FORWARD),
         Run(whole=POSES),
         Run(whole=UNLOADED),
-        *_CLOSED,
+        Run(hook="struck"),
+        Run(whole=CONDENSE, when="!looped"),
+        Run(whole=RECOVER, when="!looped"),
+        *(replace(run, when="looped") for run in _CLOSED),
     ),
 )
 

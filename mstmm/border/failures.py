@@ -30,3 +30,5 @@ class Failed(IntEnum):
     """A controller measures, or gives, what is not finite."""
     LOOP = 11
     """A loop cannot be closed near a state."""
+    BOUNCE = 12
+    """Nothing can give way to the strike of an event."""

@@ -254,6 +254,12 @@ class Calls:
                 "exceeds the accuracy asked for (errors grow geometrically along the chain); "
                 'use sweep = "riccati"'
             )
+        if reason == Failed.BOUNCE:
+            name = self.packed.described.event[element].name
+            return (
+                f'event "{name}" {at}: nothing can give way to its strike, because what it strikes '
+                "is driven or held; let another place bounce, or release the hinge"
+            )
         if reason == Failed.CONTROLLER:
             name = self.packed.described.controller[element].name
             return (

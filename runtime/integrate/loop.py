@@ -419,6 +419,11 @@ class Run:
             self._system.n_memory,
         )
 
+    @property
+    def event(self) -> int:
+        """Number of the event that fired last; -1 for none."""
+        return int(self._run.count.event)
+
     def message(
         self,
         components: Sequence[str] | None = None,
@@ -434,7 +439,7 @@ class Run:
         """
         fail = self.failure
         if fail is None:
-            event = _name("event", int(self._run.count.event), events)
+            event = _name("event", self.event, events)
             return {
                 Status.FINISHED: f"finished at t = {self.t:.9g} s",
                 Status.STOPPED: f"stopped by {event} at t = {self.t:.9g} s",

@@ -81,9 +81,10 @@ def system_of(
     )  # fmt: skip
     ports = [Port(MOVING, (1 + max(moving),))] if moving else []
     driven, values = list(_driven(nodes, tree)), Values(layout, ports)
-    laws = tuple(laws_of(nodes, tree, layout, values, len(releases)))
+    remembered = len(releases) + sum(event.do == "bounce" for event in scene.event)
+    laws = tuple(laws_of(nodes, tree, layout, values, remembered))
     loads = tuple(_load(frames, load, values) for load in nodes.load)
-    held = _held(scene, laws[-1].next_twist if laws else len(releases))
+    held = _held(scene, laws[-1].next_twist if laws else remembered)
     system = System(
         layout.nq, layout.nu, held.first + len(held.start), nodes.gravity, runs,
         laws, loads, forces_of(frames, nodes, ports),

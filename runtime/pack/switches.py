@@ -19,6 +19,7 @@ from mstmm.scene import Hinge, Scene, split
 from ..breaks.acting import Acting, acting, owners
 from ..breaks.enclosures import of_time
 from .layout import Layout
+from .records.bounces import Bounce, bounces
 from .values import Resolver, event_tape, resolver
 
 #: Margins at most: every one is looked at several times a step.
@@ -40,11 +41,12 @@ class Switch:
 class Watched:
     """What is looked at several times a step: a tape that gives the value of every event and
     release, and behind them the margins of the first MOST switches; None where there is nothing.
-    `ends` are the bodies and ends whose places it reads."""
+    `ends` are the bodies and ends whose places it reads, `bounces` how events throw back."""
 
     tape: Tape | None
     ends: tuple[tuple[str, str], ...]
     switches: tuple[Switch, ...]
+    bounces: tuple[Bounce, ...] = ()
 
 
 def watched(scene: Scene, layout: Layout, held: Collection[str] = ()) -> Watched:
@@ -58,7 +60,8 @@ def watched(scene: Scene, layout: Layout, held: Collection[str] = ()) -> Watched
         return Watched(None, (), ())
     margins = [switch.margin for switch in found[:MOST]]
     tape = event_tape(conditions, layout, graph, probes, margins)
-    return Watched(tape, tuple(probes), tuple(found))
+    thrown = bounces(scene, layout, dict(probes))
+    return Watched(tape, tuple(probes), tuple(found), thrown)
 
 
 def has_switches(scene: Scene) -> bool:

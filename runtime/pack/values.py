@@ -52,7 +52,7 @@ class Values:
     def kernel(self) -> KernelIR:
         """t (1), q, u, inputs -> the values in the order of their places."""
         inputs = [*state_ports(self.layout), inputs_port(self.layout), *self._moving]
-        return _kernel(self._graph, "values", inputs, self._nodes)
+        return values_kernel(self._graph, "values", inputs, self._nodes)
 
 
 def state_ports(layout: Layout) -> list[Port]:
@@ -106,7 +106,8 @@ def _refuse_beyond(name: Name, owner: str, index: int, entries: Sequence[str]) -
         )
 
 
-def _kernel(graph: Graph, name: str, inputs: Sequence[Port], nodes: list[Node]) -> KernelIR:
+def values_kernel(graph: Graph, name: str, inputs: Sequence[Port], nodes: list[Node]) -> KernelIR:
+    """A kernel with nodes as its one output, "values"."""
     output = Port("values", (len(nodes),))
     return graph.kernel(name, inputs, [output], {"values": nodes})
 
@@ -116,7 +117,7 @@ def drive_kernel(drives: Sequence[Expression], layout: Layout, moving: Moving = 
     graph = Graph()
     time, resolve = graph.element("t", 0), resolver(graph, layout)
     nodes = [node for drive in drives for node in motion(drive, time, resolve)]
-    return _kernel(graph, "drives", [Port("t", (1,)), inputs_port(layout), *moving], nodes)
+    return values_kernel(graph, "drives", [Port("t", (1,)), inputs_port(layout), *moving], nodes)
 
 
 def effort_kernel(effort: Expression, layout: Layout, moving: Moving = ()) -> KernelIR:
@@ -124,7 +125,7 @@ def effort_kernel(effort: Expression, layout: Layout, moving: Moving = ()) -> Ke
     graph = Graph()
     node = effort.build(graph, resolver(graph, layout, length=True))
     inputs = [*state_ports(layout), Port("length", (2,)), inputs_port(layout), *moving]
-    return _kernel(graph, "effort", inputs, [node])
+    return values_kernel(graph, "effort", inputs, [node])
 
 
 def constant_kernel(name: str, system: System, numbers: Sequence[float]) -> KernelIR:
@@ -133,7 +134,16 @@ def constant_kernel(name: str, system: System, numbers: Sequence[float]) -> Kern
     ports = [Port("t", (1,)), Port("q", (system.nq,)), Port("u", (system.nu,))]
     ports += [Port("length", (2,))] if name == "effort" else []
     ports += [Port(INPUTS, (COUNT * len(system.inputs),))]
-    return _kernel(graph, name, ports, [graph.constant(float(value)) for value in numbers])
+    return values_kernel(graph, name, ports, [graph.constant(float(value)) for value in numbers])
+
+
+def condition_value(condition: Expression, graph: Graph, resolve: Resolver) -> Node:
+    """Difference of what a comparison compares; >= 0 where it holds."""
+    comparison = condition.comparison
+    assert comparison is not None, condition.text
+    left, sign, right = comparison
+    difference = left.build(graph, resolve) - right.build(graph, resolve)
+    return difference if sign in (">", ">=") else -difference
 
 
 def event_tape(
@@ -147,11 +157,7 @@ def event_tape(
     and behind them the margins."""
     nodes = []
     for condition, own in conditions:
-        comparison = condition.comparison
-        assert comparison is not None, condition.text
-        left, sign, right = comparison
         resolve = resolver(graph, layout, own, probes=probes)
-        difference = left.build(graph, resolve) - right.build(graph, resolve)
-        nodes.append(difference if sign in (">", ">=") else -difference)
+        nodes.append(condition_value(condition, graph, resolve))
     inputs = [*state_ports(layout), Port("points", (6 * len(probes),)), inputs_port(layout)]
-    return compile_tape(_kernel(graph, "events", inputs, [*nodes, *margins]))
+    return compile_tape(values_kernel(graph, "events", inputs, [*nodes, *margins]))

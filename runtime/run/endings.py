@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 #: What a run ends with where call-backs of the scene fail; their code says how.
 _EVALUATIONS = (
     Status.RHS_FAILED, Status.EVENT_FAILED, Status.TANGENT_FAILED, Status.ACCEPT_FAILED,
+    Status.FIRE_FAILED,
 )  # fmt: skip
 
 
@@ -54,6 +55,7 @@ def message_of(system: SceneSystem, run: Run) -> str:
         text = cause or system.engine.failure_text(system.run.failure, failure.time)
         return f"{text}; last good state at t = {run.t:.9g} s"
     message = run.message(system.components(), system.event_names, cause)
+    message += rest_of(system, run.event) if run.status is Status.STOPPED else ""
     if failure is not None and failure.status in _AT_SWITCHES and run.chatter is not None:
         return f"{message}; {endless(system, run.chatter)}"
     work = failure is not None and failure.component == system.engine.nq + system.engine.nu
@@ -61,6 +63,17 @@ def message_of(system: SceneSystem, run: Run) -> str:
     small = failure is not None and failure.status is Status.STEP_TOO_SMALL
     message += _indefinite(system, run.y) if small else ""
     return message if cause else message + _switch_at(system, run)
+
+
+def rest_of(system: SceneSystem, event: int) -> str:
+    """What ends the message of a run that an event stopped: words for bounces, which stop it where
+    they follow ever faster."""
+    if all(one.event != event for one in system.engine.packed.watched.bounces):
+        return ""
+    return (
+        ": its bounces follow ever faster, what bounces has come to rest there; what lies still "
+        "needs a stop that carries it (law.limits)"
+    )
 
 
 def cause_of(

@@ -26,7 +26,7 @@ from ..integrate.settings import Settings
 from ..pack.loops.refusal import refuse
 from . import sundials
 from .crossings import Crossings, Sight, dip, just_before
-from .endings import busiest, cause_of
+from .endings import busiest, cause_of, rest_of
 from .notes import endless
 from .simulate import split, tolerances
 from .system import SceneSystem
@@ -123,7 +123,8 @@ class Equations:
         return state
 
     def fire(self, event: int, t: float, y: Array) -> int:
-        return int(self.calls.fire(self.calls.context, event, t, self._c(np.array(y))))
+        """What it answers; a bounce changes y in place."""
+        return int(self.calls.fire(self.calls.context, event, t, self._c(y)))
 
 
 def integrate(
@@ -361,6 +362,7 @@ class _Loop:
         lib, t = self.system.engine.lib, self.t
         before = (t, np.array(y), np.array(self.system.scene.memory), -(event + 1))
         answer = self.system.fire(event, t, y)
+        self.last = np.array(y)
         self.truth[event], self.fired = True, self.fired + 1
         if self.rows and self.rows[-1][0] == t and np.array_equal(self.rows[-1][1], y):
             self.rows.pop()
@@ -369,7 +371,8 @@ class _Loop:
         self.rows.append((t, np.array(y), np.array(self.system.scene.memory), event + 1))
         if answer == lib.MSTMM_FIRE_STOP:
             name = self.system.scene.event_names[event]
-            raise _Ended(Status.STOPPED, f"stopped by {name} at t = {t:.9g} s")
+            rests = rest_of(self.system.scene, event)
+            raise _Ended(Status.STOPPED, f"stopped by {name} at t = {t:.9g} s{rests}")
         return True
 
     def first_switch(self, solver: Any) -> tuple[int, float] | None:

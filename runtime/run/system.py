@@ -23,6 +23,7 @@ from ..kernels.tape import c_tape
 from ..pack.layout import StateNames
 from ..pack.packed import resize
 from ..pack.qr import refuse_steps
+from ..pack.records.bounces import Bounce
 from ..pack.switches import MOST
 from .controllers import Controllers
 
@@ -137,9 +138,21 @@ class SceneSystem:
         table = ffi.new("mstmm_event_action[]", max(1, len(actions)))
         for record, (action, release) in zip(table, actions, strict=False):
             record.action, record.release = action, release
+        for bounce in engine.packed.watched.bounces:
+            self._bounce(table[bounce.event], bounce)
         run.events, run.n_events = table, len(actions)
         run.n_switches = min(len(self.switches), MOST)
         self.kept += [records, numbers, table]
+
+    def _bounce(self, record: Any, bounce: Bounce) -> None:
+        engine, ffi = self.engine, self.engine.ffi
+        resize(engine.packed, bounce.slopes.slots)
+        places = np.array([bounce.places], dtype=np.int32).reshape(-1)
+        numbers = np.zeros(1 + len(bounce.places) + 4 * engine.nu)
+        record.slopes = c_tape(ffi, bounce.slopes, self.kept)
+        record.n_slopes, record.places = len(bounce.places), ffi.from_buffer("int[]", places)
+        record.restitution, record.numbers = bounce.restitution, engine.pointer(numbers)
+        self.kept += [places, numbers]
 
     @property
     def with_power(self) -> bool:
@@ -178,10 +191,13 @@ def _actions(engine: Engine) -> tuple[list[tuple[int, int]], list[str]]:
     packed, lib = engine.packed, engine.lib
     actions: list[tuple[int, int]] = []
     names: list[str] = []
+    bounces = len(packed.releases)
     for event in packed.scene.event:
-        stops = event.do == "stop"
-        release = -1 if stops else packed.releases[str(event.hinge)]
-        actions.append((lib.MSTMM_FIRE_STOP if stops else lib.MSTMM_FIRE_RESTART, release))
+        action = lib.MSTMM_FIRE_STOP if event.do == "stop" else lib.MSTMM_FIRE_RESTART
+        place = packed.releases[str(event.hinge)] if event.do == "release" else -1
+        if event.do == "bounce":
+            place, bounces = bounces, bounces + 1
+        actions.append((action, place))
         names.append(f'event "{event.name}"')
     for hinge in packed.scene.hinge:
         if hinge.release is not None:

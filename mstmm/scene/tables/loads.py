@@ -69,18 +69,33 @@ class Load(Table):
 
 
 class Event(Table):
-    """Something that happens when a comparison begins to hold: stop, or release a hinge."""
+    """Something that happens when a comparison begins to hold: stop, release a hinge, or bounce.
+
+    A bounce throws back what the places in `when` belong to: their rate against it leaves by
+    `restitution` (above 0, at most 1) times what it came with, and closed loops stay closed.
+    """
 
     name: Annotated[str, texts.name("the event's name")] = ""
     when: Annotated[Expression, texts.condition('a comparison such as "rod1.x < 0.1"')]
-    do: Annotated[str, texts.choice("stop", "release")]
+    do: Annotated[str, texts.choice("stop", "release", "bounce")]
     hinge: Annotated[str | None, texts.name("the hinge to release")] = None
+    restitution: Annotated[float | None, rules.number(above=0.0)] = None
 
     @model_validator(mode="after")
     def _check(self) -> Event:
+        if (self.do == "bounce") != (self.restitution is not None):
+            raise refuse(
+                'missing; do = "bounce" needs a number above 0, at most 1' if self.do == "bounce"
+                else 'only do = "bounce" takes a restitution; leave it out', "restitution",
+            )  # fmt: skip
+        if self.restitution is not None and self.restitution > 1:
+            raise refuse(
+                f"expected at most 1, which loses nothing, found {found(self.restitution)}",
+                "restitution",
+            )
         if self.do == "release" and self.hinge is None:
             raise refuse('missing; do = "release" needs the name of a hinge', "hinge")
-        if self.do == "stop" and self.hinge is not None:
+        if self.do != "release" and self.hinge is not None:
             raise refuse('only do = "release" takes a hinge; leave it out', "hinge")
         return self
 

@@ -3,6 +3,7 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "bounce.h"
 #include "control.h"
 #include "kernel_calls.h"
 #include "loops.h"
@@ -257,25 +258,31 @@ static int scene_accept(void *context, double t, double *y)
     return code ? code : mstmm_controllers_act(context, t, y);
 }
 
+int mstmm_probes_seen(mstmm_scene_run *run, real t, const real *y, const real *u)
+{
+    if (!run->n_probes) return 0;
+    real *one = run->probe_values + 6 * run->n_probes;
+    mstmm_state state = state_of(run->model, run->workspace, t, run->memory, &run->failure);
+    state.q = y;
+    state.u = u;
+    state.qdot = mstmm_spare_qdot(&state);
+    mstmm_ground(&state);
+    const int code = mstmm_run_motion(&state);
+    if (code) return code;
+    for (int k = 0; k < run->n_probes; k++) {
+        observe_probe(&state, &run->probes[k], one);
+        memcpy(run->probe_values + 6 * k, one, 6 * sizeof(real));
+    }
+    return 0;
+}
+
 static int scene_events(void *context, double t, const double *y, double *g)
 {
     mstmm_scene_run *run = context;
-    const mstmm_model *model = run->model;
-    const real *u = y + model->nq;
-    mstmm_state state = state_of(model, run->workspace, t, run->memory, &run->failure);
-    if (run->n_probes) {
-        real *one = run->probe_values + 6 * run->n_probes;
-        state.q = y;
-        state.u = u;
-        state.qdot = mstmm_spare_qdot(&state);
-        mstmm_ground(&state);
-        const int code = mstmm_run_motion(&state);
-        if (code) return code;
-        for (int k = 0; k < run->n_probes; k++) {
-            observe_probe(&state, &run->probes[k], one);
-            memcpy(run->probe_values + 6 * k, one, 6 * sizeof(real));
-        }
-    }
+    const real *u = y + run->model->nq;
+    mstmm_state state = state_of(run->model, run->workspace, t, run->memory, &run->failure);
+    const int code = mstmm_probes_seen(run, t, y, u);
+    if (code) return code;
     const real *inputs[] = {&t, y, u, run->probe_values, mstmm_input_numbers(&state)};
     real *outputs[] = {g};
     return mstmm_tape_run(run->event_tape, inputs, mstmm_slots(&state), outputs)
@@ -287,10 +294,9 @@ static int scene_fire(void *context, int event, double t, double *y)
 {
     mstmm_scene_run *run = context;
     const mstmm_event_action *action = &run->events[event];
-    (void)t;
-    (void)y;
-    if (action->action == MSTMM_FIRE_RESTART) run->memory[action->release] = 1;
     if (run->base) run->base->known = 0;
+    if (action->slopes) return mstmm_bounce(run, event, t, y);
+    if (action->action == MSTMM_FIRE_RESTART) run->memory[action->release] = 1;
     return action->action;
 }
 

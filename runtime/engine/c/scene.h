@@ -50,7 +50,13 @@ int mstmm_accelerations_many(const mstmm_model *model, real *workspace, int64_t 
 
 typedef struct {
     int action; /* MSTMM_FIRE_STOP, or MSTMM_FIRE_RESTART with `release` */
-    int release;
+    int release; /* place in memory; of a bounce that of the fastest one */
+    /* A bounce: slopes of the event's value by time, then by coordinates and places of probes */
+    const mstmm_tape *slopes; /* t, q, u, probes, inputs -> slopes; NULL: no bounce */
+    int n_slopes;
+    const int *places; /* two a slope: coordinate and speed, or -1 - 3 probe - component and 0 */
+    real restitution;
+    real *numbers; /* 1 + n_slopes + 4 nu: scratch */
 } mstmm_event_action;
 
 /* Parts of what that code works on: the base point (t, q, u, a), steps, slopes, factors, known
@@ -118,6 +124,8 @@ int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, cons
 /* Gaps of closed loops closed and slips stopped in place, by compiled code where there is some. */
 int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y);
 
+/* Places and velocities of the probes of a state with speeds u, to `probe_values`. */
+int mstmm_probes_seen(mstmm_scene_run *run, real t, const real *y, const real *u);
 /* The integrator's view of `run`, evaluated by the looped engine. */
 void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system);
 

@@ -79,7 +79,7 @@ int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const
                          .balance = balance, .failure = failure,
                          .linked = !(model->needs_pose || model->product || model->qr),
                          .observed = 0,
-                         .hinges_known = 0, .level = 0, .give = 0, .refined = 0, .asked = NULL};
+                         .hinges_known = 0, .level = 0, .give = 0, .refined = 0, .asked = NULL, .strike = NULL};
     if (balance) balance->power = balance->potential = 0;
     mstmm_ground(&state);
     const int code = mstmm_run_accelerations(&state);

@@ -327,6 +327,7 @@ typedef struct mstmm_state {
     int hinges_known; /* hinges have their motion already */
     int level;        /* MSTMM_GAP, MSTMM_SLIP; 0: accelerations */
     real give;        /* see mstmm_correction */
+    const struct mstmm_strike *strike; /* see bounce.h; NULL: none */
     const real *asked; /* what the rows lack, in place of gap or slip; NULL: that */
     int refined;      /* `given` is an answer, its multipliers are kept: what is left is answered */
     int residual;     /* drives give accelerations though others are given */

@@ -1,0 +1,153 @@
+"""Events that bounce: closed forms, hand calculations, Carnot's law, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from loops.scenes import rod
+from loops.test_four_bar import linkage
+from loops.test_heavy import LENGTHS, chain
+
+import mstmm
+
+Scene = dict[str, Any]
+G = 9.81
+
+
+def ball(**event: Any) -> Scene:
+    """Two kilograms that fall from 1 m."""
+    floor = {"name": "floor", "when": "ball.y <= 0", "do": "bounce", "restitution": 0.8} | event
+    return {
+        "gravity": [0, -G, 0], "event": [floor],
+        "body": [{"name": "ball", "mass": 2.0, "inertia": [0.1, 0.1, 0.1]}],
+        "hinge": [{"name": "fall", "type": "prismatic", "inboard": "ground", "outboard": "ball",
+                   "axis": [0, 1, 0], "initial": {"q": 1.0}}],
+    }  # fmt: skip
+
+
+def model(scene: Scene) -> mstmm.Model:
+    return mstmm.compile(mstmm.Scene(**scene))
+
+
+@pytest.mark.parametrize("when", ["ball.y <= 0", "fall.q < 0"])
+@pytest.mark.parametrize("method", ["dop853", "scipy-DOP853"])
+def test_a_ball_loses_its_height_by_squares(when: str, method: str) -> None:
+    """Heights e^(2k), times of flight 2 sqrt(2 h / g) each; then it rests, and the run says so."""
+    result = model(ball(when=when)).simulate(20.0, method, rtol=1e-10, atol=1e-12)
+    assert result.success, result.message
+    assert "come to rest" in result.message
+    assert abs(result.t[-1] - np.sqrt(2 / G) * (1 + 2 * 0.8 / 0.2)) < 1e-5
+    again = np.flatnonzero(result.trajectory.event > 0)[:20]
+    heights = result.u[again, 0] ** 2 / (2 * G)
+    assert np.abs(heights / 0.64 ** np.arange(1, 21) - 1).max() < 1e-9
+
+
+def test_a_wall_that_comes_to_meet() -> None:
+    """A floor that rises by 0.5 m/s throws the ball up by e times the speed that they meet with."""
+    result = model(ball(when="ball.y <= 0.5*t", restitution=1.0)).simulate(0.6, rtol=1e-10)
+    hit = int(np.flatnonzero(result.trajectory.event > 0)[0])
+    before = result.u[hit - 1, 0] - 0.5
+    assert before < 0 and abs(result.u[hit, 0] - 0.5 + before) < 1e-12
+
+
+def pendulum() -> Scene:
+    """Two rods on pins; the tip of the second one strikes a wall at x = 0.8 m."""
+    hinges = [
+        {"name": "top", "type": "pin", "inboard": "ground", "outboard": "upper",
+         "initial": {"q": -1.4, "u": 1.5}},
+        {"name": "knee", "type": "pin", "inboard": "upper.tip", "outboard": "lower",
+         "initial": {"q": 0.2}},
+    ]  # fmt: skip
+    wall = {"name": "wall", "when": "lower.tip.x > 0.8", "do": "bounce", "restitution": 0.6}
+    return {"gravity": [0, -G, 0], "body": [rod("upper", 1.0, 1.0), rod("lower", 0.7, 0.5)],
+            "hinge": hinges, "event": [wall]}  # fmt: skip
+
+
+def test_a_double_pendulum_strikes_a_wall() -> None:
+    """u' = u - (1 + e) (A u) / (A M^-1 A^T) M^-1 A^T with M and A of both angles by hand."""
+    one = model(pendulum())
+    result = one.simulate(3.0, rtol=1e-10, atol=1e-12)
+    hit = int(np.flatnonzero(result.trajectory.event > 0)[0])
+    a, b = result.q[hit, 0], result.q[hit].sum()
+    before = np.array([result.u[hit - 1, 0], result.u[hit - 1].sum()])
+    both = 0.5 * 1.0 * 0.35 * np.cos(a - b)
+    mass = np.array([[1 / 3 + 0.5, both], [both, 0.5 * 0.49 / 3]])
+    row = np.array([-np.sin(a), -0.7 * np.sin(b)])
+    answer = np.linalg.solve(mass, row)
+    wanted = before - 1.6 * (row @ before) / (row @ answer) * answer
+    found = np.array([result.u[hit, 0], result.u[hit].sum()])
+    assert np.abs(found - wanted).max() < 1e-11 * np.abs(wanted).max()
+    assert np.all(result.position("lower.tip")[:, 0] < 0.8 + 1e-9)
+
+
+def kinetic(q: np.ndarray, u: np.ndarray, masses: np.ndarray) -> float:
+    """Energy of the rods of a chain in the plane, J."""
+    turned, rates = 1j * np.exp(1j * np.cumsum(q[:6])) * LENGTHS, np.cumsum(u[:6])
+    middle = np.cumsum(rates * turned) - rates * turned / 2
+    own = np.array(LENGTHS) ** 2 / 12 * rates**2
+    return float(np.sum(masses * (np.abs(middle) ** 2 + own)) / 2)
+
+
+def struck(scene: Scene, when: str, restitution: float, until: float) -> mstmm.Result:
+    scene["event"] = [{"when": when, "do": "bounce", "restitution": restitution}]
+    return model(scene).simulate(until, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("cut", ["rocker_pin", "closing_pin"])
+@pytest.mark.parametrize("pin", ["rocker_pin", "closing_pin"])
+def test_a_stop_in_a_four_bar(pin: str, cut: str) -> None:
+    """Of one freedom all speeds turn round alike, whether the pin that is stopped is cut or not."""
+    scene = linkage(cut, laws=False)
+    start = model(scene)
+    place = start.layout.hinges[pin].q
+    begin, end = (float(x) for x in start.simulate(0.05).q[[0, -1], place])
+    result = struck(scene, f"{pin}.q {'>' if end > begin else '<'} {end!r}", 0.4, 0.1)
+    hit = int(np.flatnonzero(result.trajectory.event > 0)[0])
+    before, behind = result.u[hit - 1], result.u[hit]
+    assert np.abs(behind + 0.4 * before).max() < 1e-12 * np.abs(before).max()
+
+
+def test_carnot_in_a_loop() -> None:
+    """Six rods between two points, four freedoms: the loop stays closed where an end strikes, and
+    the energy falls by (1-e)/(1+e) times that of the change."""
+    masses = np.array([1.0, 0.5, 2.0, 1.0, 1.5, 1.0])
+    scene = chain(masses.tolist())
+    free = model(scene).simulate(0.2, output_times=[0.0, 0.2])
+    path = free.position("rod2.tip")[:, 1]
+    wall = float(path.mean())
+    result = struck(scene, f"rod2.tip.y {'>' if path[1] > path[0] else '<'} {wall!r}", 0.3, 0.2)
+    hit = int(np.flatnonzero(result.trajectory.event > 0)[0])
+    q, before, behind = result.q[hit], result.u[hit - 1], result.u[hit]
+    rates = result.velocity("rod2.tip")[[hit - 1, hit], 1]
+    assert abs(rates[1] + 0.3 * rates[0]) < 1e-12 * abs(rates[0])
+    turning = np.cumsum(behind[:6]) * LENGTHS * 1j * np.exp(1j * np.cumsum(q[:6]))
+    assert abs(turning.sum()) < 1e-12 * np.abs(turning).max()
+    lost = kinetic(q, before, masses) - kinetic(q, behind, masses)
+    whole = kinetic(q, before, masses)
+    assert abs(lost - 0.7 / 1.3 * kinetic(q, before - behind, masses)) < 1e-13 * whole
+
+
+@pytest.mark.parametrize(
+    ("event", "said"),
+    [
+        ({"restitution": 0.0}, "more than 0"),
+        ({"restitution": 1.5}, "at most 1"),
+        ({"restitution": None}, "needs a number above 0"),
+        ({"when": "ball.vy < -1"}, "strikes places"),
+        ({"when": "t > 1"}, "reads no place"),
+        ({"do": "stop"}, 'only do = "bounce" takes a restitution'),
+    ],
+)
+def test_refused(event: Scene, said: str) -> None:
+    with pytest.raises(mstmm.SceneError, match=said):
+        model(ball(**event))
+
+
+def test_nothing_gives_way() -> None:
+    scene = ball()
+    scene["hinge"][0] |= {"initial": {}, "drive": "1 - t"}
+    result = model(scene).simulate(2.0)
+    assert not result.success
+    assert 'event "floor"' in result.message and "nothing can give way" in result.message
