@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reference.compare import worst
+from reference.random_loops import random_mechanism
 
 import mstmm
 from mstmm.ir.replay import evaluate_floats
@@ -53,8 +55,10 @@ def interpreted(model: mstmm.Model, q: Any, u: Any) -> dict[str, Any]:
     """Everything that the fused IR gives of a state, with plain floats."""
     packed = model.packed
     structure, p = structure_of(packed.system, model.known or {}, floors=packed.floors)
-    inputs = {"p": list(p), "t": [TIME], "q": list(q), "u": list(u), "memory": [],
-              "efforts": [0.0] * model.nu}  # fmt: skip
+    inputs = {
+        "p": list(p), "t": [TIME], "q": list(q), "u": list(u), "efforts": [0.0] * model.nu,
+        "memory": list(model.looped.start_memory()[: structure.n_memory]),
+    }  # fmt: skip
     kernels = model.fusion.fused(structure).kernels.values()
     return {name: x for kernel in kernels for name, x in evaluate_floats(kernel, inputs).items()}
 
@@ -68,6 +72,15 @@ def test_interpreted_equals_looped(name: str, rng: np.random.Generator) -> None:
     inertial = float(np.abs(model.accelerations(q, 0.0 * u, TIME)).max())
     allowed = AGREEMENT * max(1.0, float(np.abs(wanted).max()), inertial)
     assert np.abs(np.array(found["udot"]) - wanted).max() < 10 * allowed
+
+
+@pytest.mark.parametrize("seed", [6, 11, 14, 18])
+def test_random_mechanisms(seed: int) -> None:
+    """All kinds of hinges in the tree and cut, with laws, rotors, springs and loads."""
+    scene, q, u = random_mechanism(seed)
+    model = compiled(scene)
+    found, wanted = interpreted(model, q, u), model.accelerations(q, u, TIME)
+    assert worst(np.array(found["udot"]), wanted) < 1e-12
 
 
 @pytest.fixture(scope="module", params=["four-bar", "Bricard"])
