@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 #: Distance from rest, and acceleration per s^2 of what nothing holds, in sizes of coordinates;
 #: stiffness that counts as none, in parts; matrices that still count as the same, in parts.
 _STILL, _SOFT, _SAME = 1e-6, 1e-13, 1e-6
+#: Efforts that are rounding, in parts of those that cancel.
+_CANCELLED = 1e-11
 #: How far matrices are compared along the motion, in rad or sizes.
 _AHEAD = 0.1
 #: Coordinates that a sentence names.
@@ -70,11 +72,20 @@ def refuse_unrest(linear: Equations) -> None:
     if linear.mechanism is None:
         return
     leaving = _accelerating(linear)
-    if leaving:
+    if leaving and not _balanced(linear, linear.mechanism.ways):
         raise SceneError(
             f"a linear model of closed loops is that of a state at rest, and {_some(leaving)} "
             "accelerate here; leave q out for the equilibrium, or give one"
         )
+
+
+def _balanced(linear: Equations, ways: Array) -> bool:
+    """Whether what pushes along the motions of a mechanism is rounding of what cancels there, which
+    may still move what hardly anything holds."""
+    state, tree = linear.state, linear.tree
+    efforts = tree.inverse_dynamics(state.t, state.q, state.u, 0 * state.a, tree.start_memory())
+    left, whole = np.abs(ways.T @ efforts), np.abs(ways).T @ np.abs(efforts)
+    return bool((left <= _CANCELLED * whole).all())
 
 
 def _accelerating(linear: Equations) -> list[str]:

@@ -5,6 +5,8 @@ Neither is the error of the motion, but both find wrong steps and wrong laws.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from mstmm.arrays import Array
@@ -52,10 +54,15 @@ def energy(result: Record) -> Drift:
         exchanged = parts["kinetic"] + np.abs(work)
         for name in ("gravity", "springs"):
             exchanged = exchanged + np.abs(parts[name] - parts[name][:1])
-        stored = _largest(np.abs(parts["gravity"]) + np.abs(parts["springs"]))
-    scale = max(_largest(exchanged), _AT_REST * stored)
+    scale = max(_largest(exchanged), _AT_REST * _stored(parts))
     change = np.nan if overflows else _change(residual)
     return Drift("energy", "J", change if len(residual) else 0.0, scale, "exchanged")
+
+
+def _stored(parts: Mapping[str, Array]) -> float:
+    """The largest energy of gravity and springs."""
+    with np.errstate(all="ignore"):
+        return _largest(np.abs(parts["gravity"]) + np.abs(parts["springs"]))
 
 
 # --- momentum -------------------------------------------------------------------------------------
@@ -65,8 +72,9 @@ def momentum(result: Record) -> list[Drift]:
     """Drift of the components of momentum that nothing outside the scene changes.
 
     Components that are zero throughout are left out.  Angular momentum is taken about the origin,
-    or about the one point of the ground through which a scene is held.  Scales: sqrt(2 m T), and
-    the larger of the largest angular momentum and that times the scene's reach.
+    or about the one point of the ground through which a scene is held.  Scales: sqrt(2 m T), at
+    rest with a part of what is stored for T, and the larger of the largest angular momentum and
+    that times the scene's reach.
     """
     scene, found = result.model.scene, list[Drift]()
     flexible = result.model.flexible
@@ -87,7 +95,7 @@ def momentum(result: Record) -> list[Drift]:
     mass += sum(undeformed(body)[0] for body in flexible.values())
     linear, angular = result.momentum(), result.angular_momentum()
     angular = angular - np.cross(pivot, linear)
-    speed = np.sqrt(2 * kinetic) * np.sqrt(mass)
+    speed = np.sqrt(2 * max(kinetic, _AT_REST * _stored(result.energies()))) * np.sqrt(mass)
     scale = max(_largest(np.linalg.norm(angular, axis=1)), speed * reach)
     for k, axis in enumerate("xyz"):
         others = [g for j, g in enumerate(scene.gravity) if j != k]

@@ -101,6 +101,12 @@ def test_matrices_are_slopes_of_accelerations(platform: mstmm.Model) -> None:
             assert worst(found, -np.linalg.solve(linear.M, matrix[:, k])) < 1e-7
 
 
+def test_a_platform_at_rest_is_trusted(platform: mstmm.Model) -> None:
+    """What moves is rounding, and no drift of momentum."""
+    rest = np.asarray(platform.equilibrium()), np.zeros(platform.nu)
+    assert not platform.simulate(0.5, initial=rest, rtol=1e-6).warnings
+
+
 def test_responses_are_those_of_the_matrices(platform: mstmm.Model) -> None:
     """Outputs of bodies, cut hinges and accelerations, by states and by frequencies."""
     linear = platform.linearize(inputs=["slide2.effort", "platform.fx"])
@@ -138,6 +144,13 @@ def test_upright_cranks_buckle() -> None:
     assert model.modes().omega == pytest.approx([np.sqrt((30 - weight) / inertia)], rel=1e-10)
     found = model.critical("foot0.law.stiffness", 30.0, 5.0)
     assert found.value == pytest.approx(weight, rel=1e-6)
+
+
+def test_cranks_that_hang() -> None:
+    """Where a row of the third crank takes the place of another."""
+    rest = compiled(cranks(angle=1.5 * np.pi)).modes()
+    weight, inertia = 9.81 * 0.6 * (3 / 2 + 1), 0.6**2 * (3 / 3 + 1)
+    assert rest.omega == pytest.approx([np.sqrt(weight / inertia)], rel=1e-9)
 
 
 def test_bricards_ring_comes_to_rest() -> None:

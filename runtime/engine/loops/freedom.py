@@ -18,8 +18,8 @@ from mstmm.errors import NumericalFailure
 from ...pack.loops.variants import undriven
 from ...pack.pack import packed_system
 from ..engine import Engine
-from .calls import LoopCalls
 from .closed import Closed
+from .rank import judging
 
 #: Motions that are rounding beside others, in sizes of the speeds.
 _ROUNDING = 1e-9
@@ -38,10 +38,7 @@ class Freedom:
     def __init__(self, engine: Engine, free: Sequence[int], sizes: Array, closed: Closed) -> None:
         packed, self._start = engine.packed, closed.start[0]
         still = Engine(packed_system(undriven(packed.system), packed))
-        self._calls = LoopCalls(still, self._start)
-        assert packed.written.loops is not None
-        for row in range(self._calls.count):  # judged as accelerations judge them
-            self._calls.records.judge(row, packed.written.loops.floor(row))
+        self._calls = judging(still, self._start)
         self._free, self._sizes = np.array(free, dtype=np.int64), sizes
         self._loops = closed.loops
 

@@ -60,7 +60,7 @@ class Rank:
 
 def rank_at(engine: Engine, q: Array) -> Rank:
     """Rows that repeat others at a closed state q (nq,) and around it."""
-    calls = _calls(engine, q)
+    calls = judging(engine, q)
     level = REPEATED * calls.mobility
     here = _repeating(calls, q, level)
     if not here:
@@ -81,7 +81,7 @@ def rank_at(engine: Engine, q: Array) -> Rank:
     return Rank(here, always, going, tuple(states), loads, nearby)
 
 
-def _calls(engine: Engine, q: Array) -> LoopCalls:
+def judging(engine: Engine, q: Array) -> LoopCalls:
     """Of the scene in the metric of its hinges, with the mobilities of bodies all alike."""
     packed = engine.packed
     mobility = LoopCalls(Engine(packed_system(geometric(packed.system), packed)), q).mobility
