@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import mstmm
 
-from .scenes import Scene
+from ..scenes import Scene
 
 SPIN, ANGLE, HALF = 2 * np.pi, np.pi / 6, 0.5
 ROD, BALL, SLIDER, COUPLER = 0.3, 5.0, 3.0, 0.15

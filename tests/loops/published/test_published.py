@@ -7,7 +7,7 @@ import pytest
 
 import mstmm
 
-from .scenes import andrews, four_bars
+from ..scenes import andrews, four_bars
 
 #: Crank angle of the N-four-bar after 10 s: I theta'' = -W cos theta, solved to 15 digits.
 ANGLES = {2: -30.179800860191, 40: -30.026637417191}
