@@ -54,6 +54,8 @@ _SAVED_PER_BODY = 6e-8
 _MOST_UNKNOWNS = 20
 #: A frame or section of a flexible body with n shapes compiles like 1 + n^2 / this many bodies.
 _MODES_PER_BODY = 24
+#: A hinge that n rows of closed loops pass compiles like n^2 / this many bodies.
+_ROWS_PER_BODY = 32
 
 #: What decides the text besides structure and kernels: the folders that print it.
 PRINTERS = {
@@ -77,7 +79,6 @@ class Fusion:
     ) -> None:
         self._definitions = definitions
         self.obstacle = obstacle or _obstacle(packed, most)
-        self._looped_by_nature = bool(self.obstacle)
         self.library: FusedLibrary | None = None
         self.lanes: FusedLibrary | None = None
         self.implicit: FusedLibrary | None = None
@@ -88,6 +89,8 @@ class Fusion:
         if not self.obstacle:
             self.structure, self.numbers = structure_of(packed.system, known, bake, packed.floors)
             self.inputs = self.structure.inputs
+            self.obstacle = _too_wide(self.structure, most)
+        self._looped_by_nature = bool(self.obstacle)
 
     def find(self) -> FusedLibrary | None:
         """The scalar library if it is in the cache; no compiler is started."""
@@ -332,6 +335,15 @@ def _obstacle(packed: Packed, most: int) -> str:
     if any(packed.elements[key].tape is not None for key in hinges):
         return "a hinge is interpreted because it was generated without a compiler"
     return ""
+
+
+def _too_wide(structure: Structure, most: int) -> str:
+    """Why code of closed loops would be too long; empty if it would not."""
+    rows = sum(len(body.pending) ** 2 for body in structure.bodies)
+    size = len(structure.bodies) + rows // _ROWS_PER_BODY
+    if size <= most:
+        return ""
+    return f"with its closed loops it is like {size} bodies; fused code is for {most} at most"
 
 
 def _looped_closure(packed: Packed) -> str:

@@ -11,6 +11,7 @@ from reference.compare import worst
 from reference.random_loops import random_mechanism
 
 import mstmm
+from mstmm.bridge.fusion import Fusion
 from mstmm.ir.replay import evaluate_floats
 from mstmm.runtime.pack.pack import pack
 from mstmm.runtime.pack.structure import structure_of
@@ -188,3 +189,11 @@ def test_rows_that_nothing_moves_cost_nothing(scene: str) -> None:
         for one in (every, left)
     ]
     assert counts[0] == counts[1]
+
+
+def test_wide_loops_stay_looped() -> None:
+    """Five rows pass every link of Bricard's ring."""
+    model = compiled(bricard())
+    for most, wanted in ((9, ""), (8, "it is like 9 bodies")):
+        assert wanted in Fusion(model.packed, {}, {}, most=most).obstacle
+        assert bool(wanted) == bool(Fusion(model.packed, {}, {}, most=most).obstacle)
