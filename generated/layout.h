@@ -41,7 +41,7 @@
 #define MSTMM_SECTION_H_PER_MODE 6
 #define MSTMM_SECTION_PUSH_PER_MODE 12
 #define MSTMM_SECTION_H6_PER_MODE 18
-/* A hinge that closes a loop; a row. */
+/* A hinge that closes a loop; a coupling; a row. */
 #define MSTMM_CLOSURE_W 0
 #define MSTMM_CLOSURE_J_A 36
 #define MSTMM_CLOSURE_J_B 72
@@ -52,6 +52,11 @@
 #define MSTMM_CLOSURE_GAP 129
 #define MSTMM_CLOSURE_SLIP 135
 #define MSTMM_CLOSURE 141
+#define MSTMM_COUPLING_DRIFT 0
+#define MSTMM_COUPLING_GAP 1
+#define MSTMM_COUPLING_SLIP 2
+#define MSTMM_COUPLING_STILL 3
+#define MSTMM_COUPLING 4
 #define MSTMM_ROW_K 0
 #define MSTMM_ROW_KNOWN 6
 #define MSTMM_ROW_PIVOT 7

@@ -1055,6 +1055,15 @@ static int mstmm_at_closures(mstmm_state *state, int index)
             .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
             .l = closed + MSTMM_CLOSURE_L);
     }
+    if (state->refined) {
+        for (int c = 0; c < looped->n_own; c++) {
+            const mstmm_own *own = &looped->own[c];
+            mstmm_generic_pull(nu,
+                .y = loops + own->tau,
+                .x = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_TOLD,
+                .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
+        }
+    }
     if (!state->level) {
         mstmm_loops_drift(
             .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
@@ -1105,6 +1114,23 @@ static int mstmm_at_closures(mstmm_state *state, int index)
                 .l = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN);
         }
     }
+    for (int c = 0; c < looped->n_own; c++) {
+        const mstmm_own *own = &looped->own[c];
+        for (int k = 0; k < body->nu; k++) {
+            mstmm_loops_act(
+                .J = closed + MSTMM_CLOSURE_J_A + 6 * k, .tau = loops + own->tau + k,
+                .e = loops + own->inner);
+            mstmm_loops_act(
+                .J = closed + MSTMM_CLOSURE_J_B + 6 * k, .tau = loops + own->tau + k,
+                .e = loops + own->outer);
+        }
+        mstmm_generic_answered(nu,
+            .y = closed + MSTMM_CLOSURE_L, .z = loops + own->tau,
+            .l = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
+        mstmm_generic_answered(nu,
+            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + own->tau,
+            .l = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
+    }
     return 0;
 }
 
@@ -1140,6 +1166,7 @@ static int mstmm_at_carried(mstmm_state *state, int index)
 {
     real hinge_J_free[6];
     real hinge_tau_free[6];
+    real tau[6];
     real z[6];
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
@@ -1164,6 +1191,17 @@ static int mstmm_at_carried(mstmm_state *state, int index)
             (mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
     for (int k = 0; k < speeds; k++)
         hinge_J_free[k] = body->rotor[columns[k]];
+    if (state->refined) {
+        for (int c = 0; c < looped->n_pending; c++) {
+            const mstmm_pending *pending = &looped->pending[c];
+            if ((pending->tau >= 0)) {
+                mstmm_generic_pull(nu,
+                    .y = loops + pending->tau,
+                    .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_TOLD,
+                    .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
+            }
+        }
+    }
     for (int k = 0; k < speeds; k++)
         hinge_tau_free[k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU))[columns[k]];
     code = mstmm_generic_factor(speeds,
@@ -1181,11 +1219,29 @@ static int mstmm_at_carried(mstmm_state *state, int index)
         .e_I = parent + MSTMM_BLOCK_E);
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
-        mstmm_generic_push(speeds,
-            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
-            .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = loops + pending->column,
-            .tau = mstmm_zeros, .y = loops + pending->y, .e_I = loops + pending->onward);
+        if (!(pending->tau >= 0)) {
+            mstmm_generic_push(speeds,
+                .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
+                .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = loops + pending->column,
+                .tau = mstmm_zeros, .y = loops + pending->y, .e_I = loops + pending->onward);
+        }
+        if ((pending->tau >= 0)) {
+            for (int k = 0; k < speeds; k++)
+                tau[k] = (loops + pending->tau)[columns[k]];
+        }
+        if ((pending->tau >= 0)) {
+            mstmm_generic_push(speeds,
+                .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
+                .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = loops + pending->column,
+                .tau = tau, .y = loops + pending->y, .e_I = loops + pending->onward);
+        }
+        if ((pending->tau >= 0)) {
+            mstmm_generic_answered(nu,
+                .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + pending->tau,
+                .l = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_KNOWN);
+        }
         if (!body->section && speeds) {
             mstmm_generic_divide(speeds,
                 .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .y = loops + pending->y, .z = z);
@@ -1254,6 +1310,17 @@ static int mstmm_at_answered(mstmm_state *state, int index)
                 .e = block + MSTMM_BLOCK_E);
         }
     }
+    if ((state->observed || state->balance)) {
+        for (int c = 0; c < looped->n_pending; c++) {
+            const mstmm_pending *pending = &looped->pending[c];
+            if ((pending->tau >= 0)) {
+                mstmm_generic_pull(nu,
+                    .y = loops + pending->tau,
+                    .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
+                    .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
+            }
+        }
+    }
     mstmm_generic_answer(speeds,
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
@@ -1315,6 +1382,12 @@ static int mstmm_at_closures_answered(mstmm_state *state, int index)
         }
     }
     if ((state->observed || state->balance)) {
+        for (int c = 0; c < looped->n_own; c++) {
+            const mstmm_own *own = &looped->own[c];
+            mstmm_generic_pull(nu,
+                .y = loops + own->tau, .x = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_X,
+                .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
+        }
         memset(block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
         for (int k = 0; k < body->nu; k++) {
             mstmm_loops_loaded(
@@ -1358,6 +1431,26 @@ static int mstmm_at_drive_power(mstmm_state *state, int index)
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .tau_d = driven);
         mstmm_frames_speed_power(
             .tau = driven, .u = state->u + body->u + k, .P = P);
+        state->balance->power += P[0];
+    }
+    return 0;
+}
+
+/* Multipliers of couplings, and the power that those feed in whose values go by time. */
+static int mstmm_at_couplings_answered(mstmm_state *state, int index)
+{
+    real P[1];
+    const mstmm_coupling *coupling = &state->model->couplings[index];
+    if ((coupling->row < 0)) return 0;
+    if (state->refined) {
+        real *loops = state->workspace + state->model->loops;
+        (loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_X)[0] += (loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_TOLD)[0];
+    }
+    if (state->balance) {
+        real *loops = state->workspace + state->model->loops;
+        mstmm_frames_speed_power(
+            .tau = loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_X,
+            .u = loops + coupling->numbers + MSTMM_COUPLING_STILL, .P = P);
         state->balance->power += P[0];
     }
     return 0;
@@ -4885,6 +4978,16 @@ static int mstmm_pass_drive_power(mstmm_state *state)
     return 0;
 }
 
+static int mstmm_pass_couplings_answered(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_couplings; i++) {
+        const int code = mstmm_at_couplings_answered(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 MSTMM_AT_ONCE void mstmm_fetch_closures_loaded(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -6136,6 +6239,10 @@ int mstmm_run_accelerations(mstmm_state *state)
     }
     if (state->balance) {
         code = mstmm_pass_drive_power(state);
+        if (code) return code;
+    }
+    if (model->n_couplings) {
+        code = mstmm_pass_couplings_answered(state);
         if (code) return code;
     }
     if (model->product) {

@@ -153,6 +153,7 @@ class Replay(RowSlots):
         s = self.state.structure
         known = {
             "linked": False, "product": False, "qr": False, "refined": False, "residual": False,
+            "couplings": False,
             "looped": bool(s.closures), "balance": not self.level, "efforts": True,
             "inverse": self.inverse,
             "driving": not self.level,

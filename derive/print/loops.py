@@ -14,6 +14,7 @@ from .tiles import Chained, Tiled, tiled
 _COUNTS = {
     "body": "n_bodies", "law": "n_laws", "load": "n_loads", "force": "n_forces",
     "drive": "n_drives", "speed": "nu", "row": "n_rows",
+    "coupling": "n_couplings",
 }  # fmt: skip
 #: The first that a loop meets, where others are met on their way: rows that close on bodies.
 _FIRSTS = {"row": "model->first_ground_row"}

@@ -77,6 +77,10 @@ _EACH = {
         "int c = 0; c < looped->n_pending; c++",
         "const mstmm_pending *pending = &looped->pending[c];", ("looped", "loops"),
     ),
+    "own": (
+        "int c = 0; c < looped->n_own; c++", "const mstmm_own *own = &looped->own[c];",
+        ("looped", "loops"),
+    ),
     "before": ("int b = 0; b <= c; b++", "", ()),
     "rows": ("int c = 0; c < 6; c++", "if (closure->rows[c] < 0) continue;", ("closure", "loops")),
     "others": (

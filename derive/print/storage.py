@@ -67,6 +67,8 @@ CLOSURE = {
     "closure.W": 36, "closure.J_A": 36, "closure.J_B": 36, "closure.l": 6, "closure.R_C": 9,
     "closure.d": 3, "closure.lever": 3, "closure.gap": 6, "closure.slip": 6,
 }  # fmt: skip
+#: Numbers of a coupling, in their order; behind them stands -C of each of its hinges.
+COUPLING = {"coupling.drift": 1, "coupling.gap": 1, "coupling.slip": 1, "coupling.still": 1}
 #: Numbers of a row: slot -> how many.
 ROW = {"row.K": 6, "row.known": 1, "row.pivot": 1, "row.inverse": 1, "row.x": 1,
        "row.told": 1}  # fmt: skip
@@ -138,6 +140,10 @@ _PLACES = {
     "side.inner": "loops + closure->inner[c]", "side.outer": "loops + closure->outer[c]",
     "pending.K": "loops + pending->column", "pending.onward": "loops + pending->onward",
     "pending.y": "loops + pending->y", "before.y": "loops + looped->pending[b].y",
+    "pending.tau": "loops + pending->tau", "own.tau": "loops + own->tau",
+    "own.inner": "loops + own->inner", "own.outer": "loops + own->outer",
+    "coupling.x": "loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_X",
+    "coupling.told": "loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_TOLD",
     "pair.L": "loops + pending->pairs[b]",
     "other.K": "loops + other->column", "other.L": "loops + other->pair",
     "second.L": "loops + row->others[b].pair", "both.L": "loops + other->pairs[b]",
@@ -193,6 +199,7 @@ VARIABLES: dict[str, tuple[str, tuple[str, ...]]] = {
     "closed": (
         "real *closed = closure ? loops + closure->numbers : NULL;", ("loops", "closure"),
     ),
+    "coupling": ("const mstmm_coupling *coupling = &state->model->couplings[index];", ()),
     "row": ("const mstmm_loop_row *row = &state->model->rows[index];", ()),
     "line": ("real *line = loops + MSTMM_ROW * (int64_t)index;", ("loops",)),
     "meeting": ("real *meeting = mstmm_block(state->model, state->workspace, row->body);",
@@ -267,6 +274,8 @@ _OF_ROWS = {
     "line.known": "closure->rows[c]", "line.x": "closure->rows[c]",
     "line.told": "closure->rows[c]", "other.known": "other->row", "other.x": "other->row",
     "pending.known": "pending->row", "pending.x": "pending->row",
+    "pending.told": "pending->row", "own.told": "own->row",
+    "own.known": "own->row", "own.x": "own->row",
 }  # fmt: skip
 
 
@@ -282,6 +291,8 @@ def _stored(slot: str) -> str | None:
         return f"mstmm_of_speeds(block, nu, MSTMM_SPEED_{PER_SPEED[slot][0]})"
     if slot in CLOSURE:
         return f"closed + {_macro(slot)}"
+    if slot in COUPLING:
+        return f"loops + coupling->numbers + {_macro(slot)}"
     if slot in ROW:
         return f"line + {_macro(slot)}"
     if slot in _OF_ROWS:
@@ -386,8 +397,14 @@ def layout_header() -> str:
         + "\n".join(rows)
         + "\n/* Flexible bodies and sections: arrays behind so many numbers per mode. */\n"
         + "\n".join([*_per_mode(MODES), *_per_mode(SECTION)])
-        + "\n/* A hinge that closes a loop; a row. */\n"
-        + "\n".join([*_listed(CLOSURE, "MSTMM_CLOSURE"), *_listed(ROW, "MSTMM_ROW")])
+        + "\n/* A hinge that closes a loop; a coupling; a row. */\n"
+        + "\n".join(
+            [
+                *_listed(CLOSURE, "MSTMM_CLOSURE"),
+                *_listed(COUPLING, "MSTMM_COUPLING"),
+                *_listed(ROW, "MSTMM_ROW"),
+            ]
+        )
         + "\n/* cdef end */\n\n"
         + "/* Arrays of a flexible body of n modes, and of one of its sections. */\n"
         + "\n".join([*_offsets(MODES, _PAIRS), *_offsets(SECTION, "")])

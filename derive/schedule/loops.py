@@ -29,6 +29,7 @@ from .steps import (
     EachSpeed,
     Move,
     Pass,
+    Pick,
     Spread,
     call,
     only,
@@ -67,12 +68,38 @@ _EFFORTS = EachSpeed(
     ),
 )
 
+#: Rows of couplings that name the hinge's own speeds: they begin on both sides of it.
+_OF_OWN = Each(
+    of="own",
+    when="!staged",
+    steps=(
+        EachSpeed(
+            steps=(
+                call("loops.act", J="closure.J_A[6 * k]", tau="own.tau[k]", e="own.inner"),
+                call("loops.act", J="closure.J_B[6 * k]", tau="own.tau[k]", e="own.outer"),
+            ),
+        ),
+        call("generic{nu}.answered", y="closure.l", z="own.tau", l="own.known"),
+        call("generic{nu}.answered", y="body.s", z="own.tau", l="own.known"),
+    ),
+)  # fmt: skip
+
+
+def _efforts_of_own(x: str, when: str) -> Each:
+    """Efforts of couplings on own speeds, by their multipliers."""
+    return Each(
+        of="own", when=when,
+        steps=(call("generic{nu}.pull", y="own.tau", x=x, y_0="body.tau"),),
+    )  # fmt: skip
+
+
 CLOSURES = Pass(
     "closures", "body", "Rows of a hinge that closes a loop, and the load of its laws.",
     (
         *_MEETING,
         _rows("closure.gap", "gaping"),
         _rows("closure.slip", "slipping"),
+        _efforts_of_own("own.told", "!staged refined"),
         *only("!corrected", *_DRIVEN),
         _EFFORTS,
         Each(
@@ -92,6 +119,7 @@ CLOSURES = Pass(
                 ),
             ),
         ),
+        _OF_OWN,
     ),
     skip="!cut",
 )  # fmt: skip
@@ -213,8 +241,15 @@ _ALONE = only(
     Each(
         of="pending",
         steps=(
-            call("generic{free}.push", **BODY, **_ACROSS, e="pending.K", tau="zero",
-                 y="pending.y", e_I="pending.onward"),
+            call("generic{free}.push", when="!coupled", **BODY, **_ACROSS, e="pending.K",
+                 tau="zero", y="pending.y", e_I="pending.onward"),
+            *only(
+                "coupled",
+                Pick(to="local.tau", source="pending.tau"),
+                call("generic{free}.push", **BODY, **_ACROSS, e="pending.K", tau="local.tau",
+                     y="pending.y", e_I="pending.onward"),
+                call("generic{nu}.answered", y="body.s", z="pending.tau", l="pending.known"),
+            ),
             *_COUPLED,
         ),
     ),
@@ -240,12 +275,24 @@ _BY_STAGES = only(
     ),
 )
 
+
+def _efforts_of_couplings(x: str, when: str) -> Each:
+    """Efforts of the couplings of a hinge, by their multipliers."""
+    return Each(
+        of="pending", when=when,
+        steps=(
+            call("generic{nu}.pull", when="coupled", y="pending.tau", x=x, y_0="body.tau"),
+        ),
+    )  # fmt: skip
+
+
 CARRIED = Pass(
     "carried", "body", "S, e and the columns of open rows carried across the hinge to the parent.",
     (
         Each(of="closings", steps=(Do(whole=ROW_CLOSED),)),
         Do(whole=HINGE_MOTION, when="own"),
         *FREE,
+        _efforts_of_couplings("pending.told", "!staged refined"),
         FREE_EFFORTS,
         *_ALONE,
         *_BY_STAGES,
@@ -271,6 +318,7 @@ ANSWERED = Pass(
         *only(
             "!staged",
             _pulled("pending.y", "hinge.g"),
+            _efforts_of_couplings("pending.x", "kept"),
             call("generic{free}.answer", **BODY, **_ACROSS, F="hinge.F", y="hinge.g",
                  delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
         ),
@@ -300,6 +348,7 @@ CLOSURES_ANSWERED = Pass(
         Each(of="rows", when="refined", steps=(Add(to="line.x", source="line.told"),)),
         *only(
             "kept",
+            _efforts_of_own("own.x", "!staged"),
             Copy(to="body.e"),
             Copy(to="body.delta", when="staged"),  # what has no mass asks for none
             EachSpeed(
@@ -312,4 +361,18 @@ CLOSURES_ANSWERED = Pass(
         ),
     ),
     skip="!cut",
+)  # fmt: skip
+
+COUPLINGS_ANSWERED = Pass(
+    "couplings_answered", "coupling",
+    "Multipliers of couplings, and the power that those feed in whose values go by time.",
+    (
+        Add(to="coupling.x", source="coupling.told", when="refined"),
+        *only(
+            "balance",
+            call("frames.speed_power", tau="coupling.x", u="coupling.still", P="local.P"),
+            Add(to="sums.power", source="local.P"),
+        ),
+    ),
+    skip="unmet",
 )  # fmt: skip

@@ -15,6 +15,7 @@ from .loops import (
     CLOSURES,
     CLOSURES_ANSWERED,
     CLOSURES_LOADED,
+    COUPLINGS_ANSWERED,
     RESTATED,
     ROW_CLOSED,
     ROW_FOUND,
@@ -83,6 +84,7 @@ ACCELERATIONS = Sweep(
         Run(whole=RECOVER, when="!linked !looped"),
         *(replace(run, when="looped") for run in _CLOSED),
         Run(whole=DRIVE_POWER, when="balance"),
+        Run(whole=COUPLINGS_ANSWERED, when="couplings"),
         Run(hook="product_compared", when="product"),
     ),
 )  # fmt: skip

@@ -175,8 +175,22 @@ pending.y | free | -H^T K
 pending.z | free | diag(d)^-1 L^-1 y
 pending.known | 1 | its known part
 pending.x | 1 | its multiplier
+pending.told | 1 | its multiplier in the answer before
+pending.tau | nu | -C: efforts of a multiplier of one on the speeds of the hinge
 before.y | free | -H^T K of another open row
 pair.L | 1 | entry of L of both
+own.tau | nu | -C of a coupling, on own speeds of a hinge that closes a loop
+own.inner | 6 | column of the coupling on the side of A
+own.outer | 6 | column of the coupling on the side of B
+own.known | 1 | its known part
+own.x | 1 | its multiplier
+own.told | 1 | its multiplier in the answer before
+coupling.x | 1 | multiplier of a coupling
+coupling.drift | 1 | its second rate while no speed that is free changes
+coupling.gap | 1 | its value
+coupling.slip | 1 | its rate
+coupling.still | 1 | its rate at rest, by what it is to equal
+coupling.told | 1 | its multiplier in the answer before
 drive.value | 1 | value of the drive
 drive.rate | 1 | its rate
 drive.acceleration | 1 | its acceleration
@@ -342,6 +356,9 @@ TRAITS: dict[str, str] = {
     "soft": "the row is that of a rotor",
     "refined": "what an answer before leaves over is answered, and added to it",
     "unmoved": "nothing moves the row in any position: code for one scene goes without it",
+    "couplings": "coordinates are coupled",
+    "unmet": "other rows do what the coupling asks",
+    "coupled": "the open row is a coupling of the hinge's speeds",
     "gaping": "a gap",
     "slipping": "a slip",
     "qr": "the sweep is that of least squares",

@@ -193,6 +193,7 @@ _DIRECTIONS = {
 #: Rows met one by one.
 _EACH = {
     "closings": "every row that closes on the body",
+    "own": "every coupling of its own speeds",
     "openings": "every row that closes on the body, the other way round",
     "pending": "every row that is open across the hinge",
     "before": "every open row up to this one",

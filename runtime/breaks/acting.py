@@ -69,6 +69,9 @@ def _all(scene: Scene) -> Iterator[Acting]:
             yield Acting(entry, f'load "{load.name}"')
     for spring in scene.spring:
         yield Acting(spring.law.effort, f'effort of spring "{spring.name}"', spring=spring)
+    for coupling in scene.coupling:
+        if coupling.equals is not None:
+            yield Acting(coupling.equals, f'coupling "{coupling.name}"', drive=True)
     for event in scene.event:
         yield Acting(event.when, f'event "{event.name}"', condition=True)
 

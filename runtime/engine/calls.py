@@ -99,7 +99,7 @@ class Calls:
         model.gravity = list(gravity)
         model.n_laws = model.n_drives = model.n_values = 0
         model.n_loads = model.n_forces = 0
-        model.needs_pose = int(bool(self.packed.system.closures))
+        model.needs_pose = int(self.packed.system.closes)
         model.product = self.ffi.NULL
         return type(self)(replace(self.packed, model=model))
 
@@ -238,6 +238,13 @@ class Calls:
                 "take a shorter step, or give the motion inertia (law.inertia) or a spring"
             )
         if reason == Failed.LOOP:
+            bodies = self.packed.system.count
+            if element >= bodies:
+                name = self.packed.system.couplings[element - bodies].name
+                return (
+                    f'coupling "{name}" {at}: it does not hold, and no state near makes it hold; '
+                    "see whether drives and other couplings ask for something else"
+                )
             return (
                 f'hinge "{self.hinge_name(element)}" {at}: the loop that it closes is open, and '
                 "no state near closes it; start from model.assemble(q, u), or see whether a drive "

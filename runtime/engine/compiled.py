@@ -49,7 +49,7 @@ class Compiled:
         self._fusing, self._product_accuracy = fusing, product_accuracy
         self.looped = Engine(pack(scene, known, product_accuracy, least_squares=least_squares))
         self.closed: Closed | None = None
-        if self.packed.system.closures:
+        if self.packed.system.closes:
             try:
                 self.closed = Closed(self.looped, len(self.free_speeds))
             except NumericalFailure as failure:

@@ -14,6 +14,7 @@ from mstmm.arrays import Array
 from mstmm.expression.drive import motion_at
 from mstmm.expression.expression import Expression, Name
 from mstmm.expression.slope import slopes
+from mstmm.scene.checks.closures import coordinate
 
 from .calls import Calls, Probe
 
@@ -109,8 +110,8 @@ def _of_hinge(where: str, hinge: Hinge) -> Iterator[tuple[str, Expression, Hinge
 def _with_values(
     engine: Calls, t: float, q: Array, u: Array
 ) -> Iterator[tuple[str, Expression, Callable[[Name], float]]]:
-    """Place and expression of every effort and load that the engine evaluates and that is no
-    constant, and what its names stand for at a state."""
+    """Place and expression of every effort, load and coupling that the engine evaluates and that is
+    no constant, and what its names stand for at a state."""
     evaluated, scene = engine.packed.model, engine.packed.described
     seen = _State(engine, t, q, u)
     for where, expression, own in _efforts(scene) if evaluated.n_values else ():
@@ -120,6 +121,11 @@ def _with_values(
         if not effort.is_constant:
             where = f'spring "{spring.name}": law.effort'
             yield where, effort, partial(seen.of_spring, own=spring)
+    for coupling in scene.coupling if evaluated.n_couplings else ():
+        where = f'coupling "{coupling.name}": '
+        yield f"{where}{coupling.key}", coupling.row, seen.of_coupling
+        if coupling.equals is not None:
+            yield f"{where}equals", coupling.equals, partial(seen.of, own=None)
 
 
 class _State:
@@ -141,6 +147,13 @@ class _State:
         index = name.index or 0
         values, first = (self.q, slots.q) if name.quantity == "q" else (self.u, slots.u)
         return float(values[first + index])
+
+    def of_coupling(self, name: Name) -> float:
+        """The coordinate or speed that a name in a coupling means."""
+        scene = self.engine.packed.described
+        number, quantity, entry = coordinate(scene, name)
+        slots = self.engine.packed.layout.hinges[scene.hinges.name(number)]
+        return float(self.q[slots.q + entry] if quantity == "q" else self.u[slots.u + entry])
 
     def of_spring(self, name: Name, own: Spring) -> float:
         """The same, where q and u alone are the spring's length and its rate."""

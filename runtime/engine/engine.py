@@ -11,6 +11,7 @@ from mstmm.arrays import Array
 from mstmm.border.failures import Failed
 from mstmm.errors import NumericalFailure, UndeterminedMotion
 
+from ..pack.loops.refusal import refuse_couplings
 from .calls import Calls
 from .culprit import culprit
 
@@ -111,6 +112,7 @@ class Engine(Calls):
         squares and with closed loops there is no factor to keep, and each column is a sweep at rest
         with its efforts.
         Without `memory` nothing is released."""
+        refuse_couplings(self.packed, "the solution with columns of efforts")
         engine = self.inertia_alone
         memory = engine.start_memory() if memory is None else memory
         if self.packed.qr or self.packed.system.closures:

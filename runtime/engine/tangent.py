@@ -17,6 +17,8 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
+from ..pack.loops.refusal import refuse_couplings
+
 if TYPE_CHECKING:
     from .engine import Engine
 
@@ -31,6 +33,7 @@ class Tangent:
     def __init__(self, engine: Engine, memory: Array | None = None) -> None:
         self.engine = engine
         packed, ffi = engine.packed, engine.ffi
+        refuse_couplings(packed, "the tangent of the equations")
         self.nq, self.nu = engine.nq, engine.nu
         self.state = np.zeros(self.nq), np.zeros(self.nu)
         slopes = packed.slopes()

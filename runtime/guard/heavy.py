@@ -27,7 +27,7 @@ _MOST = 2000
 
 def concerns(model: Compiled) -> bool:
     """Whether masses are so unlike that digits may be lost."""
-    if model.packed.qr or model.packed.system.closures:
+    if model.packed.qr or model.packed.system.closes:
         return False
     return len(model.scene.bodies) <= _MOST and _WORST * _unlike(model.scene) >= LOSS
 

@@ -25,6 +25,7 @@ from .frames import Frames
 from .laws import laws_of
 from .letting_go import releasable
 from .loops.closures import closures_of
+from .loops.couplings import couplings_of
 from .loops.opened import opened
 from .loops.unknown import refuse_unknown
 from .slots import layout_of
@@ -85,6 +86,7 @@ def system_of(
     laws = tuple(laws_of(nodes, tree, layout, values, remembered))
     loads = tuple(_load(frames, load, values) for load in nodes.load)
     held = _held(scene, laws[-1].next_twist if laws else remembered)
+    couplings, coupled = couplings_of(frames)
     system = System(
         layout.nq, layout.nu, held.first + len(held.start), nodes.gravity, runs,
         laws, loads, forces_of(frames, nodes, ports),
@@ -92,6 +94,7 @@ def system_of(
         drive_kernel([drive for _, _, drive in driven], layout, ports) if driven else None,
         tuple((place, k) for place, k, _ in driven), tuple(scene.channels.values()),
         held, by_time(nodes, nodes.channels), moving or {}, tuple(closures_of(frames, runs)),
+        couplings, coupled,
     )  # fmt: skip
     return system, frames
 

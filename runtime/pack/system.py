@@ -233,6 +233,32 @@ class ClosureNumbers:
     directions: tuple[int, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class CoupledHinge:
+    """A hinge that a coupling names: `place` of the body, or frame, whose inboard hinge it is,
+    places of the bodies on both sides (-1: the ground), and where the slopes of its coordinates'
+    rates begin among those of all curved hinges, -1 where these rates are its speeds."""
+
+    place: int
+    inboard: int
+    outboard: int
+    slopes: int
+
+
+@dataclass(frozen=True, slots=True)
+class CouplingNumbers:
+    """A row between coordinates of hinges, or `of_speeds`; its numbers are those of `coupled` from
+    `first` on.  `kept` is the value that it keeps, None while that is not known; `repeats` says
+    that other rows do what it asks, so that it has none."""
+
+    name: str
+    first: int
+    hinges: tuple[CoupledHinge, ...]
+    of_speeds: bool
+    kept: float | None
+    repeats: bool = False
+
+
 @dataclass(frozen=True)
 class System:
     """A scene in internal frames.
@@ -242,7 +268,7 @@ class System:
     whose numbers expressions read, of which some may be `held`; `by_time` says whether an
     effort or load names the time, or an input that does not stand still.  `moving` are the numbers
     in expressions that carry derivatives, by their places in the port "moving".  `closures` are the
-    hinges that close loops.
+    hinges that close loops; `coupled` gives the numbers of the `couplings` (pack/loops/couplings).
     """
 
     nq: int
@@ -261,6 +287,13 @@ class System:
     by_time: bool
     moving: Mapping[int, Any]
     closures: tuple[ClosureNumbers, ...] = ()
+    couplings: tuple[CouplingNumbers, ...] = ()
+    coupled: KernelIR | None = None
+
+    @property
+    def closes(self) -> bool:
+        """Whether anything closes but the tree."""
+        return bool(self.closures or self.couplings)
 
     def awake(self, place: int) -> System:
         """The same where the body at a place of the tree is none that is idle."""
@@ -284,9 +317,11 @@ class System:
 
     @property
     def steady(self) -> bool:
-        """Whether nothing goes by time: neither drive nor expression, nor an element that may."""
+        """Whether nothing goes by time: neither drive nor expression nor what a coupling equals,
+        nor an element that may."""
         own = any(force.element not in _BUILT_IN for force in self.forces)
-        return not (self.driven or self.timed or own)
+        coupled = self.coupled is not None and reads(self.coupled, "t")
+        return not (self.driven or self.timed or own or coupled)
 
     @property
     def timed(self) -> bool:

@@ -103,7 +103,7 @@ def pivot_loss(model: Compiled, run: Trajectory) -> PivotLoss | None:
     more than LARGEST bodies, and by least squares, which make no such difference."""
     if not len(run.t) or not model.nu or len(model.scene.bodies) > LARGEST or model.packed.qr:
         return None
-    if model.packed.system.closures:
+    if model.packed.system.closes:
         return None
     worst, pivots = PivotLoss(0.0, "", 0.0), _Pivots(model)
     count = int(np.clip(_WORK // len(pivots.parents), 1, SAMPLES))

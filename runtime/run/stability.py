@@ -134,7 +134,7 @@ def _explicit(engine: Engine, settings: Settings) -> Tableau | None:
     others = (*classical.METHODS, *second_opinion.METHODS)
     if settings.step is None or settings.method in others or engine.nu == 0:
         return None
-    if engine.packed.system.closures:
+    if engine.packed.system.closes:
         return None
     tableau = get(settings.method)
     return None if tableau.implicit else tableau

@@ -107,11 +107,12 @@ def fill_driven(scene: Mapping[str, Any] | Tree, q: Array, u: Array, t: float) -
 
 
 class _System:
-    """Rows and columns of the dense system."""
+    """Rows and columns of the dense system; behind the speeds multipliers of couplings."""
 
-    def __init__(self, tree: Tree) -> None:
+    def __init__(self, tree: Tree, couplings: int = 0) -> None:
         self.bodies, self.hinges = len(tree.bodies), len(tree.hinges)
-        size = 6 * self.bodies + 6 * self.hinges + tree.nu
+        self.behind = 6 * self.bodies + 6 * self.hinges + tree.nu
+        size = self.behind + couplings
         self.matrix, self.right = np.zeros((size, size)), np.zeros(size)
 
     def body(self, i: int) -> slice:
@@ -176,8 +177,9 @@ def solve(
     u: Array,
     t: float = 0.0,
     udot: Array | None = None,
+    coupled: tuple[Array, Array] | None = None,
 ) -> Accelerations:
-    """Accelerations and hinge wrenches at one state.
+    """Accelerations and hinge wrenches at one state; `coupled` are rows C udot + drift = 0.
 
     With `udot` given the motion is prescribed instead and `effort` is what it needs of every
     speed (inverse dynamics; laws do not enter).
@@ -185,7 +187,7 @@ def solve(
     tree = read(scene)
     q, u = np.array(q, float), np.array(u, float)
     fill_driven(tree, q, u, t)
-    at, system = motion(tree, q, u), _System(tree)
+    at, system = motion(tree, q, u), _System(tree, 0 if coupled is None else len(coupled[1]))
     _newton_euler(tree, at, system, laws.external_wrenches(tree, at, q, u, t))
     driven = _driven(tree, t)
     powers = []
@@ -198,7 +200,11 @@ def solve(
         system.matrix[rows, system.hinge(j)] = powers[-1]
         system.matrix[rows, rows] = np.diag(laws.reflected_inertia(hinge))
         system.right[rows] = laws.hinge_effort(tree, hinge, q, u, t)
-    start = system.matrix.shape[0] - tree.nu
+    start = system.behind - tree.nu
+    if coupled is not None:
+        system.matrix[start : system.behind, system.behind :] = coupled[0].T
+        system.matrix[system.behind :, start : system.behind] = coupled[0]
+        system.right[system.behind :] = -coupled[1]
     prescribed = driven if udot is None else dict(enumerate(udot))
     for i, value in prescribed.items():
         system.matrix[start + i] = 0.0
@@ -214,7 +220,7 @@ def _unpack(tree: Tree, system: _System, powers: list[Array]) -> Accelerations:
     wrenches = x[6 * n : 6 * (n + h)].reshape(h, 6)
     efforts = [power @ wrench for power, wrench in zip(powers, wrenches, strict=True)]
     return Accelerations(
-        udot=x[6 * (n + h) :],
+        udot=x[6 * (n + h) : system.behind],
         center=bodies[:, :3],
         angular=bodies[:, 3:],
         force=wrenches[:, :3],

@@ -20,8 +20,10 @@ static real *row_numbers(const mstmm_state *state, int row)
     return state->workspace + state->model->loops + MSTMM_ROW * (int64_t)row;
 }
 
+/* Is nothing asked of a row now? */
 static int let_go(const mstmm_state *state, const mstmm_loop_row *row)
 {
+    if (row->of_speeds && state->level == MSTMM_GAP) return 1;
     return row->release >= 0 && fabs(state->memory[row->release]) > 0;
 }
 
@@ -39,7 +41,7 @@ int mstmm_hook_rows_begun(mstmm_state *state)
         numbers[MSTMM_ROW_PIVOT] =
             let_go(state, row) ? (real)INFINITY : row->softness + state->give * row->mobility;
     }
-    return 0;
+    return model->n_couplings ? mstmm_couplings_begun(state) : 0;
 }
 
 int mstmm_hook_rows_asked(mstmm_state *state)
@@ -106,6 +108,9 @@ void mstmm_missing(const mstmm_state *state, real *missing)
         for (int c = 0; c < 6; c++)
             if (closure->rows[c] >= 0) missing[closure->rows[c]] = known[c];
     }
+    for (int k = 0; k < model->n_couplings; k++)
+        if (model->couplings[k].row >= 0)
+            missing[model->couplings[k].row] = mstmm_coupling_lack(state, &model->couplings[k]);
 }
 
 int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q, real *u,
@@ -151,7 +156,7 @@ void mstmm_unit_quaternions(int count, const int *first, real *q)
 
 /* Largest of what the rows lack that have a multiplier, and own speeds of hinges that close; where
  * `repeated`, of what the others lack: they say what some of these say, and follow by themselves.
- * *where is the frame of its hinge. */
+ * *where is the frame of its hinge, or the number of a coupling behind those of all bodies. */
 static real largest(const mstmm_state *state, int repeated, int *where)
 {
     const mstmm_model *model = state->model;
@@ -171,6 +176,15 @@ static real largest(const mstmm_state *state, int repeated, int *where)
             *where = i;
         }
     }
+    for (int k = 0; k < model->n_couplings; k++) {
+        const mstmm_coupling *one = &model->couplings[k];
+        const real lack = fabs(mstmm_coupling_lack(state, one));
+        const int counts =
+            one->row >= 0 && row_numbers(state, one->row)[MSTMM_ROW_INVERSE] > 0;
+        if (counts == repeated || lack <= found) continue;
+        found = lack;
+        *where = model->n_bodies + k;
+    }
     return found;
 }
 
@@ -188,7 +202,7 @@ static int looped_gaps(void *context, mstmm_gaps *found)
 {
     const looped_state *at = context;
     const mstmm_state state = {.model = at->model, .workspace = at->workspace,
-                               .memory = at->memory};
+                               .memory = at->memory, .level = MSTMM_GAP};
     int code = mstmm_correction(at->model, at->workspace, MSTMM_GAP, 0, at->t, at->q, at->u,
                                 at->memory, at->change, NULL, at->failure);
     if (code) return code;

@@ -131,7 +131,8 @@ typedef struct {
 /* A row whose column goes across the inboard hinge of a body; places behind `loops`. */
 typedef struct {
     int row;
-    int64_t column, onward, y; /* of its column here and on the parent, of -H^T K */
+    int64_t column, onward, y; /* of its column here and on the parent, of -H^T K - C */
+    int64_t tau;               /* of -C; -1: it is no coupling of this hinge's speeds */
     const int64_t *pairs;      /* of the entries of L with those up to this one */
 } mstmm_pending;
 
@@ -150,6 +151,7 @@ typedef struct {
     real floor;    /* largest pivot that is rounding */
     real mobility; /* of its ends, if they were free: scale of its pivot */
     real softness; /* 1 / inertia of a rotor on an own speed; 0: the row is met */
+    int of_speeds; /* nothing is asked of positions */
     int release;   /* place in memory that is non-zero once the row is let go; -1: never */
 } mstmm_loop_row;
 
@@ -162,11 +164,35 @@ typedef struct {
     int64_t numbers;            /* of its own */
 } mstmm_closure;
 
+/* A coupling of own speeds of a hinge that closes a loop: its row, and places of its columns on
+ * both sides and of -C. */
+typedef struct {
+    int row;
+    int64_t inner, outer, tau;
+} mstmm_own;
+
+/* A row between coordinates (-1: others do what it asks), or of speeds, of which nothing is asked of
+ * positions; from `numbers` on stand those of MSTMM_COUPLING, behind `loops`. */
+typedef struct {
+    int row, of_speeds;
+    real kept; /* value that it keeps */
+    int64_t numbers;
+} mstmm_coupling;
+
+/* A hinge in a coupling whose coordinates do not go by its speeds as they are: from `rates` on stand
+ * the derivatives of its coordinates' rates, by every speed and by every coordinate. */
+typedef struct {
+    int body;
+    int64_t rates;
+} mstmm_curved;
+
 /* What a body has to do with closed loops. */
 typedef struct {
     int first_row, n_rows; /* that close on it */
     int n_pending;
     const mstmm_pending *pending;
+    int n_own;
+    const mstmm_own *own;
     const mstmm_closure *closure; /* the body is the frame C of a hinge that closes a loop */
 } mstmm_looped;
 
@@ -221,6 +247,12 @@ typedef struct {
     int64_t loops_summed; /* so many of them are sums */
     int64_t answer;       /* and of nu numbers: an answer that is refined */
     int refines;          /* digits are lost behind heavy bodies: accelerations are refined once */
+    int n_couplings;
+    const mstmm_coupling *couplings;
+    int n_curved;
+    const mstmm_curved *curved;
+    const mstmm_tape *coupling_tape; /* t, q, u, qdot, rates of curved hinges -> their numbers */
+    int64_t coupling_numbers, curved_rates; /* first of either behind `loops` */
     real loops_apart;     /* gap (m, rad) at which rows that repeat others do so no longer */
     int needs_pose; /* loads or forces that need poses and velocities */
     int64_t workspace; /* numbers of workspace */

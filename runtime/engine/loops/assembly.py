@@ -112,8 +112,8 @@ class Assembly:
             row = int(np.abs(missing).argmax())
             raise SceneError(
                 f"scene: the speeds given for {self._names()} contradict each other by "
-                f"{abs(missing[row]):.3g} {self._unit(row)}/s where {self._hinge(row)} closes a "
-                "loop; give fewer of them, or others"
+                f"{self._amount(row, missing, '.3g', '/s')} {self._where(row)}; "
+                "give fewer of them, or others"
             )
         return u
 
@@ -154,8 +154,8 @@ class Assembly:
         return float(np.abs(missing).max(initial=0.0))
 
     def _weighted(self) -> Array:
-        """The same for all gaps and for all angles: the mean mobility of their kind, so that the
-        least gap is that of the geometry."""
+        """The same for all gaps, for all angles and for all couplings: the mean mobility of their
+        kind, so that the least gap is that of the geometry."""
         calls = self.calls
         turning = np.zeros(calls.count, bool)
         for one in calls.records.closures:
@@ -163,8 +163,10 @@ class Assembly:
             for direction, row in one.rows.items():
                 force, moment = directions[direction, :3], directions[direction, 3:]
                 turning[row] = moment @ moment > force @ force
+        coupling = np.zeros(calls.count, bool)
+        coupling[[one.row for one in calls.records.couplings]] = True
         weights, self._turning = np.ones(calls.count), turning
-        for kind in (turning, ~turning):
+        for kind in (turning, coupling, ~(turning | coupling)):
             if kind.any():
                 weights[kind] = 1.0 / calls.mobility[kind].mean()
         for row in range(calls.count):
@@ -177,18 +179,39 @@ class Assembly:
         row = int(np.abs(missing).argmax())
         while_held = f" with {self._names()} held" if self.held else ""
         return (
-            f"scene: the loop that {self._hinge(row)} closes stays open: the nearest pose leaves "
-            f"{abs(missing[row]):.7g} {self._unit(row)}{while_held}; correct the lengths, or start "
-            "nearer to where it closes"
+            f"scene: {self._subject(row)}: the nearest pose leaves "
+            f"{self._amount(row, missing, '.7g')}{while_held}; {self._remedy(row)}"
         )
 
     def _names(self) -> str:
         return ", ".join(f'"{name}"' for name in self.held) or "driven hinges"
 
     def _hinge(self, row: int) -> str:
-        closures = self.calls.records.closures
-        frame = next(one.frame for one in closures if row in one.rows.values())
-        return f'hinge "{self.calls.engine.hinge_name(frame)}"'
+        """The hinge whose row it is; "" for a row of a coupling."""
+        for one in self.calls.records.closures:
+            if row in one.rows.values():
+                return f'hinge "{self.calls.engine.hinge_name(one.frame)}"'
+        return ""
 
-    def _unit(self, row: int) -> str:
-        return "rad" if self._turning[row] else "m"
+    def _coupling(self, row: int) -> str:
+        found = (one for one in self.calls.records.couplings if one.row == row)
+        return f'coupling "{next(found).coupling.name}"'
+
+    def _where(self, row: int) -> str:
+        hinge = self._hinge(row)
+        return f"where {hinge} closes a loop" if hinge else f"in {self._coupling(row)}"
+
+    def _subject(self, row: int) -> str:
+        hinge = self._hinge(row)
+        if hinge:
+            return f"the loop that {hinge} closes stays open"
+        return f"{self._coupling(row)} cannot hold"
+
+    def _remedy(self, row: int) -> str:
+        if self._hinge(row):
+            return "correct the lengths, or start nearer to where it closes"
+        return "leave it or another coupling out, or correct what they equal"
+
+    def _amount(self, row: int, missing: Array, digits: str, per: str = "") -> str:
+        unit = f" {'rad' if self._turning[row] else 'm'}{per}" if self._hinge(row) else ""
+        return f"{abs(missing[row]):{digits}}{unit}"

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.ir.structure import Key
 
-from ...pack.records.loops import WrittenClosure
-from ...pack.system import Numbers
 from ..engine import Engine
+from .mobility import mobilities
+from .numbers import LoopNumbers
 
 #: A pivot below this share of its usual size is rounding, which is the mobility of its row but for
 #: rows that only heavy bodies answer.
@@ -20,7 +19,7 @@ ROUNDING, _ANSWERED = 1e-8, 1e-3
 _NOISE, _LEAST = 1e-12, 1e-15
 
 
-class LoopCalls:
+class LoopCalls(LoopNumbers):
     """Gaps and slips of the loops of one packed scene, and what corrects them.
 
     Every row is given the mobility of its ends at `q` (nq,), if they were free: the scale by which
@@ -28,16 +27,14 @@ class LoopCalls:
     """
 
     def __init__(self, engine: Engine, q: Array, mobility: Array | None = None) -> None:
-        records = engine.packed.written.loops
-        assert records is not None
-        self.engine, self.records, self.model = engine, records, engine.packed.model
-        self.count = records.count
+        super().__init__(engine)
+        records, self.model = self.records, engine.packed.model
         self.memory = engine.start_memory()
         quaternions = np.append(engine.packed.layout.quaternions, 0).astype(np.int32)
         self._quaternions = quaternions
         self.mobility = np.ones(self.count)
         self.correction(self.gap, q, np.zeros(engine.nu))
-        self.mobility = self._mobilities() if mobility is None else mobility
+        self.mobility = mobilities(self) if mobility is None else mobility
         for row, scale in enumerate(self.mobility.tolist()):
             records.scale(row, scale)
             records.judge(row, records.floor(row) or ROUNDING * scale)
@@ -102,14 +99,6 @@ class LoopCalls:
             raise engine.failed(failure, t, q, u)
         return q, u
 
-    def inverses(self) -> Array:
-        """1 / pivot of every row in the last correction, 0 for rows without a multiplier."""
-        return self._of_rows("INVERSE")
-
-    def pivots(self) -> Array:
-        """The pivots of the rows in the last correction."""
-        return self._of_rows("PIVOT")
-
     def judge_by(self, states: Sequence[Array]) -> None:
         """Take the largest pivots at these closed states (nq,) for the usual ones, where they are
         far below the mobilities: honest rows, behind which heavy bodies hang."""
@@ -124,55 +113,3 @@ class LoopCalls:
             heavy = 0.0 < pivot < _ANSWERED * mobility and not self.records.yields(row)
             floor = max(ROUNDING * pivot, _LEAST * mobility) if heavy else floors[row]
             self.records.judge(row, min(floor, floors[row]))
-
-    def _of_rows(self, name: str) -> Array:
-        lib, stride = self.engine.lib, int(self.engine.lib.MSTMM_ROW)
-        first = self.records.place + int(getattr(lib, f"MSTMM_ROW_{name}"))
-        return self.engine.workspace_array()[first : first + stride * self.count : stride].copy()
-
-    def numbers_of(self, one: WrittenClosure, name: str) -> Array:
-        """Numbers of a closure after a correction: W, J_A or J_B, 6 rows of 6."""
-        at = self.records.place + one.numbers
-        at += int(getattr(self.engine.lib, f"MSTMM_CLOSURE_{name}"))
-        return self.engine.workspace_array()[at : at + 36].reshape(6, 6).copy()
-
-    def _mobilities(self) -> Array:
-        """J M^-1 J^T of both ends, bodies taken as free; of what has no mass that of the others."""
-        found, masses = np.zeros(self.count), _Masses(self.engine)
-        for one in self.records.closures:
-            for body, name in ((one.inboard, "J_A"), (one.outboard, "J_B")):
-                if body >= 0:
-                    columns, inverse = self.numbers_of(one, name), masses.inverse(body)
-                    for direction, row in one.rows.items():
-                        column = columns[direction]
-                        found[row] += column @ inverse @ column
-        known = found[found > 0]
-        found[~(found > 0)] = known.mean() if len(known) else 1.0
-        return found
-
-
-class _Masses:
-    """Inverse mass matrices of bodies alone, about their input ends, once for all alike."""
-
-    def __init__(self, engine: Engine) -> None:
-        self.engine, self.which = engine, engine.packed.system.which
-        self.distinct = list(engine.packed.system.distinct)
-        self.known: dict[tuple[Key, Numbers], Array] = {}
-
-    def inverse(self, body: int) -> Array:
-        one = self.distinct[int(self.which[body])]
-        kind = one.body, one.body_p
-        if kind not in self.known:
-            self.known[kind] = self._inverted(*kind)
-        return self.known[kind]
-
-    def _inverted(self, body: Key, numbers: Numbers) -> Array:
-        upper, engine = np.zeros(21), self.engine
-        function = engine.packed.elements[body].functions["inertia"]
-        call = engine.ffi.cast("int (*)(const double *, double *)", function)
-        call(list(numbers), engine.ffi.from_buffer("double[]", upper))
-        matrix = np.zeros((6, 6))
-        matrix[np.triu_indices(6)] = upper
-        whole = matrix + np.triu(matrix, 1).T
-        inverse = np.linalg.pinv(whole, rcond=1e-12, hermitian=True)
-        return np.asarray(inverse, dtype=np.float64)

@@ -10,7 +10,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
-from ...pack.loops.variants import LOCKED, length_of, without
+from ...pack.loops.variants import LOCKED, keeping, length_of, without
 from ...pack.pack import packed_system
 from ...pack.start import start_values
 from ..engine import Engine
@@ -22,6 +22,8 @@ from .stress import outboard_axes
 
 #: Directions of a hinge that closes a loop, as its rows are called.
 _DIRECTIONS = ("x", "y", "z", "mx", "my", "mz")
+#: The row of a coupling of coordinates, and of one of speeds.
+_COUPLED = ("expression", "speeds")
 #: Gaps at which it may still be that rows repeat others but for a misfit, in parts of the length of
 #: the scene.
 _NEARLY = 1e-2
@@ -95,6 +97,7 @@ class Closed:
         q, u = calls.driven(q, u)
         length = length_of(packed.system)
         near = Assembly(engine, q, holds).positions(q, _NEARLY * length)
+        self._keep(near)
         self.loops, repeating = self._judged(near, free_speeds)
         self._refuse_structure()
         self.start = self.assembled(near, u, holds, self.fast)
@@ -111,6 +114,13 @@ class Closed:
         q = Assembly(self.engine, q, holds).positions(q)
         return q, Assembly(self.engine, q, fast).speeds(q, u)
 
+    def _keep(self, q: Array) -> None:
+        """Couplings without a value keep what they have at q."""
+        packed = self.engine.packed
+        if any(one.kept is None for one in packed.system.couplings):
+            values = LoopCalls(self.engine, q).values()
+            self.engine = Engine(packed_system(keeping(packed.system, values.tolist()), packed))
+
     def _judged(self, q: Array, free_speeds: int) -> tuple[Loops, dict[int, tuple[str, str]]]:
         """What closes near q, and the rows that always repeat others."""
         rank, calls = rank_at(self.engine, q), LoopCalls(self.engine, q)
@@ -118,17 +128,19 @@ class Closed:
         names = self._names(calls)
         met = [row for row in range(calls.count) if not records.yields(row)]
         rows = len(met) - len(rank.here)
+        couplings = {one.coupling.name for one in records.couplings if one.row in rank.going}
+        repeated = {
+            (one.frame, direction)
+            for one in records.closures
+            for direction, row in one.rows.items() if row in rank.going
+        }  # fmt: skip
+        left = without(packed.system, repeated, couplings)
         if packed.releases:
             # What repeats others now may be needed once these let go: by every evaluation.
             for row in rank.going:
                 records.judge(row, REPEATED * float(calls.mobility[row]))
         elif rank.going:
-            repeated = {
-                (one.frame, direction)
-                for one in records.closures
-                for direction, row in one.rows.items() if row in rank.going
-            }  # fmt: skip
-            self.engine = Engine(packed_system(without(packed.system, repeated), packed))
+            self.engine = Engine(packed_system(left, packed))
             calls = LoopCalls(self.engine, q)
             records = calls.records
         calls.judge_by(rank.states)
@@ -145,8 +157,9 @@ class Closed:
         packed = self.engine.packed
         if self.loops.mobility > 0 or packed.system.driven or packed.releases:
             return
-        cut = ", ".join(f'"{name}"' for name in self.loops.cut[:_NAMED])
-        more = " ..." if len(self.loops.cut) > _NAMED else ""
+        closing = [*self.loops.cut, *(one.name for one in packed.described.coupling)]
+        cut = ", ".join(f'"{name}"' for name in closing[:_NAMED])
+        more = " ..." if len(closing) > _NAMED else ""
         raise SceneError(
             f"scene: no freedom is left with the loops closed that end at {cut}{more}: a "
             "structure; take a hinge with more coordinates, or a [[spring]] in place of one of them"
@@ -158,8 +171,16 @@ class Closed:
         """SceneError where a row that repeats others leaves a gap that they do not close."""
         q, u = self.start
         missing = np.abs(calls.correction(calls.gap, q, np.zeros(len(u)))[1])
+        slips = np.abs(calls.correction(calls.slip, q, u)[1])
+        of_couplings = [one.row for one in calls.records.couplings]
+        missing[of_couplings] = np.maximum(missing, slips)[of_couplings]
         for row, (hinge, direction) in repeating.items():
             if missing[row] > much:
+                if direction in _COUPLED:
+                    raise SceneError(
+                        f'scene: coupling "{hinge}" contradicts what others ask, by '
+                        f"{missing[row]:.3g} at the start; leave it out, or correct what it equals"
+                    )
                 raise SceneError(
                     f'scene: direction {direction} of hinge "{hinge}" repeats what other hinges '
                     f"do, but for a gap of {missing[row]:.3g}: as a rigid mechanism it would lock; "
@@ -183,6 +204,10 @@ class Closed:
             words = dict(zip(held, _words(np.abs(W.reshape(-1, 6))), strict=True))
             for direction, row in one.rows.items():
                 names[row] = (hinge, words.get(direction, f"u{direction + 1}"))
+        for coupling in calls.records.couplings:
+            names[coupling.row] = (
+                coupling.coupling.name, _COUPLED[coupling.coupling.of_speeds]
+            )  # fmt: skip
         return names
 
 

@@ -33,7 +33,7 @@ def opened(scene: Scene) -> tuple[Scene, tuple[Cut, ...]]:
         return scene, ()
     refuse_unknown(scene)
     plan = build(scene).plan
-    if plan is None:
+    if plan is None or not plan.cut:
         return scene, ()
     tables, bodies, cuts = list(scene.hinge), list(scene.body), []
     for number in plan.cut:

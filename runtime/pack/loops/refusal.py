@@ -18,7 +18,7 @@ INSTEAD = "accelerations and simulate with dop853, dopri5 or rk4 do"
 
 def refuse(packed: Packed, what: str, instead: str) -> None:
     """SceneError where loops are closed, which `what` cannot follow; `instead` does."""
-    if not packed.system.closures:
+    if not packed.system.closes:
         return
     plan = build(packed.described).plan
     assert plan is not None
@@ -26,6 +26,15 @@ def refuse(packed: Packed, what: str, instead: str) -> None:
         f"scene: {named_loop(packed.described, plan)} is closed, and {what} cannot follow that "
         f"yet; {instead}"
     )
+
+
+def refuse_couplings(packed: Packed, what: str) -> None:
+    """SceneError where coordinates are coupled, which `what` cannot follow."""
+    for one in packed.system.couplings[:1]:
+        raise SceneError(
+            f'scene: loop of coupling "{one.name}" is closed, and {what} cannot follow that yet; '
+            f"{INSTEAD}"
+        )
 
 
 #: Methods that take increments of loads or an exponential of the whole motion, which closed loops

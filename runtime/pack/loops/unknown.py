@@ -25,12 +25,11 @@ def may_close(scene: Scene) -> bool:
 
 def refuse_unknown(scene: Scene) -> None:
     """SceneError for what closes loops and is read and checked, but not compiled yet."""
-    for table in ("constraint", "coupling"):
-        if getattr(scene, table):
-            raise SceneError(
-                f'scene: {table} "{getattr(scene, table)[0].name}" is read and checked, but not '
-                "compiled yet; a hinge that closes the loop is, or put a stiff [[spring]] there"
-            )
+    if scene.constraint:
+        raise SceneError(
+            f'scene: constraint "{scene.constraint[0].name}" is read and checked, but not '
+            "compiled yet; a hinge that closes the loop is, or put a stiff [[spring]] there"
+        )
     if (scene.beam or scene.elastic) and may_close(scene):
         plan = build(scene.skeleton).plan
         assert plan is not None
@@ -41,7 +40,9 @@ def refuse_unknown(scene: Scene) -> None:
 
 
 def named_loop(scene: SceneTables, plan: Plan) -> str:
-    """The first loop by its hinges."""
+    """The first loop by its hinges, or the first coupling where no hinge closes one."""
+    if not plan.cut:
+        return f'loop of coupling "{scene.coupling[0].name}"'
     around = plan.loop(plan.cut[0])
     names = " - ".join(scene.hinges.name(hinge) for hinge in around[:_NAMED])
     return f'loop "{names}{" ..." if len(around) > _NAMED else ""}"'

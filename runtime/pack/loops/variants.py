@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -42,13 +42,28 @@ def _closure_held(one: ClosureNumbers, speeds: int) -> ClosureNumbers:
     return replace(one, directions=(*range(speeds), *others))
 
 
-def without(system: System, rows: Collection[tuple[int, int]]) -> System:
-    """Without some rows, each given by the place of its closure's frame and its direction."""
+def keeping(system: System, values: Sequence[float]) -> System:
+    """With couplings whose values were not known keeping these, of all couplings in their order."""
+    couplings = tuple(
+        replace(one, kept=float(value)) if one.kept is None else one
+        for one, value in zip(system.couplings, values, strict=True)
+    )
+    return replace(system, couplings=couplings)
+
+
+def without(
+    system: System, rows: Collection[tuple[int, int]], couplings: Collection[str] = ()
+) -> System:
+    """Without some rows, each given by the place of its closure's frame and its direction, and
+    those of some couplings by their names."""
     closures = tuple(
         replace(one, directions=tuple(k for k in one.directions if (one.frame, k) not in rows))
         for one in system.closures
     )
-    return replace(system, closures=closures)
+    left = tuple(
+        replace(one, repeats=one.repeats or one.name in couplings) for one in system.couplings
+    )
+    return replace(system, closures=closures, couplings=left)
 
 
 def undriven(system: System) -> System:

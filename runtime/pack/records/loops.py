@@ -10,6 +10,7 @@ from mstmm.graph.mechanism import GROUND, Rows
 from ..loops.rows import RowPlan, planned
 from ..loops.variants import LOCKED, length_of
 from ..system import ClosureNumbers, System
+from .couplings import WrittenCoupling, attach_couplings, placed
 from .memory import Memory
 
 
@@ -29,9 +30,14 @@ class LoopRecords:
     """Closed loops in the memory of C; `place` is where their numbers begin in the workspace."""
 
     def __init__(
-        self, place: int, plan: RowPlan, rows: Any, closures: tuple[WrittenClosure, ...]
+        self,
+        place: int,
+        plan: RowPlan,
+        rows: Any,
+        closures: tuple[WrittenClosure, ...],
+        couplings: tuple[WrittenCoupling, ...],
     ) -> None:
-        self.place, self.closures, self._rows = place, closures, rows
+        self.place, self.closures, self.couplings, self._rows = place, closures, couplings, rows
         self.count = len(plan.rows)
         self.width = max(map(len, plan.pending.values()), default=0)
 
@@ -52,6 +58,8 @@ class LoopRecords:
         for mine, theirs in zip(self.closures, other.closures, strict=True):
             for direction in mine.rows.keys() & theirs.rows.keys():
                 self.judge(mine.rows[direction], other.floor(theirs.rows[direction]))
+        for one, same in zip(self.couplings, other.couplings, strict=True):
+            self.judge(one.row, other.floor(same.row))
 
     def floor(self, row: int) -> float:
         """Up to where pivots of a row are rounding."""
@@ -68,7 +76,7 @@ def attach_loops(
 ) -> tuple[int, LoopRecords | None]:
     """Give the model the rows of its loops and a place for them in the workspace; returns the place
     behind them, and the records."""
-    if not system.closures:
+    if not system.closes:
         return place, None
     return _Loops(model, system, memory, lib).write(place)
 
@@ -87,7 +95,8 @@ class _Shelf:
 
 class _Loops:
     """Numbers of loops lie behind the place that the model names, in this order: rows, a dump for
-    columns on the ground, entries of L, columns, then what is no sum: y of the columns, closures.
+    columns on the ground, entries of L, columns, then what is no sum: couplings, y of the columns,
+    closures.
     """
 
     def __init__(self, model: Any, system: System, memory: Memory, lib: Any) -> None:
@@ -97,6 +106,10 @@ class _Loops:
             Rows((self.parents[one.frame], one.outboard), len(one.directions))
             for one in system.closures
         ]
+        groups += [
+            Rows(tuple(end for hinge in one.hinges for end in (hinge.inboard, hinge.outboard)), 1)
+            for one in system.couplings if not one.repeats
+        ]  # fmt: skip
         self.plan: RowPlan = planned(self.parents, groups)
         self.row_numbers = int(lib.MSTMM_ROW)
         count = len(self.plan.rows)
@@ -124,6 +137,13 @@ class _Loops:
     def write(self, place: int) -> tuple[int, LoopRecords]:
         model, memory = self.model, self.memory
         looped = memory.new("mstmm_looped[]", self.system.count)
+        behind = self.plan.of[len(self.system.closures) :]
+        couplings = placed(model, self.system, [rows[0] for rows in behind], self._take)
+        self.coupled = {
+            (hinge, one.row): at
+            for one in couplings if one.row >= 0
+            for hinge, at in one.columns.items()
+        }  # fmt: skip
         for body, rows in self.pending:
             looped[body].n_pending = len(rows)
             looped[body].pending = self._pending(body, rows)
@@ -144,11 +164,14 @@ class _Loops:
         for group, closure in enumerate(self.system.closures):
             looped[closure.frame].closure, told = self._closure(group, closure, records)
             written.append(told)
+        attach_couplings(model, self.system, memory, couplings, records, looped, self._side)
         model.looped, model.rows, model.n_rows = looped, records, len(self.plan.rows)
         model.loops, model.loops_summed = place, self.summed
         model.answer = place + self._take(self.system.nu)
         model.loops_apart = LOCKED * length_of(self.system)
-        return place + self.end, LoopRecords(place, self.plan, records, tuple(written))
+        return place + self.end, LoopRecords(
+            place, self.plan, records, tuple(written), tuple(c for c in couplings if c.row >= 0)
+        )
 
     def _take(self, count: int) -> int:
         first = self.end
@@ -178,6 +201,7 @@ class _Loops:
             records[k].column = self.columns[body, row]
             records[k].onward = self._column(self.parents[body], row)
             records[k].y = self._take(speeds)
+            records[k].tau = self.coupled.get((body, row), -1)
             records[k].pairs = self._places([self._entry(row, other) for other in rows[: k + 1]])
         return records
 
@@ -203,11 +227,8 @@ class _Loops:
         for k, direction in enumerate(closure.directions):
             row = self.plan.of[group][k]
             record.rows[direction] = own[direction] = row
-            sides = (inboard, closure.outboard)
-            inner, outer = (
-                self.dump if side == GROUND else self._column(side, row) for side in sides
-            )
-            record.inner[direction], record.outer[direction] = inner, outer
+            record.inner[direction] = self._side(inboard, row)
+            record.outer[direction] = self._side(closure.outboard, row)
             if direction >= body.nu:
                 continue
             if body.imposed[direction]:
@@ -216,3 +237,7 @@ class _Loops:
                 rows[row].softness = 1.0 / body.rotor[direction]
         told = WrittenClosure(closure.frame, inboard, closure.outboard, record.numbers, own)
         return record, told
+
+    def _side(self, body: int, row: int) -> int:
+        """Place of a row's column on a body, a dump on the ground."""
+        return self.dump if body == GROUND else self._column(body, row)

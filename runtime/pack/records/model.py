@@ -71,7 +71,7 @@ def write(system: System, elements: Elements) -> Written:
         _force(record, force, elements, memory)
         record.own = int(own)
     model.forces, model.n_forces = forces, len(system.forces)
-    model.needs_pose = int(bool(system.forces or system.loads or system.dragged or system.closures))
+    model.needs_pose = int(bool(system.forces or system.loads or system.dragged or system.closes))
     model.inputs = write_inputs(system.inputs, system.held.places, memory)
     model.n_inputs = len(system.inputs)
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)

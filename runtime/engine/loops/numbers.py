@@ -1,0 +1,49 @@
+"""What the last correction of closed loops has left in the workspace."""
+
+from __future__ import annotations
+
+from mstmm.arrays import Array
+
+from ...pack.records.couplings import WrittenCoupling
+from ...pack.records.loops import WrittenClosure
+from ..engine import Engine
+
+
+class LoopNumbers:
+    """Numbers of rows, closures and couplings of one packed scene."""
+
+    def __init__(self, engine: Engine) -> None:
+        records = engine.packed.written.loops
+        assert records is not None
+        self.engine, self.records = engine, records
+        self.count = records.count
+
+    def inverses(self) -> Array:
+        """1 / pivot of every row in the last correction, 0 for rows without a multiplier."""
+        return self._of_rows("INVERSE")
+
+    def pivots(self) -> Array:
+        """The pivots of the rows in the last correction."""
+        return self._of_rows("PIVOT")
+
+    def _of_rows(self, name: str) -> Array:
+        lib, stride = self.engine.lib, int(self.engine.lib.MSTMM_ROW)
+        first = self.records.place + int(getattr(lib, f"MSTMM_ROW_{name}"))
+        return self.engine.workspace_array()[first : first + stride * self.count : stride].copy()
+
+    def values(self) -> Array:
+        """The values of couplings in the last correction of gaps."""
+        first = self.records.place + int(self.engine.lib.MSTMM_COUPLING_GAP)
+        places = [first + one.numbers for one in self.records.couplings]
+        return self.engine.workspace_array()[places]
+
+    def slopes_of(self, one: WrittenCoupling, place: int) -> Array:
+        """-C of a coupling (nu,) on the speeds of one of its hinges, after a correction."""
+        at = self.records.place + one.columns[place]
+        return self.engine.workspace_array()[at : at + self.engine.packed.system.body(place).nu]
+
+    def numbers_of(self, one: WrittenClosure, name: str) -> Array:
+        """Numbers of a closure after a correction: W, J_A or J_B, 6 rows of 6."""
+        at = self.records.place + one.numbers
+        at += int(getattr(self.engine.lib, f"MSTMM_CLOSURE_{name}"))
+        return self.engine.workspace_array()[at : at + 36].reshape(6, 6).copy()
