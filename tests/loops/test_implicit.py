@@ -174,3 +174,34 @@ def test_fastest_motion() -> None:
     ]  # fmt: skip
     whole = np.block([[np.zeros((n, n)), np.eye(n)], columns])
     assert found == pytest.approx(np.abs(np.linalg.eigvals(whole)).max(), rel=1e-3)
+
+
+def test_a_drive_that_lets_go_where_the_loop_closes() -> None:
+    """Its row has a multiplier before the release, the hinge's speed is unknown behind it."""
+    scene = linkage("closing_pin", False)
+    closing = scene["hinge"][3]
+    closing["drive"] = f"{closing.pop('initial')['q']!r} + 0.3*t"
+    del scene["hinge"][0]["initial"]["u"]
+    scene["event"] = [{"name": "go", "when": "t > 0.2", "do": "release", "hinge": "closing_pin"}]
+    model = mstmm.compile(mstmm.Scene(**scene))
+    wanted = model.simulate(0.6, rtol=1e-10, output_times=[0.0, 0.6])
+    for method, much in (("rodas5p", 1e-8), ("kvaerno5", 1e-6)):
+        result = model.simulate(0.6, method, rtol=1e-8, output_times=[0.0, 0.6])
+        assert result.success, result.message
+        assert np.abs(result.q[-1] - wanted.q[-1]).max() < much
+
+
+def test_sessions_and_batches() -> None:
+    """Ticks of a session are the fixed steps of one run, a batch has what runs alone have."""
+    model = mstmm.compile(mstmm.Scene(**bushed(1e6)))
+    session = model.session(method="genalpha", step=1e-3)
+    for _ in range(4):
+        session.advance(0.02)
+    alone = model.simulate(0.08, "genalpha", step=1e-3, output_times=[0.0, 0.08])
+    assert np.array_equal(session.q, alone.q[-1])
+    q, u = model.initial_state()
+    starts = np.array([q, q]), np.array([u, u])
+    batch = model.simulate_batch(starts, t_end=0.05, method="rodas4p2", rtol=1e-6)
+    assert batch.success.all()
+    run = model.simulate(0.05, "rodas4p2", rtol=1e-6, initial=(q, u), output_times=[0.0, 0.05])
+    assert np.abs(batch.q[0, -1] - run.q[-1]).max() < 1e-12
