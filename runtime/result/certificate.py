@@ -10,6 +10,7 @@ from mstmm.risk import Risk, sentences
 from ..integrate.reached import ReachedError
 from ..run.error_estimate import ANGLE, PART, ErrorEstimate
 from ..run.stability import StepCheck
+from .closure import Closure
 from .conditioning import LARGEST, PivotLoss, SingularDistance
 from .control import Control
 from .evidence import Drift, Give
@@ -47,6 +48,7 @@ class Certificate:
         models: where models of the scene are outside their range whatever the run.
         known: of the scene and its start before the run, and what the run itself has seen.
         reached: of the error that was asked for (error=...); None where none was.
+        closure: how well loops stayed closed, and what of their loads is open; None for trees.
         control: of the steps, which says how well balances can be expected to be kept.
     """
 
@@ -71,6 +73,7 @@ class Certificate:
     models: tuple[Risk, ...] = ()
     known: tuple[Risk, ...] = ()
     reached: ReachedError | None = None
+    closure: Closure | None = None
 
     def verdict(self, accuracy: float = ACCURACY, balance: float | None = None) -> Verdict:
         """May the numbers be used?  Within `accuracy` (error in rad; of coordinates that are no
@@ -127,6 +130,8 @@ class Certificate:
             rows += [(d.name, str(d)) for d in self.momentum]
         if self.quaternion_residual:
             rows.append(("quaternion length", f"within {self.quaternion_residual:.1e} of 1"))
+        if self.closure is not None:
+            rows.append(("closed loops", str(self.closure)))
         if self.pivot is not None:
             rows.append(("pivot ratio", f'{self.pivot.ratio:.1e} at hinge "{self.pivot.hinge}"'))
         elif self.too_large:

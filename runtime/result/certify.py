@@ -9,6 +9,7 @@ from ..run.stability import StepCheck, check_later
 from . import gives
 from .balances import energy, momentum
 from .certificate import Certificate
+from .closure import closure
 from .conditioning import LARGEST, pivot_loss, singular_distance
 from .control import control
 from .flexible import certify
@@ -44,4 +45,5 @@ def certificate(result: Record, error: ErrorEstimate | None, step: StepCheck | N
         models=result._outside(),
         known=(*run.risks, *passed_over(result.model, run), *of_outputs(run, result.outputs())),
         reached=run.reached,
+        closure=closure(result.model, run),
     )

@@ -186,14 +186,15 @@ def _among(t: Array, times: Array) -> NDArray[np.bool_]:
 
 
 def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Array, float]:
-    """Samples (n, n_state) with unit quaternions and exact driven coordinates.
+    """Samples (n, n_state) with unit quaternions, exact driven coordinates and closed loops.
 
-    Between steps the samples are the method's dense output, which meets both only within the
+    Between steps the samples are the method's dense output, which meets these only within the
     tolerance.  Also returns the largest distance of a quaternion's length from 1.
     """
     engine, y, residual = system.engine, y.copy(), 0.0
     quaternions = engine.packed.layout.quaternions
-    if not len(quaternions) and not engine.packed.system.driven:
+    settles = bool(engine.packed.system.driven or engine.packed.system.closures)
+    if not len(quaternions) and not settles:
         return y, residual
     entries = quaternions[:, None] + np.arange(4) if len(quaternions) else quaternions
     rows = max(1, _QUATERNIONS // max(1, len(entries)))
@@ -203,7 +204,7 @@ def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Arr
         residual = max(residual, float(np.max(np.abs(lengths - 1), initial=0.0)))
         with np.errstate(invalid="ignore"):  # a quaternion of zeros is named by the run itself
             some[:, entries] /= lengths[:, :, None]
-    if engine.packed.system.driven:
+    if settles:
         times, known = np.ascontiguousarray(t), memory.copy()
         engine.lib.mstmm_scene_settle_many(
             system.run, len(y), y.shape[1], engine.pointer(times), engine.pointer(known),

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import mstmm
+from mstmm.runtime.result.result import Result
 
 from .linkages import bricard, four_bar
 from .test_nearest import gap
@@ -45,6 +48,13 @@ def test_a_bricard_ring_stays_closed() -> None:
     assert min(np.abs(c + s + sign * c * s).max() for sign in (1, -1)) < 1e-8
     energy = result.energy()
     assert np.abs(energy - energy[0]).max() < 1e-5
+    certificate = result.certificate
+    assert certificate.closure is not None
+    assert certificate.closure.gap < 1e-12 and certificate.closure.slip < 1e-11
+    assert "loads left open: " in str(certificate)
+    opened = replace(result.trajectory, q=result.q + 1e-3 * np.eye(1, result.q.shape[1]))
+    seen = Result(result.model, opened).certificate.closure
+    assert seen is not None and seen.gap > 1e-4
 
 
 @pytest.mark.parametrize("cut", ["knee", "end"])

@@ -1,0 +1,54 @@
+"""How well the loops of a run stayed closed, by its samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
+
+from ..engine.loops.calls import LoopCalls
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+    from ..run.trajectory import Trajectory
+
+#: Samples that are looked at, at most.
+_SAMPLES = 12
+
+
+@dataclass(frozen=True)
+class Closure:
+    """Largest gap (m, rad) and slip (m/s, rad/s) of the loops in samples of a run, and the
+    components of loads that rigid bodies leave open, in words."""
+
+    gap: float
+    slip: float
+    open_loads: str = ""
+
+    def __str__(self) -> str:
+        text = f"closed within {self.gap:.1e} (m, rad), slipping by {self.slip:.1e} a second"
+        return f"{text}; loads left open: {self.open_loads}" if self.open_loads else text
+
+
+def closure(model: Compiled, run: Trajectory) -> Closure | None:
+    """None for a tree, for hinges that are let go, whose gaps are none, and without samples."""
+    if model.closed is None or model.packed.releases or not len(run.t):
+        return None
+    calls, gap, slip = LoopCalls(model.looped, np.array(run.q[0])), 0.0, 0.0
+    for k in np.unique(np.linspace(0, len(run.t) - 1, _SAMPLES).astype(int)):
+        q, u, t = np.array(run.q[k]), np.array(run.u[k]), float(run.t[k])
+        gap = max(gap, _largest(calls, calls.gap, q, u, t))
+        slip = max(slip, _largest(calls, calls.slip, q, u, t))
+    return Closure(gap, slip, model.closed.loops.open_loads)
+
+
+def _largest(calls: LoopCalls, level: int, q: Array, u: Array, t: float) -> float:
+    """Of what the rows lack at one state; nan where it cannot be evaluated."""
+    try:
+        return float(np.abs(calls.correction(level, q, u, t=t)[1]).max(initial=0.0))
+    except NumericalFailure:
+        return np.nan
