@@ -37,6 +37,19 @@ def refuse_couplings(packed: Packed, what: str) -> None:
         )
 
 
+def refuse_beyond_hinges(packed: Packed, what: str) -> None:
+    """SceneError where more than hinges of rigid bodies closes loops, which `what` cannot follow
+    yet."""
+    refuse_couplings(packed, what)
+    if packed.flexible:
+        refuse(packed, f"{what} with flexible bodies", INSTEAD)
+    for one in packed.described.constraint[:1]:
+        raise SceneError(
+            f'scene: constraint "{one.name}" closes a loop, and {what} cannot follow that yet; '
+            f"{INSTEAD}"
+        )
+
+
 #: Methods that take increments of loads or an exponential of the whole motion, which closed loops
 #: are not brought into.
 _ALIEN = ("dttmm", "exprb32")
