@@ -16,7 +16,7 @@ from mstmm.arrays import Array, batch
 from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.compiled import Compiled
-from ..engine.sizes import speed_sizes
+from ..engine.loops.freedom import Freedom
 from ..linear.channels import channel, names_of
 from ..pack.layout import refuse_dense
 
@@ -105,7 +105,7 @@ def _efforts(
     if len(rates) != len(places):
         _refuse_torn(model, rates, a)
     needed = engine.inverse_dynamics(t, q, u, a, memory)
-    if not _all_ways(model, ways, acting):
+    if not _all_ways(freedom, ways, acting):
         names = ", ".join(model.layout.u_name(k) for k in acting)
         raise NumericalFailure(
             f"actuators: at this state efforts along {names} do not move the mechanism all ways; "
@@ -118,10 +118,10 @@ def _efforts(
     return efforts
 
 
-def _all_ways(model: Compiled, ways: Array, acting: list[int]) -> bool:
+def _all_ways(freedom: Freedom, ways: Array, acting: list[int]) -> bool:
     """Whether efforts along some speeds move a mechanism all ways, lengths beside turns."""
-    sizes = speed_sizes(model)
-    scaled = ways * sizes[list(_places(model))] / sizes[:, None]
+    sizes = freedom.sizes
+    scaled = ways * sizes[list(freedom.places)] / sizes[:, None]
     least = np.linalg.svd(scaled[acting], compute_uv=False).min(initial=np.inf)
     return bool(least > _WEAK * np.abs(scaled).max(initial=0.0))
 

@@ -39,7 +39,7 @@ class Freedom:
         packed, self._start = engine.packed, closed.start[0]
         still = Engine(packed_system(undriven(packed.system), packed))
         self._calls = judging(still, self._start)
-        self._free, self._sizes = np.array(free, dtype=np.int64), sizes
+        self._free, self.sizes = np.array(free, dtype=np.int64), sizes
         self._loops = closed.loops
 
     @cached_property
@@ -53,7 +53,7 @@ class Freedom:
         Each is the first in the scene that is told apart from those before it a quarter as well as
         any other, by motions in sizes.
         """
-        left = self._motions(q)[self._free] / self._sizes[self._free, None]
+        left = self._motions(q)[self._free] / self.sizes[self._free, None]
         found = list[int]()
         for _ in range(left.shape[1]):
             lengths = np.linalg.norm(left, axis=1)
@@ -69,7 +69,7 @@ class Freedom:
         Raises NumericalFailure where these decide nothing, at a dead centre, and at singular poses.
         """
         found, own = self._motions(q), list(places)
-        scaled = found[own] / self._sizes[own, None]
+        scaled = found[own] / self.sizes[own, None]
         rows, ways = scaled.shape
         branches = self._loops.singular and ways == self._loops.mobility
         if rows == ways and not branches and (not ways or np.linalg.cond(scaled) < _MOST):
@@ -83,7 +83,7 @@ class Freedom:
     def driving(self, q: Array, speed: int) -> Array:
         """All speeds (nu,) for a unit of one that is imposed, the others of these at rest; nan
         where the loops do not let it move alone."""
-        moved = self._allowed(q, np.eye(1, len(self._sizes), speed)[0])
+        moved = self._allowed(q, np.eye(1, len(self.sizes), speed)[0])
         slips = self._calls.correction(self._calls.slip, q, moved)[1]
         return moved if np.abs(slips).max(initial=0.0) < _ROUNDING else np.full_like(moved, np.nan)
 
@@ -95,13 +95,13 @@ class Freedom:
         """(nu, n) a basis of the motions at q, orthonormal in sizes."""
         count = min(len(self._free), self._loops.mobility + 1)  # one more shows at a singular pose
         draw = np.random.default_rng(0)
-        trials = np.zeros((count, len(self._sizes)))
+        trials = np.zeros((count, len(self.sizes)))
         trials[:, self._free] = draw.standard_normal((count, len(self._free)))
-        columns = [self._allowed(q, trial * self._sizes) for trial in trials]
-        scaled = np.reshape(columns, trials.shape).T / self._sizes[:, None]
+        columns = [self._allowed(q, trial * self.sizes) for trial in trials]
+        scaled = np.reshape(columns, trials.shape).T / self.sizes[:, None]
         left, lengths, _ = np.linalg.svd(scaled, full_matrices=False)
         kept = lengths > _ROUNDING * lengths.max(initial=1.0)
-        return np.asarray(left[:, kept] * self._sizes[:, None])
+        return np.asarray(left[:, kept] * self.sizes[:, None])
 
     def _allowed(self, q: Array, speeds: Array) -> Array:
         """Speeds less their slips."""
