@@ -15,6 +15,7 @@ import mstmm
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
+from matplotlib.patches import Circle
 
 HERE = Path(__file__).parent
 COLORS = {"sun": "#c1121f", "ring": "#1d3557", "carrier": "#2a9d8f"}
@@ -34,7 +35,7 @@ def draw(path: Path) -> None:
         wheels.append((center, 0.02, carrier + own, "#6c757d"))
         left.plot([0, center.real], [0, center.imag], color=COLORS["carrier"], lw=3, zorder=0)
     for center, radius, angle, color in wheels:
-        left.add_patch(plt.Circle((center.real, center.imag), radius, fill=False, ec=color, lw=2))
+        left.add_patch(Circle((center.real, center.imag), radius, fill=False, ec=color, lw=2))
         mark = center + radius * np.exp(1j * angle)
         left.plot(mark.real, mark.imag, "o", color=color, ms=7)
     left.set(xlabel="x, m", ylabel="y, m", title="After 0.12 s", xlim=(-0.08, 0.08))
