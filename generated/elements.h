@@ -1401,6 +1401,15 @@ int mstmm_sweep_modal_stiffened(int n, const real *restrict K, const real *restr
     const real *restrict rate, const real *restrict sq, real *restrict S_ff);
 int mstmm_sweep_modal_strained(int n, const real *restrict K, const real *restrict D,
     const real *restrict eta, const real *restrict etad, real *restrict e_f);
+int mstmm_sweep_modal_row_felt(int n, const real *restrict H, const real *restrict K,
+    real *restrict K_f);
+int mstmm_sweep_modal_row_condensed(int n, const real *restrict S_ff, const real *restrict K_f,
+    const real *restrict Gg, real *restrict Y, real *restrict K, real *restrict l_,
+    real *restrict work);
+int mstmm_sweep_modal_row_coupled(int n, const real *restrict K_f, const real *restrict Y,
+    real *restrict L_ij);
+int mstmm_sweep_modal_row_answered(int n, const real *restrict Y, const real *restrict x,
+    real *restrict etadd);
 int mstmm_sweep_modal_residual_slope(int n, const real *restrict p, const real *restrict C,
     const real *restrict P, const real *restrict B, const real *restrict Z_xx,
     const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,

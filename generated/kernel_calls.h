@@ -1007,6 +1007,62 @@ static inline int mstmm_modal_strained_by(struct mstmm_modal_strained to)
 }
 #define mstmm_modal_strained(...) mstmm_modal_strained_by((struct mstmm_modal_strained){__VA_ARGS__})
 
+struct mstmm_modal_row_felt {
+    int n;
+    const real *H;
+    const real *K;
+    real *K_f;
+};
+static inline int mstmm_modal_row_felt_by(struct mstmm_modal_row_felt to)
+{
+    return mstmm_sweep_modal_row_felt(
+        to.n, to.H, to.K, to.K_f);
+}
+#define mstmm_modal_row_felt(...) mstmm_modal_row_felt_by((struct mstmm_modal_row_felt){__VA_ARGS__})
+
+struct mstmm_modal_row_condensed {
+    int n;
+    const real *S_ff;
+    const real *K_f;
+    const real *Gg;
+    real *Y;
+    real *K;
+    real *l_;
+    real *work;
+};
+static inline int mstmm_modal_row_condensed_by(struct mstmm_modal_row_condensed to)
+{
+    return mstmm_sweep_modal_row_condensed(
+        to.n, to.S_ff, to.K_f, to.Gg, to.Y, to.K, to.l_, to.work);
+}
+#define mstmm_modal_row_condensed(...) mstmm_modal_row_condensed_by((struct mstmm_modal_row_condensed){__VA_ARGS__})
+
+struct mstmm_modal_row_coupled {
+    int n;
+    const real *K_f;
+    const real *Y;
+    real *L_ij;
+};
+static inline int mstmm_modal_row_coupled_by(struct mstmm_modal_row_coupled to)
+{
+    return mstmm_sweep_modal_row_coupled(
+        to.n, to.K_f, to.Y, to.L_ij);
+}
+#define mstmm_modal_row_coupled(...) mstmm_modal_row_coupled_by((struct mstmm_modal_row_coupled){__VA_ARGS__})
+
+struct mstmm_modal_row_answered {
+    int n;
+    const real *Y;
+    const real *x;
+    real *etadd;
+};
+static inline int mstmm_modal_row_answered_by(struct mstmm_modal_row_answered to)
+{
+    return mstmm_sweep_modal_row_answered(
+        to.n, to.Y, to.x, to.etadd);
+}
+#define mstmm_modal_row_answered(...) mstmm_modal_row_answered_by((struct mstmm_modal_row_answered){__VA_ARGS__})
+
 struct mstmm_modal_residual_slope {
     int n;
     const real *p;

@@ -73,6 +73,15 @@ int mstmm_sweep_modal_stiffened(int n, const real *restrict K, const real *restr
     const real *restrict rate, const real *restrict sq, real *restrict S_ff);
 int mstmm_sweep_modal_strained(int n, const real *restrict K, const real *restrict D,
     const real *restrict eta, const real *restrict etad, real *restrict e_f);
+int mstmm_sweep_modal_row_felt(int n, const real *restrict H, const real *restrict K,
+    real *restrict K_f);
+int mstmm_sweep_modal_row_condensed(int n, const real *restrict S_ff, const real *restrict K_f,
+    const real *restrict Gg, real *restrict Y, real *restrict K, real *restrict l_,
+    real *restrict work);
+int mstmm_sweep_modal_row_coupled(int n, const real *restrict K_f, const real *restrict Y,
+    real *restrict L_ij);
+int mstmm_sweep_modal_row_answered(int n, const real *restrict Y, const real *restrict x,
+    real *restrict etadd);
 int mstmm_sweep_modal_residual_slope(int n, const real *restrict p, const real *restrict C,
     const real *restrict P, const real *restrict B, const real *restrict Z_xx,
     const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
@@ -4268,6 +4277,252 @@ static const mstmm_port mstmm_sweep_modal_strained_inputs[] = {
 
 static const mstmm_port mstmm_sweep_modal_strained_outputs[] = {
     {"e_f", 1, "", 1, 1},
+};
+
+/* row on the modes
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * in  H[6][n] motion subspace of the modes, rows v then w, outboard axes
+ * in  K[6] column of the row on the frame
+ * out K_f[n] column of the row on the modes, added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_row_felt_sized(int n, const real *restrict H, const real *restrict K,
+    real *restrict K_f)
+{
+    for (int k = 0; k < n; ++k) {
+        const real t0 = K[0] * H[k];
+        const real t1 = K[1] * H[n + k];
+        const real t2 = t0 + t1;
+        const real t3 = K[2] * H[2 * n + k];
+        const real t4 = t2 + t3;
+        const real t5 = K[3] * H[3 * n + k];
+        const real t6 = t4 + t5;
+        const real t7 = K[4] * H[4 * n + k];
+        const real t8 = t6 + t7;
+        const real t9 = K[5] * H[5 * n + k];
+        const real t10 = t8 + t9;
+        K_f[k] += t10;
+    }
+    return 0;
+}
+
+int mstmm_sweep_modal_row_felt(int n, const real *restrict H, const real *restrict K,
+    real *restrict K_f)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_row_felt_sized(1, H, K, K_f);
+    case 2: return mstmm_sweep_modal_row_felt_sized(2, H, K, K_f);
+    case 3: return mstmm_sweep_modal_row_felt_sized(3, H, K, K_f);
+    case 4: return mstmm_sweep_modal_row_felt_sized(4, H, K, K_f);
+    default: return mstmm_sweep_modal_row_felt_sized(n, H, K, K_f);
+    }
+}
+
+static int mstmm_sweep_modal_row_felt_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_row_felt(n, in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_modal_row_felt_inputs[] = {
+    {"H", 6, "", 0, 1},
+    {"K", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_modal_row_felt_outputs[] = {
+    {"K_f", 1, "", 1, 1},
+};
+
+/* row of a flexible body condensed
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * in  S_ff[n][n] rows and columns of the modes
+ * in  K_f[n] column of the row on the modes
+ * in  Gg[n][7] etadd = g - G a: columns of G, then -g
+ * out Y[n] S_ff^-1 K_f
+ * out K[6] column of the row on the frame, added to what is there
+ * out l[1] known part of the row, added to what is there
+ * out work[n][n] factor L, D of solve
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_row_condensed_sized(int n, const real *restrict S_ff,
+    const real *restrict K_f, const real *restrict Gg, real *restrict Y, real *restrict K,
+    real *restrict l_, real *restrict work)
+{
+    /* a pivot of S_ff vanishes: a motion of the modes is undetermined */
+    if (mstmm_solve_ldl(n, 1, S_ff, K_f, Y, work, 1e-13)) return 1;
+    real t1 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t0 = Gg[7 * k] * K_f[k];
+        t1 += t0;
+    }
+    const real t2 = -t1;
+    K[0] += t2;
+    real t4 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t3 = K_f[k] * Gg[7 * k + 1];
+        t4 += t3;
+    }
+    const real t5 = -t4;
+    K[1] += t5;
+    real t7 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t6 = K_f[k] * Gg[7 * k + 2];
+        t7 += t6;
+    }
+    const real t8 = -t7;
+    K[2] += t8;
+    real t10 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t9 = K_f[k] * Gg[7 * k + 3];
+        t10 += t9;
+    }
+    const real t11 = -t10;
+    K[3] += t11;
+    real t13 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t12 = K_f[k] * Gg[7 * k + 4];
+        t13 += t12;
+    }
+    const real t14 = -t13;
+    K[4] += t14;
+    real t16 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t15 = K_f[k] * Gg[7 * k + 5];
+        t16 += t15;
+    }
+    const real t17 = -t16;
+    K[5] += t17;
+    real t19 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t18 = K_f[k] * Gg[7 * k + 6];
+        t19 += t18;
+    }
+    const real t20 = -t19;
+    l_[0] += t20;
+    return 0;
+}
+
+int mstmm_sweep_modal_row_condensed(int n, const real *restrict S_ff, const real *restrict K_f,
+    const real *restrict Gg, real *restrict Y, real *restrict K, real *restrict l_,
+    real *restrict work)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_row_condensed_sized(1, S_ff, K_f, Gg, Y, K, l_, work);
+    case 2: return mstmm_sweep_modal_row_condensed_sized(2, S_ff, K_f, Gg, Y, K, l_, work);
+    case 3: return mstmm_sweep_modal_row_condensed_sized(3, S_ff, K_f, Gg, Y, K, l_, work);
+    case 4: return mstmm_sweep_modal_row_condensed_sized(4, S_ff, K_f, Gg, Y, K, l_, work);
+    default: return mstmm_sweep_modal_row_condensed_sized(n, S_ff, K_f, Gg, Y, K, l_, work);
+    }
+}
+
+static int mstmm_sweep_modal_row_condensed_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_row_condensed(n, in[0], in[1], in[2], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_sweep_modal_row_condensed_inputs[] = {
+    {"S_ff", 1, "", 0, 2},
+    {"K_f", 1, "", 0, 1},
+    {"Gg", 7, "", 0, 1},
+};
+
+static const mstmm_port mstmm_sweep_modal_row_condensed_outputs[] = {
+    {"Y", 1, "", 0, 1},
+    {"K", 6, "", 1, 0},
+    {"l", 1, "", 1, 0},
+    {"work", 1, "", 0, 2},
+};
+
+static const mstmm_guard mstmm_sweep_modal_row_condensed_guards[] = {
+    {1, "a pivot of S_ff vanishes: a motion of the modes is undetermined"},
+};
+
+/* rows coupled by modes
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * in  K_f[n] column of the row on the modes
+ * in  Y[n] S_ff^-1 K_f
+ * out L_ij[1] entry of L, added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_row_coupled_sized(int n, const real *restrict K_f, const real *restrict Y,
+    real *restrict L_ij)
+{
+    real t1 = 0;
+    for (int k = 0; k < n; ++k) {
+        const real t0 = K_f[k] * Y[k];
+        t1 += t0;
+    }
+    L_ij[0] += t1;
+    return 0;
+}
+
+int mstmm_sweep_modal_row_coupled(int n, const real *restrict K_f, const real *restrict Y,
+    real *restrict L_ij)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_row_coupled_sized(1, K_f, Y, L_ij);
+    case 2: return mstmm_sweep_modal_row_coupled_sized(2, K_f, Y, L_ij);
+    case 3: return mstmm_sweep_modal_row_coupled_sized(3, K_f, Y, L_ij);
+    case 4: return mstmm_sweep_modal_row_coupled_sized(4, K_f, Y, L_ij);
+    default: return mstmm_sweep_modal_row_coupled_sized(n, K_f, Y, L_ij);
+    }
+}
+
+static int mstmm_sweep_modal_row_coupled_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_row_coupled(n, in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_modal_row_coupled_inputs[] = {
+    {"K_f", 1, "", 0, 1},
+    {"Y", 1, "", 0, 1},
+};
+
+static const mstmm_port mstmm_sweep_modal_row_coupled_outputs[] = {
+    {"L_ij", 1, "", 1, 0},
+};
+
+/* modal accelerations by a multiplier
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * in  Y[n] S_ff^-1 K_f
+ * in  x[1] multiplier of the row
+ * out etadd[n] modal accelerations, added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_row_answered_sized(int n, const real *restrict Y, const real *restrict x,
+    real *restrict etadd)
+{
+    for (int k = 0; k < n; ++k) {
+        const real t0 = x[0] * Y[k];
+        const real t1 = -t0;
+        etadd[k] += t1;
+    }
+    return 0;
+}
+
+int mstmm_sweep_modal_row_answered(int n, const real *restrict Y, const real *restrict x,
+    real *restrict etadd)
+{
+    switch (n) { /* loops over a number that is known are unrolled */
+    case 1: return mstmm_sweep_modal_row_answered_sized(1, Y, x, etadd);
+    case 2: return mstmm_sweep_modal_row_answered_sized(2, Y, x, etadd);
+    case 3: return mstmm_sweep_modal_row_answered_sized(3, Y, x, etadd);
+    case 4: return mstmm_sweep_modal_row_answered_sized(4, Y, x, etadd);
+    default: return mstmm_sweep_modal_row_answered_sized(n, Y, x, etadd);
+    }
+}
+
+static int mstmm_sweep_modal_row_answered_call(int n, const real *const *in, real *const *out)
+{
+    return mstmm_sweep_modal_row_answered(n, in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_modal_row_answered_inputs[] = {
+    {"Y", 1, "", 0, 1},
+    {"x", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_modal_row_answered_outputs[] = {
+    {"etadd", 1, "", 1, 1},
 };
 
 /* residual and its derivative along a direction
@@ -9347,6 +9602,54 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "row_felt",
+        .function = (void (*)(void))mstmm_sweep_modal_row_felt,
+        .call = mstmm_sweep_modal_row_felt_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_modal_row_felt_inputs,
+        .outputs = mstmm_sweep_modal_row_felt_outputs,
+        .ir_hash = "52c3a0e712377b7cd9359370a6c4b4ea4382b25cfc03f88cd95124c0009d772e",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "row_condensed",
+        .function = (void (*)(void))mstmm_sweep_modal_row_condensed,
+        .call = mstmm_sweep_modal_row_condensed_call,
+        .n_inputs = 3,
+        .n_outputs = 4,
+        .inputs = mstmm_sweep_modal_row_condensed_inputs,
+        .outputs = mstmm_sweep_modal_row_condensed_outputs,
+        .ir_hash = "a0e3d6e5f9f0debf6fa9c65e8971b733c5bf33990108af3d7eae8eb4ceabf3ad",
+        .n_guards = 1,
+        .guards = mstmm_sweep_modal_row_condensed_guards,
+    },
+    {
+        .name = "row_coupled",
+        .function = (void (*)(void))mstmm_sweep_modal_row_coupled,
+        .call = mstmm_sweep_modal_row_coupled_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_modal_row_coupled_inputs,
+        .outputs = mstmm_sweep_modal_row_coupled_outputs,
+        .ir_hash = "6f1599de88e88b91ad6f21cf5eee35007f642144e96e0a06451b4b9ff9d03108",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "row_answered",
+        .function = (void (*)(void))mstmm_sweep_modal_row_answered,
+        .call = mstmm_sweep_modal_row_answered_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_modal_row_answered_inputs,
+        .outputs = mstmm_sweep_modal_row_answered_outputs,
+        .ir_hash = "b2fa08e9def1b2652b14283e92c0cb73e68a8a5fd637283c7e5abc49a86d0a4a",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "residual_slope",
         .function = (void (*)(void))mstmm_sweep_modal_residual_slope,
         .call = mstmm_sweep_modal_residual_slope_call,
@@ -9460,7 +9763,7 @@ const mstmm_element mstmm_sweep_modal = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "modal",
-    .hash = "0cac7ee782685417e686854e78213ffc56a61f5ea666f7efe4eae1fe26d961a3",
+    .hash = "25842afe3f17d525472c6cbdd2c449d7c2773b02a327df58377a6224d77c3b64",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -9470,6 +9773,6 @@ const mstmm_element mstmm_sweep_modal = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 28,
+    .n_kernels = 32,
     .kernels = mstmm_sweep_modal_kernels,
 };

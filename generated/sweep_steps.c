@@ -1172,15 +1172,52 @@ static int mstmm_at_carried(mstmm_state *state, int index)
     real *block = state->workspace + body->block;
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
     const int nu = body->nu;
+    const mstmm_modal *modal = mstmm_modal_of(body);
+    const int n = mstmm_modes_of(modal);
+    const mstmm_section *section = body->section;
+    real *laid = section ? state->workspace + section->place : NULL;
     const mstmm_looped *looped = &state->model->looped[index];
     real *loops = state->workspace + state->model->loops;
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
     if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (body->modal) {
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        code = mstmm_at_modal_condense(state, index);
+        if (code) return code;
+        for (int c = 0; c < looped->n_bent; c++) {
+            const mstmm_pending *bent = &looped->bent[c];
+            if (body->section) {
+                mstmm_modal_row_felt(
+                    .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .K = loops + bent->column,
+                    .K_f = loops + bent->modes);
+            }
+            mstmm_modal_row_condensed(
+                .n = modal->n, .S_ff = modes + MSTMM_MODES_S_FF(n), .K_f = loops + bent->modes,
+                .Gg = modes + MSTMM_MODES_GAIN(n), .Y = loops + bent->y,
+                .K = loops + bent->column,
+                .l_ = loops + MSTMM_ROW * (int64_t)bent->row + MSTMM_ROW_KNOWN,
+                .work = modes + MSTMM_MODES_WORK(n));
+            for (int b = 0; b <= c; b++) {
+                mstmm_modal_row_coupled(
+                    .n = modal->n, .K_f = loops + looped->bent[b].modes, .Y = loops + bent->y,
+                    .L_ij = loops + bent->pairs[b]);
+            }
+        }
+    }
     for (int r = looped->first_row; r < looped->first_row + looped->n_rows; r++) {
         code = mstmm_at_row_closed(state, r);
         if (code) return code;
+    }
+    if (body->section && !body->section->inward) {
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        mstmm_modal_absorb(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
+            .H = laid + MSTMM_SECTION_H(n), .S = block + MSTMM_BLOCK_S,
+            .e = block + MSTMM_BLOCK_E, .U = laid + MSTMM_SECTION_PUSH(n),
+            .S_rf = modes + MSTMM_MODES_S_RF(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
+            .e_f = modes + MSTMM_MODES_E_F(n));
     }
     if (!body->generic) {
         code = mstmm_at_hinge_motion(state, index);
@@ -1219,6 +1256,11 @@ static int mstmm_at_carried(mstmm_state *state, int index)
         .e_I = parent + MSTMM_BLOCK_E);
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
+        if (body->section && !body->section->inward) {
+            mstmm_modal_row_felt(
+                .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .K = loops + pending->column,
+                .K_f = loops + pending->modes);
+        }
         if (!(pending->tau >= 0)) {
             mstmm_generic_push(speeds,
                 .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
@@ -1285,6 +1327,7 @@ static int mstmm_at_row_found(mstmm_state *state, int index)
 /* Accelerations of a hinge under the multipliers of its open rows. */
 static int mstmm_at_answered(mstmm_state *state, int index)
 {
+    real delta[6];
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
@@ -1344,6 +1387,34 @@ static int mstmm_at_answered(mstmm_state *state, int index)
     for (int r = looped->first_row + looped->n_rows - 1; r >= looped->first_row; r--) {
         code = mstmm_at_row_found(state, r);
         if (code) return code;
+    }
+    if (body->modal) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        mstmm_modal_recover(
+            .n = modal->n, .Gg = modes + MSTMM_MODES_GAIN(n),
+            .delta_I = block + MSTMM_BLOCK_DELTA, .etadd = modes + MSTMM_MODES_ETADD(n));
+        for (int c = 0; c < looped->n_bent; c++) {
+            const mstmm_pending *bent = &looped->bent[c];
+            mstmm_modal_row_answered(
+                .n = modal->n, .Y = loops + bent->y,
+                .x = loops + MSTMM_ROW * (int64_t)bent->row + MSTMM_ROW_X,
+                .etadd = modes + MSTMM_MODES_ETADD(n));
+        }
+        for (int j = 0; j < n; j++)
+            (state->udot + modal->u)[j] = (modes + MSTMM_MODES_ETADD(n))[j];
+    }
+    if (body->section) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        mstmm_modal_displaced(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .etadd = modes + MSTMM_MODES_ETADD(n),
+            .delta_I = block + MSTMM_BLOCK_DELTA, .delta = delta);
+        memcpy(block + MSTMM_BLOCK_DELTA, delta, 6 * sizeof(real));
     }
     if (mstmm_imposed(body, state->memory) && state->balance) {
         code = mstmm_at_hinge_motion(state, index);
@@ -1577,6 +1648,13 @@ static int mstmm_at_unloaded(mstmm_state *state, int index)
     memset(block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
     for (int j = 0; j < nu; j++)
         (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU))[j] = 0;
+    if (body->modal) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        for (int j = 0; j < n; j++)
+            (modes + MSTMM_MODES_E_F(n))[j] = 0;
+    }
     return 0;
 }
 

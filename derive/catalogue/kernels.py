@@ -20,7 +20,7 @@ from ..equations import tangent_placed as placed
 from ..equations.complement import complement
 from ..equations.factored import eliminate_factored, recover_factored
 from ..equations.hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
-from ..flexible import beam_fields, beam_second_order, modal, modal_sweep, section
+from ..flexible import beam_fields, beam_second_order, modal, modal_rows, modal_sweep, section
 from ..language.derivation import Derivation, Equation, Quantity, vector
 from ..language.element import Body, Hinge
 from ..lower.kernel import lower
@@ -210,7 +210,7 @@ def modal_kernels() -> tuple[Kernel, ...]:
         Kernel("inward", section.inward(), turning),
         Kernel("subspace", section.subspace()),
         Kernel("imposed", section.imposed()),
-        *(Kernel(step.__name__, step()) for step in modal_sweep.STEPS),
+        *(Kernel(step.__name__, step()) for step in (*modal_sweep.STEPS, *modal_rows.STEPS)),
     )
 
 

@@ -82,6 +82,11 @@ _EACH = {
         ("looped", "loops"),
     ),
     "before": ("int b = 0; b <= c; b++", "", ()),
+    "bent": (
+        "int c = 0; c < looped->n_bent; c++", "const mstmm_pending *bent = &looped->bent[c];",
+        ("looped", "loops"),
+    ),
+    "bent_before": ("int b = 0; b <= c; b++", "", ()),
     "rows": ("int c = 0; c < 6; c++", "if (closure->rows[c] < 0) continue;", ("closure", "loops")),
     "others": (
         "int c = 0; c < row->n_others; c++", "const mstmm_other *other = &row->others[c];",

@@ -144,7 +144,10 @@ _PLACES = {
     "own.inner": "loops + own->inner", "own.outer": "loops + own->outer",
     "coupling.x": "loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_X",
     "coupling.told": "loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_TOLD",
-    "pair.L": "loops + pending->pairs[b]",
+    "pair.L": "loops + pending->pairs[b]", "pending.modes": "loops + pending->modes",
+    "bent.K": "loops + bent->column", "bent.modes": "loops + bent->modes",
+    "bent.y": "loops + bent->y", "bent_before.modes": "loops + looped->bent[b].modes",
+    "bent_pair.L": "loops + bent->pairs[b]",
     "other.K": "loops + other->column", "other.L": "loops + other->pair",
     "second.L": "loops + row->others[b].pair", "both.L": "loops + other->pairs[b]",
     "scene.t": "&state->t", "sums.power": "&state->balance->power",
@@ -276,6 +279,7 @@ _OF_ROWS = {
     "pending.known": "pending->row", "pending.x": "pending->row",
     "pending.told": "pending->row", "own.told": "own->row",
     "own.known": "own->row", "own.x": "own->row",
+    "bent.known": "bent->row", "bent.x": "bent->row",
 }  # fmt: skip
 
 

@@ -7,6 +7,7 @@ scene stage by stage, as the load does there.  See derive/equations/loops.py.
 
 from __future__ import annotations
 
+from .flexible import ABSORBED, DISPLACED, MODAL_CONDENSE
 from .motion import HINGE_MOTION
 from .riccati import (
     BODY,
@@ -208,8 +209,33 @@ RESTATED = Pass(
 
 UNLOADED = Pass(
     "unloaded", "body", "No load and no effort: the rows alone are to be met.",
-    (Copy(to="body.e"), Copy(to="body.tau")),
+    (Copy(to="body.e"), Copy(to="body.tau"), *only("modal", Copy(to="modes.e_f"))),
 )  # fmt: skip
+
+#: Modes eliminated from the rows that pass or end at a flexible body, behind S and e.
+_ROWS_CONDENSED = Each(
+    of="bent",
+    steps=(
+        call("modal.row_felt", when="section", H="section.H", K="bent.K", K_f="bent.modes"),
+        call("modal.row_condensed", S_ff="modes.S_ff", K_f="bent.modes", Gg="modes.gain",
+             work="modes.work", Y="bent.y", K="bent.K", l="bent.known"),
+        Each(
+            of="bent_before",
+            steps=(
+                call("modal.row_coupled", K_f="bent_before.modes", Y="bent.y",
+                     L_ij="bent_pair.L"),
+            ),
+        ),
+    ),
+)  # fmt: skip
+_MODES_ANSWERED = (
+    call("modal.recover", Gg="modes.gain", delta_I="body.delta", etadd="modes.etadd"),
+    Each(
+        of="bent",
+        steps=(call("modal.row_answered", Y="bent.y", x="bent.x", etadd="modes.etadd"),),
+    ),
+    Copy(to="modes.udot", source="modes.etadd"),
+)
 
 _ACROSS = {"H": "hinge.H_free", "G": "hinge.G"}
 
@@ -241,6 +267,8 @@ _ALONE = only(
     Each(
         of="pending",
         steps=(
+            call("modal.row_felt", when="outward", H="section.H", K="pending.K",
+                 K_f="pending.modes"),
             call("generic{free}.push", when="!coupled", **BODY, **_ACROSS, e="pending.K",
                  tau="zero", y="pending.y", e_I="pending.onward"),
             *only(
@@ -289,7 +317,9 @@ def _efforts_of_couplings(x: str, when: str) -> Each:
 CARRIED = Pass(
     "carried", "body", "S, e and the columns of open rows carried across the hinge to the parent.",
     (
+        *only("modal", Do(whole=MODAL_CONDENSE), _ROWS_CONDENSED),
         Each(of="closings", steps=(Do(whole=ROW_CLOSED),)),
+        *only("outward", ABSORBED),
         Do(whole=HINGE_MOTION, when="own"),
         *FREE,
         _efforts_of_couplings("pending.told", "!staged refined"),
@@ -331,6 +361,8 @@ ANSWERED = Pass(
         ),
         Add(to="body.udot", source="body.chosen", when="staged !corrected"),
         Each(of="openings", steps=(Do(whole=ROW_FOUND),)),
+        *only("modal", *_MODES_ANSWERED),
+        *only("section", *DISPLACED),
         # The elimination lay where H was.
         Do(whole=HINGE_MOTION, when="!staged imposed balance"),
     ),

@@ -133,7 +133,8 @@ class Each(Step):
 
     `of`: "closings", the rows that close on a body, where the passes done are those of rows, and
     "openings", the same the other way round; "pending", the rows whose columns go across its hinge;
-    "before", those of them up to the one at hand; "rows", the rows of a hinge that closes a loop,
+    "before", those of them up to the one at hand; "bent", the rows that ends of a flexible body
+    bring, "bent_before" likewise; "rows", the rows of a hinge that closes a loop,
     each in direction number c; "own", the rows of couplings of such a hinge; "others", the rows
     that a row is coupled with when it closes;
     "seconds", those of them up to the one at hand.

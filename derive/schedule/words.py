@@ -191,6 +191,14 @@ coupling.gap | 1 | its value
 coupling.slip | 1 | its rate
 coupling.still | 1 | its rate at rest, by what it is to equal
 coupling.told | 1 | its multiplier in the answer before
+pending.modes | n | its column on the modes of the body that an end belongs to
+bent.K | 6 | column of a row that passes or ends at a flexible body, on the frame
+bent.modes | n | the same on the modes
+bent.y | n | S_ff^-1 times it
+bent.known | 1 | its known part
+bent.x | 1 | its multiplier
+bent_before.modes | n | column of another such row on the modes
+bent_pair.L | 1 | entry of L of both
 drive.value | 1 | value of the drive
 drive.rate | 1 | its rate
 drive.acceleration | 1 | its acceleration

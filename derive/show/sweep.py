@@ -197,6 +197,8 @@ _EACH = {
     "openings": "every row that closes on the body, the other way round",
     "pending": "every row that is open across the hinge",
     "before": "every open row up to this one",
+    "bent": "every row that ends of the flexible body bring",
+    "bent_before": "every such row up to this one",
     "rows": "every row of the hinge, in direction c",
     "others": "every row that is coupled with it",
     "seconds": "every such row up to this one",

@@ -333,6 +333,8 @@ def _obstacle(packed: Packed, most: int) -> str:
         return "heavy bodies behind light ones cost digits, which refinement mends: it is looped"
     if packed.system.couplings:
         return "couplings of coordinates are looped"
+    if packed.system.closures and packed.flexible:
+        return "loops through flexible bodies are looped"
     hinges = {body.hinge for body in packed.system.distinct}
     if any(packed.elements[key].tape is not None for key in hinges):
         return "a hinge is interpreted because it was generated without a compiler"

@@ -9,6 +9,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.scene.checks.flexible import free_axes
+from mstmm.scene.checks.topology import holders
 from mstmm.scene.rules.values import GROUND
 from mstmm.scene.tables.hinge_frames import start_motion
 
@@ -43,7 +44,7 @@ class Supports:
     """The supports of the flexible bodies of a scene."""
 
     def __init__(self, scene: Scene) -> None:
-        self._holds = {hinge.outboard_body: hinge for hinge in scene.hinge}
+        self._holds = holders(scene)
         self._bodies = {body.name: body for body in scene.body if body.type == "rigid"}
         self._let_go = {event.hinge for event in scene.event if event.hinge}
 

@@ -27,7 +27,7 @@ from .letting_go import releasable
 from .loops.closures import closures_of
 from .loops.couplings import couplings_of
 from .loops.opened import opened
-from .loops.unknown import refuse_unknown
+from .loops.unknown import refuse_beside_bending
 from .slots import layout_of
 from .system import Held, LoadNumbers, Numbers, System
 from .values import MOVING, Values, drive_kernel
@@ -41,13 +41,15 @@ def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) 
     if not (scene.beam or scene.elastic):
         nodes, cuts = opened(scene)
         return Expanded(nodes, scene, {}, cuts=cuts)
-    refuse_unknown(scene)
     from ..flexible.bodies import modal_bodies
     from .flexible.rigidified import rigidified
 
     rigid = rigidified(scene, flexible or {})
     known = {name: body for name, body in (flexible or {}).items() if name not in rigid.one_way}
-    expanded = expand(rigid.scene, modal_bodies(rigid.scene) if flexible is None else known)
+    refuse_beside_bending(scene, rigid.one_way)
+    nodes, cuts = opened(rigid.scene)
+    bodies = modal_bodies(rigid.scene) if flexible is None else known
+    expanded = expand(nodes, bodies, cuts)
     expanded.described, expanded.rigidified = scene, rigid
     expanded.nodes |= rigid.nodes
     return expanded

@@ -65,15 +65,6 @@ def test_no_fused_code() -> None:
         mstmm.compile(model.scene, engine="fused")
 
 
-def test_flexible_bodies() -> None:
-    scene = linkage("closing_pin", laws=False)
-    scene["body"].pop(1)
-    numbers = {"mass_per_length": 1.0, "bending_stiffness": 50.0}
-    scene["beam"] = [{"name": "coupler", "length": 1.1, **numbers}]
-    with pytest.raises(mstmm.SceneError, match=f"{LOOP}.* flexible bodies"):
-        mstmm.compile(mstmm.Scene(**scene))
-
-
 def test_constraints() -> None:
     scene = linkage(None, laws=False)
     del scene["hinge"][3]

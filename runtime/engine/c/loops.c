@@ -138,6 +138,8 @@ int mstmm_moved(const mstmm_model *model, real *workspace, real t, real *q, cons
     for (int i = 0; i < model->n_bodies; i++) {
         const int code = mstmm_at_hinge_motion(&state, i);
         if (code) return code;
+        const mstmm_modal *modal = mstmm_modal_of(&model->bodies[i]);
+        if (modal) memcpy(qdot + modal->q, change + modal->u, (size_t)modal->n * sizeof(real));
     }
     for (int i = 0; i < model->nq; i++) q[i] += qdot[i];
     mstmm_unit_quaternions(n_quaternions, quaternions, q);

@@ -133,6 +133,7 @@ typedef struct {
     int row;
     int64_t column, onward, y; /* of its column here and on the parent, of -H^T K - C */
     int64_t tau;               /* of -C; -1: it is no coupling of this hinge's speeds */
+    int64_t modes;             /* of its column on the modes of the body that this is an end of */
     const int64_t *pairs;      /* of the entries of L with those up to this one */
 } mstmm_pending;
 
@@ -193,6 +194,8 @@ typedef struct {
     const mstmm_pending *pending;
     int n_own;
     const mstmm_own *own;
+    int n_bent; /* that ends of the flexible body bring: y is S_ff^-1 times the modes' column */
+    const mstmm_pending *bent;
     const mstmm_closure *closure; /* the body is the frame C of a hinge that closes a loop */
 } mstmm_looped;
 

@@ -15,7 +15,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
-from ...pack.loops.variants import held
+from ...pack.loops.variants import held, stiff
 from ...pack.pack import packed_system
 from ..engine import Engine
 from .calls import LoopCalls
@@ -33,12 +33,13 @@ _ALONE = 1e14
 
 
 def with_held(engine: Engine, hinges: Collection[str]) -> Engine:
-    """The engine of the same scene with all speeds of some hinges imposed."""
+    """The engine of the same scene with all speeds of some hinges imposed, in which flexible bodies
+    resist a change of their shape as they do at rest."""
     packed = engine.packed
     places = {packed.hinge_position[name] for name in hinges}
-    if not places:
+    if not places and not packed.flexible:
         return engine
-    found = Engine(packed_system(held(packed.system, places), packed))
+    found = Engine(packed_system(stiff(held(packed.system, places)), packed))
     known, own = packed.written.loops, found.packed.written.loops
     assert known is not None and own is not None
     own.judge_as(known)
@@ -119,7 +120,7 @@ class Assembly:
 
     def _free_speeds(self) -> Array:
         found, layout = np.ones(self.calls.engine.nu), self.calls.engine.packed.layout
-        for hinge in self.calls.engine.packed.scene.hinge:
+        for hinge in self.calls.engine.packed.described.hinge:
             slots = layout.hinges[hinge.name]
             drive = hinge.drive or (None,) * slots.nu
             for k in range(slots.nu):

@@ -87,7 +87,7 @@ def judging(engine: Engine, q: Array) -> LoopCalls:
     mobility = LoopCalls(Engine(packed_system(geometric(packed.system), packed)), q).mobility
     slides = {
         packed.hinge_position[hinge.name]: hinge.facts.slides
-        for hinge in packed.scene.hinge if hinge.facts is not None
+        for hinge in packed.described.hinge if hinge.facts is not None
     }  # fmt: skip
     return LoopCalls(Engine(packed_system(by_hinges(packed.system, slides), packed)), q, mobility)
 

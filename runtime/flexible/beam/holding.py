@@ -10,6 +10,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.scene.checks.flexible import free_axes
+from mstmm.scene.checks.topology import holders
 from mstmm.scene.rules.values import split
 from mstmm.scene.tables.bushing import Bushing
 from mstmm.scene.tables.loads import Load, Spring
@@ -63,7 +64,12 @@ class Surroundings:
     """What acts on which body of a scene, found once for all its beams."""
 
     def __init__(self, scene: Scene) -> None:
-        self.holds = {hinge.outboard_body: hinge for hinge in scene.hinge}
+        self.holds = holders(scene)
+        #: Hinges that close loops, by the bodies that others hold.
+        self.closes: dict[str, list[Hinge]] = {}
+        for hinge in scene.hinge:
+            if self.holds.get(hinge.outboard_body) is not hinge:
+                self.closes.setdefault(hinge.outboard_body, []).append(hinge)
         self.carries: dict[str, list[Hinge]] = {}
         for hinge in scene.hinge:
             self.carries.setdefault(hinge.inboard_body, []).append(hinge)
@@ -85,7 +91,10 @@ class Surroundings:
         waiting = [body]
         while waiting:
             name = waiting[-1]
-            children = [hinge.outboard_body for hinge in self.carries.get(name, ())]
+            children = [
+                hinge.outboard_body for hinge in self.carries.get(name, ())
+                if self.holds.get(hinge.outboard_body) is hinge
+            ]  # fmt: skip
             missing = [child for child in children if child not in self._beyond]
             if missing:
                 waiting += missing
@@ -168,6 +177,10 @@ def _ends(around: Surroundings, beam: Beam, data: BeamData) -> Iterator[End]:
             free = frozenset()
         heavy = around.mass_beyond(hinge.outboard_body) > HEAVY * data.mass
         yield End(x, frozenset(AXES) - free, heavy)
+    for hinge in around.closes.get(beam.name, ()):
+        x, turn = data.ends[hinge.outboard_end or "root"]
+        free = frozenset() if _acts(hinge) else _directions(turn, free_axes(hinge))
+        yield End(x, frozenset(AXES) - free, True)
     for end, element in around.acts.get(beam.name, ()):
         x = data.ends[end][0]
         if isinstance(element, Load):

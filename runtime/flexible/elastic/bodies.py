@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.scene.checks.topology import holders
 from mstmm.scene.rules.values import GROUND, split
 
 from ...host.apart import apart
@@ -180,7 +181,7 @@ def model_of(elastic: Elastic) -> ElasticModel:
 
 def _holder(name: str, scene: Scene) -> Hinge | None:
     """The hinge that holds the body."""
-    return next((hinge for hinge in scene.hinge if hinge.outboard_body == name), None)
+    return holders(scene).get(name)
 
 
 def _used(name: str, scene: Scene) -> set[str]:

@@ -9,7 +9,7 @@ which connections pass sections of flexible bodies is kept beside the scene.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from mstmm.errors import SceneError
 from mstmm.expression.expression import Expression, parse
@@ -58,21 +58,24 @@ class Expanded:
         return name in self.bodies or name in self.passages or name.endswith(f"/{HELD}")
 
 
-def expand(scene: Scene, bodies: Mapping[str, ModalBody]) -> Expanded:
-    """The scene of nodes of a scene and its flexible bodies.
+def expand(scene: Scene, bodies: Mapping[str, ModalBody], cuts: tuple[Cut, ...] = ()) -> Expanded:
+    """The scene of nodes of a scene and its flexible bodies; `cuts` are the hinges that close loops
+    in it.
 
     Raises SceneError for a flexible body that no hinge holds.
     """
     if not bodies:
-        return Expanded(scene, scene, bodies)
-    return _Expansion(scene, bodies).run()
+        return Expanded(scene, scene, bodies, cuts=cuts)
+    return _Expansion(scene, bodies, cuts).run()
 
 
 class _Expansion:
     """One walk over the flexible bodies; tables of the new scene grow as it goes."""
 
-    def __init__(self, scene: Scene, bodies: Mapping[str, ModalBody]) -> None:
-        self.scene, self.made = scene, Expanded(scene, scene, bodies)
+    def __init__(
+        self, scene: Scene, bodies: Mapping[str, ModalBody], cuts: tuple[Cut, ...]
+    ) -> None:
+        self.scene, self.made, self.cuts = scene, Expanded(scene, scene, bodies), cuts
         self.body = list(scene.body)
         self.internal: list[Hinge] = []
         self.used = {self._full(x) for x in self._references()}
@@ -97,16 +100,18 @@ class _Expansion:
             "load": tuple(map(self._load, self.scene.load)),
         }  # fmt: skip
         self.made.scene = Scene.model_construct(**fields)
+        self.made.cuts = tuple(replace(cut, body=self._node(cut.body)) for cut in self.cuts)
         return self.made
 
     # --- references ---------------------------------------------------------------------------
 
     def _references(self) -> Iterator[str]:
+        yield from (cut.body for cut in self.cuts)
         yield from (hinge.inboard for hinge in self.scene.hinge)
         yield from (chain.inboard for chain in self.scene.chain)
         yield from (load.on for load in self.scene.load)
-        for force in self.scene.forces:
-            yield from (force.from_, force.to)
+        for element in (*self.scene.forces, *self.scene.constraint):
+            yield from (element.from_, element.to)
 
     def _full(self, reference: str) -> str:
         """The end that a reference means: the bare name of a beam is its root."""

@@ -7,9 +7,9 @@ the rows of the loop.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from mstmm.scene import Body, Scene
+from mstmm.scene import Body, End, Scene
 from mstmm.scene.checks.topology import build
 
 from .unknown import may_close, refuse_unknown
@@ -17,7 +17,8 @@ from .unknown import may_close, refuse_unknown
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """A hinge that closes a loop: its frame stands for `body` and has a name of its own."""
+    """A hinge that closes a loop: its frame stands for `body`, or for an end of it where it is
+    flexible, and has a name of its own."""
 
     hinge: str
     frame: str
@@ -27,22 +28,26 @@ class Cut:
 def opened(scene: Scene) -> tuple[Scene, tuple[Cut, ...]]:
     """The tree, and what is cut in the order of the hinges; a tree is its own.
 
-    Raises SceneError for what closes loops but is no hinge between rigid bodies.
+    Raises SceneError for what closes loops but is no hinge.
     """
     if not may_close(scene):
         return scene, ()
     refuse_unknown(scene)
-    plan = build(scene).plan
+    plan = build(scene.skeleton).plan
     if plan is None or not plan.cut:
         return scene, ()
-    tables, bodies, cuts = list(scene.hinge), list(scene.body), []
+    tables, bodies, cuts = list(scene.hinge), list(scene.body), list[Cut]()
+    bends = {one.name for one in (*scene.beam, *scene.elastic)}
     for number in plan.cut:
         hinge = tables[number]
-        end = f".{hinge.outboard_end}" if hinge.outboard_end else ""
-        cut = Cut(hinge.name, f"{hinge.name}/cut", hinge.outboard_body)
-        held = {"outboard": cut.frame + end, "cut": None}
+        end, name = hinge.outboard_end, f"{hinge.name}/cut"
+        cut, ends = Cut(hinge.name, name, hinge.outboard_body), dict[str, End]()
+        if cut.body in bends:
+            cut, end = replace(cut, body=hinge.outboard), ""
+        else:
+            ends = scene.bodies.by_name[cut.body].ends
+        held = {"outboard": f"{name}.{end}" if end else name, "cut": None}
         tables[number] = hinge.model_copy(update=held)
-        ends = scene.bodies.by_name[cut.body].ends
         frame = Body(name="frame", mass=0.0)
         bodies.append(frame.model_copy(update={"name": cut.frame, "ends": ends}))
         cuts.append(cut)

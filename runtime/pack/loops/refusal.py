@@ -20,11 +20,11 @@ def refuse(packed: Packed, what: str, instead: str) -> None:
     """SceneError where loops are closed, which `what` cannot follow; `instead` does."""
     if not packed.system.closes:
         return
-    plan = build(packed.described).plan
+    scene = packed.described.skeleton
+    plan = build(scene).plan
     assert plan is not None
     raise SceneError(
-        f"scene: {named_loop(packed.described, plan)} is closed, and {what} cannot follow that "
-        f"yet; {instead}"
+        f"scene: {named_loop(scene, plan)} is closed, and {what} cannot follow that yet; {instead}"
     )
 
 
@@ -61,6 +61,8 @@ def refuse_method(packed: Packed, method: str, tangent: str) -> None:
     loops = packed.written.loops
     if loops is not None and loops.count > sum(len(one.rows) for one in loops.closures):
         refuse(packed, f'method "{method}"', "dop853, dopri5 and rk4 do")
+    if packed.flexible:
+        refuse(packed, f'method "{method}" with flexible bodies', INSTEAD)
     if method in _ALIEN:
         refuse(packed, f'method "{method}"', "genalpha and rodas4p2 do")
     if tangent == "laws":

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from mstmm.errors import SceneError
 from mstmm.graph.plan import Plan
 from mstmm.scene import Scene
-from mstmm.scene.checks.topology import build
 
 if TYPE_CHECKING:
     from mstmm.scene.tables.all import SceneTables
@@ -30,12 +30,21 @@ def refuse_unknown(scene: Scene) -> None:
             f'scene: constraint "{scene.constraint[0].name}" is read and checked, but not '
             "compiled yet; a hinge that closes the loop is, or put a stiff [[spring]] there"
         )
-    if (scene.beam or scene.elastic) and may_close(scene):
-        plan = build(scene.skeleton).plan
-        assert plan is not None
+
+
+def refuse_beside_bending(scene: Scene, one_way: Collection[str]) -> None:
+    """SceneError for what flexible bodies cannot be beside in a scene with loops: constraints and
+    couplings, and bodies that bend without acting back."""
+    for table in ("constraint", "coupling"):
+        if getattr(scene, table):
+            raise SceneError(
+                f'scene: {table} "{getattr(scene, table)[0].name}" is not compiled in scenes with '
+                "flexible bodies yet; close the loop by a hinge or a [[bushing]]"
+            )
+    if one_way and may_close(scene):
         raise SceneError(
-            f"scene: {named_loop(scene.skeleton, plan)} is closed, which scenes with flexible "
-            "bodies cannot be yet; make the bodies rigid, or close it with a stiff [[spring]]"
+            f'scene: "{next(iter(one_way))}": model: loops are closed, which bodies that respond '
+            'one way cannot follow; write model = "flexible" or "rigid"'
         )
 
 

@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..bodies import RIGID
-from ..system import BodyNumbers, BodyRun, ClosureNumbers, System
+from ..system import Arrays, BodyNumbers, BodyRun, ClosureNumbers, System
 
 #: Gap of a row that repeats others, in parts of the length of the scene, at which a rigid mechanism
 #: locks.
 LOCKED = 1e-3
+#: Stiffness of the slowest mode, as a mass, in parts of that of the scene.
+_SLOW = 1e8
 #: Radius of gyration of a body in the metric of the geometry, in parts of the length.
 _GYRATION = 1.0 / 3.0
 
@@ -76,6 +78,26 @@ def torn(system: System) -> System:
     return replace(system, closures=())
 
 
+def stiff(system: System) -> System:
+    """With modal masses that stand for the stiffness of flexible bodies: they bend where nothing
+    else closes a loop."""
+
+    mass = sum(body.body_p[0] for body in system.distinct if body.body[1] == RIGID)
+
+    def made(body: BodyNumbers) -> BodyNumbers:
+        if body.modal is None:
+            return body
+        modal, moments = body.modal, dict(body.modal.moments.named)
+        stiffness = modal.matrices.named["stiffness"]
+        least = float(np.min(np.diag(stiffness), initial=np.inf))
+        most = max(mass, float(np.max(np.diag(moments["M"]), initial=0.0)))
+        moments["M"] = moments["M"] + _SLOW * most / least * stiffness
+        return replace(body, modal=replace(modal, moments=Arrays(moments)))
+
+    runs = tuple(replace(run, alike=tuple(map(made, run.alike))) for run in system.bodies)
+    return replace(system, bodies=runs)
+
+
 def length_of(system: System) -> float:
     """Mean square distance between hinges, m; 1 where all of them meet in one point."""
     squares = [sum(x * x for x in body.connection[9:12]) for body in system.distinct]
@@ -110,12 +132,17 @@ def _moment(system: System) -> float:
 
 
 def _with_bodies(system: System, changed: Callable[[int, BodyNumbers], BodyNumbers]) -> System:
-    """With rigid bodies changed, each given with its place, but for the frames of closures."""
+    """With rigid bodies changed, each given with its place, but for the frames of closures and the
+    ends and mass points of flexible bodies."""
     frames = {one.frame for one in system.closures}
 
     def made(run: BodyRun) -> BodyRun:
-        alike = (changed(run.place, b) if b.body[1] == RIGID else b for b in run.alike)
+        alike = (changed(run.place, b) if _is_rigid(b) else b for b in run.alike)
         return replace(run, alike=tuple(alike))
 
     runs = tuple(run if run.place in frames else made(run) for run in system.bodies)
     return replace(system, bodies=runs)
+
+
+def _is_rigid(body: BodyNumbers) -> bool:
+    return body.body[1] == RIGID and body.modal is None and body.section is None

@@ -7,7 +7,7 @@ from typing import Any
 
 from mstmm.graph.mechanism import GROUND, Rows
 
-from ..loops.rows import RowPlan, planned
+from ..loops.bent import BentPlan
 from ..loops.variants import LOCKED, length_of
 from ..system import ClosureNumbers, System
 from .couplings import WrittenCoupling, attach_couplings, placed
@@ -32,7 +32,7 @@ class LoopRecords:
     def __init__(
         self,
         place: int,
-        plan: RowPlan,
+        plan: BentPlan,
         rows: Any,
         closures: tuple[WrittenClosure, ...],
         couplings: tuple[WrittenCoupling, ...],
@@ -110,7 +110,7 @@ class _Loops:
             Rows(tuple(end for hinge in one.hinges for end in (hinge.inboard, hinge.outboard)), 1)
             for one in system.couplings if not one.repeats
         ]  # fmt: skip
-        self.plan: RowPlan = planned(self.parents, groups)
+        self.plan = BentPlan(system, groups)
         self.row_numbers = int(lib.MSTMM_ROW)
         count = len(self.plan.rows)
         self.dump = count * self.row_numbers
@@ -122,8 +122,15 @@ class _Loops:
             for row in rows:
                 self.columns[body, row] = start
                 start += 6
+        #: Columns on the modes of flexible bodies.
+        self.modes: dict[tuple[int, int], int] = {}
+        for body, rows in self.plan.bent.items():
+            for row in rows:
+                self.modes[body, row] = start
+                start += self._modes_of(body)
         self.summed = self.end = start
         passing = [len(rows) for _, rows in self.pending]
+        passing += map(len, self.plan.bent.values())
         staying = [len(row.others) for row in self.plan.rows]
         pairs = sum(n * (n + 1) // 2 for n in (*passing, *staying))
         self.shelves = {
@@ -147,6 +154,9 @@ class _Loops:
         for body, rows in self.pending:
             looped[body].n_pending = len(rows)
             looped[body].pending = self._pending(body, rows)
+        for body, rows in self.plan.bent.items():
+            looped[body].n_bent = len(rows)
+            looped[body].bent = self._bent(body, rows)
         records = memory.new("mstmm_loop_row[]", max(1, len(self.plan.rows)))
         model.first_ground_row = len(self.plan.rows)
         for number, row in enumerate(self.plan.rows):
@@ -200,10 +210,25 @@ class _Loops:
             records[k].row = row
             records[k].column = self.columns[body, row]
             records[k].onward = self._column(self.parents[body], row)
+            records[k].modes = self.modes.get((self.parents[body], row), 0)
             records[k].y = self._take(speeds)
             records[k].tau = self.coupled.get((body, row), -1)
             records[k].pairs = self._places([self._entry(row, other) for other in rows[: k + 1]])
         return records
+
+    def _bent(self, body: int, rows: list[int]) -> Any:
+        records = self.shelves["mstmm_pending"].take(len(rows))
+        for k, row in enumerate(rows):
+            records[k].row = row
+            records[k].column = self._column(body, row)
+            records[k].modes = self.modes[body, row]
+            records[k].y = self._take(self._modes_of(body))
+            records[k].pairs = self._places([self._entry(row, other) for other in rows[: k + 1]])
+        return records
+
+    def _modes_of(self, body: int) -> int:
+        modal = self.system.body(body).modal
+        return 0 if modal is None else modal.n
 
     def _others(self, body: int, others: tuple[int, ...], number: int) -> Any:
         records = self.shelves["mstmm_other"].take(len(others))

@@ -1,0 +1,199 @@
+"""Flexible bodies in closed loops, against the open tree under the forces that close it."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mstmm
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+
+from .scenes import rod
+
+Scene = dict[str, Any]
+
+CRANK, ROD, ANGLE = 0.3, 0.9, 0.6
+#: The same shapes in the loop and in the open tree.
+BASIS = {"frame": "tangent", "basis": "clamped-free"}
+
+
+def slider_crank(cut: str = "wrist", stiffness: float = 300.0) -> Scene:
+    """A crank, a beam for its rod and a slider; of its hinges `cut` closes the loop."""
+    lean = np.arcsin(CRANK * np.sin(ANGLE) / ROD)
+    reach = CRANK * np.cos(ANGLE) + ROD * np.cos(lean)
+    slider = {"name": "slider", "mass": 0.8, "inertia": [1e-3, 1e-3, 1e-3]}
+    hinges: list[Scene] = [
+        {"name": "foot", "type": "pin", "inboard": "ground", "outboard": "crank",
+         "initial": {"q": ANGLE, "u": 8.0}},
+        {"name": "knee", "type": "pin", "inboard": "crank.tip", "outboard": "bar",
+         "initial": {"q": -lean - ANGLE}},
+        {"name": "guide", "type": "prismatic", "inboard": "ground", "outboard": "slider",
+         "axis": [1, 0, 0], "initial": {"q": reach}},
+        {"name": "wrist", "type": "pin", "inboard": "bar.tip", "outboard": "slider"},
+    ]  # fmt: skip
+    if cut == "turned":
+        hinges[3] |= {"inboard": "slider", "outboard": "bar.tip", "cut": True}
+    else:
+        next(one for one in hinges if one["name"] == cut)["cut"] = True
+    return {"gravity": [0, -9.81, 0], "body": [rod("crank", CRANK, 0.5), slider], "hinge": hinges,
+            "beam": [{"name": "bar", "length": ROD, "mass_per_length": 1.5,
+                      "bending_stiffness": stiffness, "modes": {"y": 2, "z": 0},
+                      **BASIS}]}  # fmt: skip
+
+
+def shackled() -> Scene:
+    """A cantilever with two links between its middle and its tip: the loop closes on the beam."""
+    links = [rod("near", 0.4, 0.2), rod("far", 0.5, 0.3)]
+    hinges: list[Scene] = [
+        {"name": "root", "type": "pin", "inboard": "ground", "outboard": "bar",
+         "initial": {"u": 2.0}},
+        {"name": "middle", "type": "pin", "inboard": "bar.mid", "outboard": "near",
+         "initial": {"q": 1.0}},
+        {"name": "joint", "type": "pin", "inboard": "near.tip", "outboard": "far",
+         "initial": {"q": -1.8}},
+        {"name": "wrist", "type": "pin", "inboard": "far.tip", "outboard": "bar.tip", "cut": True},
+    ]  # fmt: skip
+    return {"gravity": [0, -9.81, 0], "body": links, "hinge": hinges,
+            "beam": [{"name": "bar", "length": 1.2, "mass_per_length": 1.5,
+                      "bending_stiffness": 40.0, "modes": {"y": 3, "z": 0}, **BASIS,
+                      "ends": {"mid": 0.6}}]}  # fmt: skip
+
+
+def hung() -> Scene:
+    """Two beams in space from the ground to the ends of a bar, on balls; they bend both ways."""
+    beams = [
+        {"name": name, "length": 1.0, "mass_per_length": 0.8, "bending_stiffness": [30.0, 50.0],
+         "torsional_stiffness": 20.0, "polar_inertia_per_length": 1e-3,
+         "modes": {"y": 2, "z": 1, "twist": 1}, **BASIS}
+        for name in ("left", "right")
+    ]  # fmt: skip
+    hinges: list[Scene] = [
+        {"name": "first", "type": "ball", "inboard": "ground", "outboard": "left",
+         "orientation": [0.1, 1.2, 0.2], "initial": {"u": [0.4, -1.0, 0.6]}},
+        {"name": "second", "type": "ball", "inboard": "left.tip", "outboard": "bar",
+         "initial": {"q": [0.92, 0.0, -0.39, 0.0]}},
+        {"name": "third", "type": "universal", "axis2": [0, 1, 0],
+         "inboard": "ground", "outboard": "right", "position": [1.1, 0.2, 0.0],
+         "orientation": [0.0, 1.4, -0.1]},
+        {"name": "wrist", "type": "ball", "inboard": "bar.tip", "outboard": "right.tip",
+         "cut": True},
+    ]  # fmt: skip
+    bar = {"name": "bar", "mass": 0.7, "center_of_mass": [0.5, 0.05, 0],
+           "inertia": [0.02, 0.06, 0.05], "ends": {"tip": [1.0, 0.1, 0]}}  # fmt: skip
+    return {"gravity": [0, 0, -9.81], "body": [bar], "beam": beams, "hinge": hinges}
+
+
+SCENES = {"slider_crank": (slider_crank, "slider", 2), "shackled": (shackled, "far.tip", 2),
+          "hung": (hung, "bar.tip", 3)}  # fmt: skip
+
+
+def run(scene: Scene, t_end: float = 0.3, **options: Any) -> mstmm.Result:
+    result = mstmm.compile(mstmm.Scene(**scene)).simulate(
+        t_end, rtol=1e-9, atol=1e-11, output_times=np.linspace(0, t_end, 4), **options
+    )
+    assert result.success, result.message
+    return result
+
+
+def opened(scene: Scene, rows: int, ends: tuple[str, str]) -> mstmm.Model:
+    """The tree without the wrist, and in its place equal forces on both ends by inputs."""
+    tree = copy.deepcopy(scene)
+    tree["hinge"] = [one for one in tree["hinge"] if one["name"] != "wrist"]
+    tree["input"] = [{"name": f"pull{k}", "unit": "N", "value": 0.0} for k in range(rows)]
+    force = [f"pull{k}" if k < rows else "0" for k in range(3)]
+    tree["load"] = [
+        {"on": end, "force": [f"{sign}{one}" for one in force]}
+        for end, sign in zip(ends, ("", "-"), strict=True)
+    ]
+    return mstmm.compile(mstmm.Scene(**tree))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_accelerations_are_those_of_the_tree_under_the_forces_that_close_it(name: str) -> None:
+    made, other, rows = SCENES[name]
+    scene = made()
+    closed = run(scene)
+    assert np.ptp(closed.energy()) < 2e-7 * max(1.0, np.abs(closed.energy()).max())
+    wrist = scene["hinge"][3]
+    bent = wrist["outboard"] if "tip" in wrist["outboard"] else wrist["inboard"]
+    apart = closed.position(bent) - closed.position(other)
+    np.testing.assert_allclose(apart[:, :rows], 0, atol=1e-9)
+    slots = closed.model.layout.hinges["wrist"]
+    q, u = (np.delete(x[-1], part) for x, part in
+            ((closed.q, slots.q_slice), (closed.u, slots.u_slice)))  # fmt: skip
+    assert np.abs(q[-2:]).max() > 1e-6  # bent
+    tree = opened(scene, rows, (bent, other))
+
+    def pulled(forces: Array) -> tuple[Array, Array]:
+        """Accelerations along the speeds, and those of the ends apart from each other."""
+        model = tree.with_inputs({f"pull{k}": float(x) for k, x in enumerate(forces)})
+        seen = model.simulate(1e-9, initial=(q, u), output_times=[0.0])
+        apart = seen.acceleration(bent) - seen.acceleration(other)
+        return seen.udot[0], apart[0, :rows]
+
+    free, gap = pulled(np.zeros(rows))
+    columns = [pulled(unit) for unit in np.eye(rows)]
+    forces = np.linalg.solve(np.array([one - gap for _, one in columns]).T, -gap)
+    known = free + sum(x * (one - free) for x, (one, _) in zip(forces, columns, strict=True))
+    model = mstmm.compile(mstmm.Scene(**scene))
+    found = np.delete(model.accelerations(closed.q[-1], closed.u[-1]), slots.u_slice)
+    np.testing.assert_allclose(found, known, rtol=0, atol=2e-11 * np.abs(known).max())
+
+
+def test_cutting_another_hinge_changes_nothing() -> None:
+    found = [run(slider_crank(cut)) for cut in ("wrist", "turned", "guide")]
+    for other in found[1:]:
+        for hinge in ("foot", "guide"):
+            np.testing.assert_allclose(
+                other.coordinate(hinge), found[0].coordinate(hinge), atol=1e-7
+            )
+        np.testing.assert_allclose(other.position("bar.tip"), found[0].position("bar.tip"),
+                                   atol=1e-7)  # fmt: skip
+    assert mstmm.compile(mstmm.Scene(**slider_crank())).loops.rank == 2
+
+
+def test_a_stiff_rod_moves_as_a_rigid_one() -> None:
+    """What it bends by goes with 1 / EI."""
+    scene = slider_crank()
+    scene["beam"][0]["model"] = "rigid"
+    rigid = run(scene).coordinate("foot")[-1, 0]
+    gaps = [abs(run(slider_crank(stiffness=ei)).coordinate("foot")[-1, 0] - rigid)
+            for ei in (1e4, 1e5)]  # fmt: skip
+    assert gaps[0] > 1e-6
+    assert gaps[1] < 0.5 * gaps[0]
+
+
+def test_a_stiff_bushing_does_as_the_hinge() -> None:
+    scene = slider_crank()
+    tree = copy.deepcopy(scene)
+    del tree["hinge"][3]
+    k, c = 3e6, 3e2
+    tree["bushing"] = [
+        {"from": "bar.tip", "to": "slider", "stiffness": [k, k, 0, 0, 0, 0],
+         "damping": [c, c, 0, 0, 0, 0]}
+    ]  # fmt: skip
+    closed = run(scene)
+    kept = np.delete(np.arange(closed.q.shape[1]), closed.model.layout.hinges["wrist"].q_slice)
+    soft = run(tree, initial=(closed.q[0, kept], closed.u[0, kept]))
+    assert soft.coordinate("foot")[-1] == pytest.approx(closed.coordinate("foot")[-1], abs=1e-4)
+
+
+def test_what_is_refused() -> None:
+    scene = slider_crank()
+    model = mstmm.compile(mstmm.Scene(**scene))
+    for asked in (
+        lambda: model.simulate(0.1, method="rodas5p"),
+        lambda: model.derivatives(*model.initial_state()),
+    ):
+        with pytest.raises(SceneError, match="with flexible bodies cannot follow that yet"):
+            asked()
+    distance = {"type": "distance", "from": "bar.tip", "to": "ground", "length": 1.0}
+    with pytest.raises(SceneError, match="not compiled in scenes with flexible bodies yet"):
+        mstmm.compile(mstmm.Scene(**scene, constraint=[distance]))
+    scene["beam"][0]["model"] = "one-way"
+    with pytest.raises(SceneError, match='"bar": model: loops are closed'):
+        mstmm.compile(mstmm.Scene(**scene))
