@@ -1309,6 +1309,16 @@ int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *
 int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
     const real *restrict x, real *restrict l);
 int mstmm_sweep_loops_loaded(const real *restrict K, const real *restrict x, real *restrict e);
+int mstmm_sweep_loops_distance(const real *restrict p, const real *restrict d, real *restrict W,
+    real *restrict gap);
+int mstmm_sweep_loops_distance_drift(const real *restrict d, const real *restrict slip,
+    real *restrict drift);
+int mstmm_sweep_loops_plane(const real *restrict p, const real *restrict d, real *restrict W,
+    real *restrict gap);
+int mstmm_sweep_loops_rolling(const real *restrict p, const real *restrict R_C,
+    const real *restrict d, real *restrict W, real *restrict gap);
+int mstmm_sweep_loops_rolling_drift(const real *restrict p, const real *restrict R_C,
+    const real *restrict slip, real *restrict drift);
 int mstmm_sweep_loops_gap_slope(const real *restrict A_C, const real *restrict x_C,
     const real *restrict A_B, const real *restrict x_B, const real *restrict R_e,
     const real *restrict r_e, const real *restrict Rc, const real *restrict r,

@@ -1795,6 +1795,71 @@ static inline int mstmm_loops_loaded_by(struct mstmm_loops_loaded to)
 }
 #define mstmm_loops_loaded(...) mstmm_loops_loaded_by((struct mstmm_loops_loaded){__VA_ARGS__})
 
+struct mstmm_loops_distance {
+    const real *p;
+    const real *d;
+    real *W;
+    real *gap;
+};
+static inline int mstmm_loops_distance_by(struct mstmm_loops_distance to)
+{
+    return mstmm_sweep_loops_distance(
+        to.p, to.d, to.W, to.gap);
+}
+#define mstmm_loops_distance(...) mstmm_loops_distance_by((struct mstmm_loops_distance){__VA_ARGS__})
+
+struct mstmm_loops_distance_drift {
+    const real *d;
+    const real *slip;
+    real *drift;
+};
+static inline int mstmm_loops_distance_drift_by(struct mstmm_loops_distance_drift to)
+{
+    return mstmm_sweep_loops_distance_drift(
+        to.d, to.slip, to.drift);
+}
+#define mstmm_loops_distance_drift(...) mstmm_loops_distance_drift_by((struct mstmm_loops_distance_drift){__VA_ARGS__})
+
+struct mstmm_loops_plane {
+    const real *p;
+    const real *d;
+    real *W;
+    real *gap;
+};
+static inline int mstmm_loops_plane_by(struct mstmm_loops_plane to)
+{
+    return mstmm_sweep_loops_plane(
+        to.p, to.d, to.W, to.gap);
+}
+#define mstmm_loops_plane(...) mstmm_loops_plane_by((struct mstmm_loops_plane){__VA_ARGS__})
+
+struct mstmm_loops_rolling {
+    const real *p;
+    const real *R_C;
+    const real *d;
+    real *W;
+    real *gap;
+};
+static inline int mstmm_loops_rolling_by(struct mstmm_loops_rolling to)
+{
+    return mstmm_sweep_loops_rolling(
+        to.p, to.R_C, to.d, to.W, to.gap);
+}
+#define mstmm_loops_rolling(...) mstmm_loops_rolling_by((struct mstmm_loops_rolling){__VA_ARGS__})
+
+struct mstmm_loops_rolling_drift {
+    const real *p;
+    const real *R_C;
+    const real *slip;
+    real *drift;
+};
+static inline int mstmm_loops_rolling_drift_by(struct mstmm_loops_rolling_drift to)
+{
+    return mstmm_sweep_loops_rolling_drift(
+        to.p, to.R_C, to.slip, to.drift);
+}
+#define mstmm_loops_rolling_drift(...) mstmm_loops_rolling_drift_by((struct mstmm_loops_rolling_drift){__VA_ARGS__})
+
 struct mstmm_loops_gap_slope {
     const real *A_C;
     const real *x_C;

@@ -38,6 +38,16 @@ int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *
 int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
     const real *restrict x, real *restrict l);
 int mstmm_sweep_loops_loaded(const real *restrict K, const real *restrict x, real *restrict e);
+int mstmm_sweep_loops_distance(const real *restrict p, const real *restrict d, real *restrict W,
+    real *restrict gap);
+int mstmm_sweep_loops_distance_drift(const real *restrict d, const real *restrict slip,
+    real *restrict drift);
+int mstmm_sweep_loops_plane(const real *restrict p, const real *restrict d, real *restrict W,
+    real *restrict gap);
+int mstmm_sweep_loops_rolling(const real *restrict p, const real *restrict R_C,
+    const real *restrict d, real *restrict W, real *restrict gap);
+int mstmm_sweep_loops_rolling_drift(const real *restrict p, const real *restrict R_C,
+    const real *restrict slip, real *restrict drift);
 int mstmm_sweep_loops_gap_slope(const real *restrict A_C, const real *restrict x_C,
     const real *restrict A_B, const real *restrict x_B, const real *restrict R_e,
     const real *restrict r_e, const real *restrict Rc, const real *restrict r,
@@ -1858,6 +1868,456 @@ static const mstmm_port mstmm_sweep_loops_loaded_inputs[] = {
 
 static const mstmm_port mstmm_sweep_loops_loaded_outputs[] = {
     {"e", 6, "", 1, 0},
+};
+
+/* row of a distance that is kept
+ * in  p[1] (m) the distance that is kept
+ * in  d[3] (m) that end from the origin of C, axes of C
+ * out W[6][6] rows: H^+, then what the hinge holds
+ * out gap[6] (m) what the constraint lacks, axes of C
+ */
+int mstmm_sweep_loops_distance(const real *restrict p, const real *restrict d, real *restrict W,
+    real *restrict gap)
+{
+    const real t0 = d[2] * d[2];
+    const real t1 = d[0] * d[0];
+    const real t2 = d[1] * d[1];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    const real t5 = 1e-24 < t4;
+    const real t6 = (1e-24 < t4 || isnan(t4)) ? t4 : 1e-24;
+    const real t7 = sqrt(t6);
+    const real t8 = 1.0 / t7;
+    const real t9 = d[0] * t8;
+    const real t10 = t5 != 0 ? t9 : 1.0;
+    W[0] = t10;
+    const real t11 = d[1] * t8;
+    const real t12 = t5 != 0 ? t11 : 0.0;
+    W[1] = t12;
+    const real t13 = d[2] * t8;
+    const real t14 = t5 != 0 ? t13 : 0.0;
+    W[2] = t14;
+    W[3] = 0.0;
+    W[4] = 0.0;
+    W[5] = 0.0;
+    W[6] = 0.0;
+    W[7] = 0.0;
+    W[8] = 0.0;
+    W[9] = 0.0;
+    W[10] = 0.0;
+    W[11] = 0.0;
+    W[12] = 0.0;
+    W[13] = 0.0;
+    W[14] = 0.0;
+    W[15] = 0.0;
+    W[16] = 0.0;
+    W[17] = 0.0;
+    W[18] = 0.0;
+    W[19] = 0.0;
+    W[20] = 0.0;
+    W[21] = 0.0;
+    W[22] = 0.0;
+    W[23] = 0.0;
+    W[24] = 0.0;
+    W[25] = 0.0;
+    W[26] = 0.0;
+    W[27] = 0.0;
+    W[28] = 0.0;
+    W[29] = 0.0;
+    W[30] = 0.0;
+    W[31] = 0.0;
+    W[32] = 0.0;
+    W[33] = 0.0;
+    W[34] = 0.0;
+    W[35] = 0.0;
+    const real t15 = t7 - p[0];
+    const real t16 = t10 * t15;
+    gap[0] = t16;
+    const real t17 = t12 * t15;
+    gap[1] = t17;
+    const real t18 = t14 * t15;
+    gap[2] = t18;
+    gap[3] = 0.0;
+    gap[4] = 0.0;
+    gap[5] = 0.0;
+    return 0;
+}
+
+static int mstmm_sweep_loops_distance_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_distance(in[0], in[1], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_loops_distance_inputs[] = {
+    {"p", 1, "m", 0, 0},
+    {"d", 3, "m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_distance_outputs[] = {
+    {"W", 36, "", 0, 0},
+    {"gap", 6, "m", 0, 0},
+};
+
+/* rate of the row of a distance
+ * in  d[3] (m) that end from the origin of C, axes of C
+ * in  slip[6] rate of d and relative angular velocity, axes of C
+ * out drift[6] rate of the slip in the bias motion, axes of C, added to what is there
+ */
+int mstmm_sweep_loops_distance_drift(const real *restrict d, const real *restrict slip,
+    real *restrict drift)
+{
+    const real t0 = d[2] * d[2];
+    const real t1 = d[0] * d[0];
+    const real t2 = d[1] * d[1];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    const real t5 = (1e-24 < t4 || isnan(t4)) ? t4 : 1e-24;
+    const real t6 = sqrt(t5);
+    const real t7 = 1.0 / t6;
+    const real t8 = 1e-24 < t4;
+    const real t9 = d[0] * t7;
+    const real t10 = t8 != 0 ? t9 : 1.0;
+    const real t11 = slip[2] * slip[2];
+    const real t12 = slip[1] * slip[1];
+    const real t13 = slip[0] * slip[0];
+    const real t14 = d[2] * t7;
+    const real t15 = t8 != 0 ? t14 : 0.0;
+    const real t16 = slip[2] * t15;
+    const real t17 = slip[0] * t10;
+    const real t18 = d[1] * t7;
+    const real t19 = t8 != 0 ? t18 : 0.0;
+    const real t20 = slip[1] * t19;
+    const real t21 = t17 + t20;
+    const real t22 = t16 + t21;
+    const real t23 = t22 * t22;
+    const real t24 = t13 - t23;
+    const real t25 = t12 + t24;
+    const real t26 = t11 + t25;
+    const real t27 = t10 * t26;
+    const real t28 = t7 * t27;
+    drift[0] += t28;
+    const real t29 = t19 * t26;
+    const real t30 = t7 * t29;
+    drift[1] += t30;
+    const real t31 = t15 * t26;
+    const real t32 = t7 * t31;
+    drift[2] += t32;
+    drift[3] += 0.0;
+    drift[4] += 0.0;
+    drift[5] += 0.0;
+    return 0;
+}
+
+static int mstmm_sweep_loops_distance_drift_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_distance_drift(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_distance_drift_inputs[] = {
+    {"d", 3, "m", 0, 0},
+    {"slip", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_distance_drift_outputs[] = {
+    {"drift", 6, "", 1, 0},
+};
+
+/* row of a point on a plane
+ * in  p[1] (m) height of the plane over C
+ * in  d[3] (m) that end from the origin of C, axes of C
+ * out W[6][6] rows: H^+, then what the hinge holds
+ * out gap[6] (m) what the constraint lacks, axes of C
+ */
+int mstmm_sweep_loops_plane(const real *restrict p, const real *restrict d, real *restrict W,
+    real *restrict gap)
+{
+    W[0] = 0.0;
+    W[1] = 0.0;
+    W[2] = 1.0;
+    W[3] = 0.0;
+    W[4] = 0.0;
+    W[5] = 0.0;
+    W[6] = 0.0;
+    W[7] = 0.0;
+    W[8] = 0.0;
+    W[9] = 0.0;
+    W[10] = 0.0;
+    W[11] = 0.0;
+    W[12] = 0.0;
+    W[13] = 0.0;
+    W[14] = 0.0;
+    W[15] = 0.0;
+    W[16] = 0.0;
+    W[17] = 0.0;
+    W[18] = 0.0;
+    W[19] = 0.0;
+    W[20] = 0.0;
+    W[21] = 0.0;
+    W[22] = 0.0;
+    W[23] = 0.0;
+    W[24] = 0.0;
+    W[25] = 0.0;
+    W[26] = 0.0;
+    W[27] = 0.0;
+    W[28] = 0.0;
+    W[29] = 0.0;
+    W[30] = 0.0;
+    W[31] = 0.0;
+    W[32] = 0.0;
+    W[33] = 0.0;
+    W[34] = 0.0;
+    W[35] = 0.0;
+    gap[0] = 0.0;
+    gap[1] = 0.0;
+    const real t0 = d[2] - p[0];
+    gap[2] = t0;
+    gap[3] = 0.0;
+    gap[4] = 0.0;
+    gap[5] = 0.0;
+    return 0;
+}
+
+static int mstmm_sweep_loops_plane_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_plane(in[0], in[1], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_loops_plane_inputs[] = {
+    {"p", 1, "m", 0, 0},
+    {"d", 3, "m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_plane_outputs[] = {
+    {"W", 36, "", 0, 0},
+    {"gap", 6, "m", 0, 0},
+};
+
+/* rows of a disc that rolls on a plane
+ * in  p[5] (m, -) height of the plane over C, radius of the disc, its axis in axes of B (a ball: 0)
+ * in  R_C[3][3] rotation, axes of C to axes of B
+ * in  d[3] (m) that end from the origin of C, axes of C
+ * out W[6][6] rows: H^+, then what the hinge holds
+ * out gap[6] (m) what the constraint lacks, axes of C
+ */
+int mstmm_sweep_loops_rolling(const real *restrict p, const real *restrict R_C,
+    const real *restrict d, real *restrict W, real *restrict gap)
+{
+    const real t0 = p[2] * R_C[2];
+    const real t1 = p[3] * R_C[5];
+    const real t2 = t0 + t1;
+    const real t3 = p[4] * R_C[8];
+    const real t4 = t2 + t3;
+    const real t5 = t4 * t4;
+    const real t6 = 1.0 - t5;
+    const real t7 = t6 * t6;
+    const real t8 = p[2] * R_C[0];
+    const real t9 = p[3] * R_C[3];
+    const real t10 = t8 + t9;
+    const real t11 = p[4] * R_C[6];
+    const real t12 = t10 + t11;
+    const real t13 = t12 * t4;
+    const real t14 = t13 * t13;
+    const real t15 = p[2] * R_C[1];
+    const real t16 = p[3] * R_C[4];
+    const real t17 = t15 + t16;
+    const real t18 = p[4] * R_C[7];
+    const real t19 = t17 + t18;
+    const real t20 = t19 * t4;
+    const real t21 = t20 * t20;
+    const real t22 = t14 + t21;
+    const real t23 = t7 + t22;
+    const real t24 = (1e-24 < t23 || isnan(t23)) ? t23 : 1e-24;
+    const real t25 = sqrt(t24);
+    const real t26 = ((real)1 / (real)1000) < t25;
+    if (!(t26 != 0)) return 1; /* the disc lies flat on its plane */
+    W[0] = 1.0;
+    W[1] = 0.0;
+    W[2] = 0.0;
+    W[3] = 0.0;
+    const real t27 = 1.0 / t25;
+    const real t28 = p[1] * t6;
+    const real t29 = t27 * t28;
+    const real t30 = -t29;
+    W[4] = t30;
+    const real t31 = p[1] * t20;
+    const real t32 = t27 * t31;
+    const real t33 = -t32;
+    W[5] = t33;
+    W[6] = 0.0;
+    W[7] = 1.0;
+    W[8] = 0.0;
+    W[9] = t29;
+    W[10] = 0.0;
+    const real t34 = p[1] * t13;
+    const real t35 = t34 * t27;
+    W[11] = t35;
+    W[12] = 0.0;
+    W[13] = 0.0;
+    W[14] = 1.0;
+    W[15] = t32;
+    const real t36 = -t35;
+    W[16] = t36;
+    W[17] = 0.0;
+    W[18] = 0.0;
+    W[19] = 0.0;
+    W[20] = 0.0;
+    W[21] = 0.0;
+    W[22] = 0.0;
+    W[23] = 0.0;
+    W[24] = 0.0;
+    W[25] = 0.0;
+    W[26] = 0.0;
+    W[27] = 0.0;
+    W[28] = 0.0;
+    W[29] = 0.0;
+    W[30] = 0.0;
+    W[31] = 0.0;
+    W[32] = 0.0;
+    W[33] = 0.0;
+    W[34] = 0.0;
+    W[35] = 0.0;
+    gap[0] = 0.0;
+    gap[1] = 0.0;
+    const real t37 = d[2] - p[0];
+    const real t38 = t37 - t29;
+    gap[2] = t38;
+    gap[3] = 0.0;
+    gap[4] = 0.0;
+    gap[5] = 0.0;
+    return 0;
+}
+
+static int mstmm_sweep_loops_rolling_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_rolling(in[0], in[1], in[2], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_loops_rolling_inputs[] = {
+    {"p", 5, "m, -", 0, 0},
+    {"R_C", 9, "", 0, 0},
+    {"d", 3, "m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_rolling_outputs[] = {
+    {"W", 36, "", 0, 0},
+    {"gap", 6, "m", 0, 0},
+};
+
+static const mstmm_guard mstmm_sweep_loops_rolling_guards[] = {
+    {1, "the disc lies flat on its plane"},
+};
+
+/* rate of the rows of a disc that rolls on a plane
+ * in  p[5] (m, -) height of the plane over C, radius of the disc, its axis in axes of B (a ball: 0)
+ * in  R_C[3][3] rotation, axes of C to axes of B
+ * in  slip[6] rate of d and relative angular velocity, axes of C
+ * out drift[6] rate of the slip in the bias motion, axes of C, added to what is there
+ */
+int mstmm_sweep_loops_rolling_drift(const real *restrict p, const real *restrict R_C,
+    const real *restrict slip, real *restrict drift)
+{
+    const real t0 = p[2] * R_C[2];
+    const real t1 = p[3] * R_C[5];
+    const real t2 = t0 + t1;
+    const real t3 = p[4] * R_C[8];
+    const real t4 = t2 + t3;
+    const real t5 = t4 * t4;
+    const real t6 = 1.0 - t5;
+    const real t7 = t6 * t6;
+    const real t8 = p[2] * R_C[0];
+    const real t9 = p[3] * R_C[3];
+    const real t10 = t8 + t9;
+    const real t11 = p[4] * R_C[6];
+    const real t12 = t10 + t11;
+    const real t13 = t12 * t4;
+    const real t14 = t13 * t13;
+    const real t15 = p[2] * R_C[1];
+    const real t16 = p[3] * R_C[4];
+    const real t17 = t15 + t16;
+    const real t18 = p[4] * R_C[7];
+    const real t19 = t17 + t18;
+    const real t20 = t19 * t4;
+    const real t21 = t20 * t20;
+    const real t22 = t14 + t21;
+    const real t23 = t7 + t22;
+    const real t24 = (1e-24 < t23 || isnan(t23)) ? t23 : 1e-24;
+    const real t25 = sqrt(t24);
+    const real t26 = 1.0 / t25;
+    const real t27 = slip[3] * t19;
+    const real t28 = slip[4] * t12;
+    const real t29 = t27 - t28;
+    const real t30 = t12 * t29;
+    const real t31 = slip[4] * t4;
+    const real t32 = slip[5] * t19;
+    const real t33 = t31 - t32;
+    const real t34 = t4 * t33;
+    const real t35 = t30 + t34;
+    const real t36 = t13 * t35;
+    const real t37 = t19 * t29;
+    const real t38 = slip[5] * t12;
+    const real t39 = slip[3] * t4;
+    const real t40 = t38 - t39;
+    const real t41 = t4 * t40;
+    const real t42 = t37 + t41;
+    const real t43 = t20 * t42;
+    const real t44 = t36 + t43;
+    const real t45 = t4 * t29;
+    const real t46 = 2.0 * t45;
+    const real t47 = t6 * t46;
+    const real t48 = t44 - t47;
+    const real t49 = t48 * t26;
+    const real t50 = t20 * t49;
+    const real t51 = t26 * t50;
+    const real t52 = t51 - t42;
+    const real t53 = p[1] * t52;
+    const real t54 = t26 * t53;
+    const real t55 = slip[5] * t54;
+    const real t56 = t6 * t49;
+    const real t57 = t26 * t56;
+    const real t58 = t46 + t57;
+    const real t59 = p[1] * t58;
+    const real t60 = t26 * t59;
+    const real t61 = slip[4] * t60;
+    const real t62 = t55 + t61;
+    drift[0] += t62;
+    const real t63 = t13 * t49;
+    const real t64 = t26 * t63;
+    const real t65 = t64 - t35;
+    const real t66 = p[1] * t65;
+    const real t67 = t26 * t66;
+    const real t68 = slip[5] * t67;
+    const real t69 = slip[3] * t60;
+    const real t70 = t68 + t69;
+    const real t71 = -t70;
+    drift[1] += t71;
+    const real t72 = slip[4] * t67;
+    const real t73 = slip[3] * t54;
+    const real t74 = t72 - t73;
+    drift[2] += t74;
+    drift[3] += 0.0;
+    drift[4] += 0.0;
+    drift[5] += 0.0;
+    return 0;
+}
+
+static int mstmm_sweep_loops_rolling_drift_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_rolling_drift(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_rolling_drift_inputs[] = {
+    {"p", 5, "m, -", 0, 0},
+    {"R_C", 9, "", 0, 0},
+    {"slip", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_rolling_drift_outputs[] = {
+    {"drift", 6, "", 1, 0},
 };
 
 /* gap and its derivative along a direction
@@ -4358,6 +4818,66 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "distance",
+        .function = (void (*)(void))mstmm_sweep_loops_distance,
+        .call = mstmm_sweep_loops_distance_call,
+        .n_inputs = 2,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_loops_distance_inputs,
+        .outputs = mstmm_sweep_loops_distance_outputs,
+        .ir_hash = "d3e43424a6952a98737b6c39df274dc776bb767f2381e3a99ee92a41be10bef5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "distance_drift",
+        .function = (void (*)(void))mstmm_sweep_loops_distance_drift,
+        .call = mstmm_sweep_loops_distance_drift_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_distance_drift_inputs,
+        .outputs = mstmm_sweep_loops_distance_drift_outputs,
+        .ir_hash = "780e1802a1e7773edb96cd8b971cad8f7f43c5e0149f0108f5ea0e3a88655ffa",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "plane",
+        .function = (void (*)(void))mstmm_sweep_loops_plane,
+        .call = mstmm_sweep_loops_plane_call,
+        .n_inputs = 2,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_loops_plane_inputs,
+        .outputs = mstmm_sweep_loops_plane_outputs,
+        .ir_hash = "3ef5783ebcc52b6bcda9329197bdd04073e1cc767cd12e0da606f55ca92a60d9",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "rolling",
+        .function = (void (*)(void))mstmm_sweep_loops_rolling,
+        .call = mstmm_sweep_loops_rolling_call,
+        .n_inputs = 3,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_loops_rolling_inputs,
+        .outputs = mstmm_sweep_loops_rolling_outputs,
+        .ir_hash = "a1ff2f6ad76f95733d26e4fd587463918a12dc8f9c4a74b87f221473bfe57403",
+        .n_guards = 1,
+        .guards = mstmm_sweep_loops_rolling_guards,
+    },
+    {
+        .name = "rolling_drift",
+        .function = (void (*)(void))mstmm_sweep_loops_rolling_drift,
+        .call = mstmm_sweep_loops_rolling_drift_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_rolling_drift_inputs,
+        .outputs = mstmm_sweep_loops_rolling_drift_outputs,
+        .ir_hash = "16c505815ca9753482fe486212c64705e862e3c82bc8e70b9370ab7a7b0215d3",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "gap_slope",
         .function = (void (*)(void))mstmm_sweep_loops_gap_slope,
         .call = mstmm_sweep_loops_gap_slope_call,
@@ -4435,7 +4955,7 @@ const mstmm_element mstmm_sweep_loops = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "loops",
-    .hash = "b934f78693f6064ccc1193ce50d86cc5f2c59501d0649753f67f7ea306ae49a9",
+    .hash = "c5e4a0d4e99a96e188e7e1424c9006a11c18d1c8678b950006d5ebfb682b8d1d",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4445,6 +4965,6 @@ const mstmm_element mstmm_sweep_loops = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 19,
+    .n_kernels = 24,
     .kernels = mstmm_sweep_loops_kernels,
 };

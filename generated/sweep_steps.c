@@ -1006,7 +1006,7 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
     return 0;
 }
 
-/* Rows of a hinge that closes a loop, and the load of its laws. */
+/* Rows of what closes a loop, and the load of a hinge's laws. */
 static int mstmm_at_closures(mstmm_state *state, int index)
 {
     real drift[6];
@@ -1025,9 +1025,11 @@ static int mstmm_at_closures(mstmm_state *state, int index)
         code = mstmm_at_hinge_motion(state, index);
         if (code) return code;
     }
-    code = mstmm_generic_complement(nu,
-        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .W = closed + MSTMM_CLOSURE_W);
-    if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
+    if (closure->kind == MSTMM_HINGE) {
+        code = mstmm_generic_complement(nu,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .W = closed + MSTMM_CLOSURE_W);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
+    }
     mstmm_loops_gap(
         .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
         .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .R_e = closure->turn,
@@ -1039,6 +1041,22 @@ static int mstmm_at_closures(mstmm_state *state, int index)
         .v_C = block + MSTMM_BLOCK_V, .w_C = block + MSTMM_BLOCK_MOTION,
         .v_B = outboard + MSTMM_BLOCK_V, .w_B = outboard + MSTMM_BLOCK_MOTION,
         .slip = closed + MSTMM_CLOSURE_SLIP);
+    if (closure->kind == MSTMM_DISTANCE) {
+        mstmm_loops_distance(
+            .p = closure->p, .d = closed + MSTMM_CLOSURE_D, .W = closed + MSTMM_CLOSURE_W,
+            .gap = closed + MSTMM_CLOSURE_GAP);
+    }
+    if (closure->kind == MSTMM_PLANE) {
+        mstmm_loops_plane(
+            .p = closure->p, .d = closed + MSTMM_CLOSURE_D, .W = closed + MSTMM_CLOSURE_W,
+            .gap = closed + MSTMM_CLOSURE_GAP);
+    }
+    if (closure->kind == MSTMM_ROLLING) {
+        code = mstmm_loops_rolling(
+            .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C, .d = closed + MSTMM_CLOSURE_D,
+            .W = closed + MSTMM_CLOSURE_W, .gap = closed + MSTMM_CLOSURE_GAP);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_LOOP, index, code);
+    }
     if (state->level == MSTMM_GAP) {
         mstmm_loops_rows(
             .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C,
@@ -1070,6 +1088,17 @@ static int mstmm_at_closures(mstmm_state *state, int index)
             .d = closed + MSTMM_CLOSURE_D, .slip = closed + MSTMM_CLOSURE_SLIP,
             .motion_C = block + MSTMM_BLOCK_MOTION, .motion_B = outboard + MSTMM_BLOCK_MOTION,
             .drift = drift);
+    }
+    if (!state->level && closure->kind == MSTMM_DISTANCE) {
+        mstmm_loops_distance_drift(
+            .d = closed + MSTMM_CLOSURE_D, .slip = closed + MSTMM_CLOSURE_SLIP, .drift = drift);
+    }
+    if (!state->level && closure->kind == MSTMM_ROLLING) {
+        mstmm_loops_rolling_drift(
+            .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .slip = closed + MSTMM_CLOSURE_SLIP, .drift = drift);
+    }
+    if (!state->level) {
         mstmm_loops_rows(
             .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C,
             .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
@@ -1546,9 +1575,11 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
         code = mstmm_at_hinge_motion(state, index);
         if (code) return code;
     }
-    code = mstmm_generic_complement(nu,
-        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .W = closed + MSTMM_CLOSURE_W);
-    if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
+    if (closure->kind == MSTMM_HINGE) {
+        code = mstmm_generic_complement(nu,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .W = closed + MSTMM_CLOSURE_W);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
+    }
     mstmm_loops_gap(
         .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
         .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .R_e = closure->turn,
@@ -2309,9 +2340,12 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
     real *d_loops = state->slope->workspace + state->model->loops;
     real *d_closed = closure ? d_loops + closure->numbers : NULL;
     if (!looped->closure) return 0;
-    mstmm_generic_complement_slope(nu,
-        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
-        .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H), .d_W = d_closed + MSTMM_CLOSURE_W);
+    if (closure->kind == MSTMM_HINGE) {
+        mstmm_generic_complement_slope(nu,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+            .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
+            .d_W = d_closed + MSTMM_CLOSURE_W);
+    }
     mstmm_loops_gap_slope(
         .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
         .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .R_e = closure->turn,

@@ -14,7 +14,19 @@ from ..classical import harmonic_stiffness
 from ..classical.catalogue import CLASSICAL, classical_derivation, classical_guards
 from ..elements.body_rigid import RigidBody
 from ..equations import body as body_kernels
-from ..equations import columns, frames, laws, link, loops, qr, screw, sweep, tangent, tangent_hinge
+from ..equations import (
+    columns,
+    constraints,
+    frames,
+    laws,
+    link,
+    loops,
+    qr,
+    screw,
+    sweep,
+    tangent,
+    tangent_hinge,
+)
 from ..equations import force as force_kernels
 from ..equations import tangent_placed as placed
 from ..equations.complement import complement
@@ -168,7 +180,10 @@ def qr_kernels() -> tuple[Kernel, ...]:
 
 def loop_kernels() -> tuple[Kernel, ...]:
     """Closed loops, but for what goes by the speeds of a hinge."""
-    return tuple(Kernel(make.__name__, make()) for make in loops.STEPS)
+    return tuple(
+        Kernel(make.__name__, make(), constraints.GUARDS.get(make.__name__, ()))
+        for make in (*loops.STEPS, *constraints.STEPS)
+    )
 
 
 def links() -> dict[str, Hinge]:

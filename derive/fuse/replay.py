@@ -420,6 +420,9 @@ _TRAITS: dict[str, Callable[[Replay, BodyStructure], bool]] = {
     "cut": lambda replay, body: replay.closure() is not None,
     "aside": lambda replay, body: body.idle or replay.closure() is not None,
     "refined": lambda replay, body: False,
+    # Scenes with constraints are looped.
+    "hinged": lambda replay, body: True,
+    **dict.fromkeys(("distance", "plane", "rolling"), lambda replay, body: False),
     "kept": lambda replay, body: not replay.level,
     "corrected": lambda replay, body: bool(replay.level),
     "soft": lambda replay, body: bool(replay.row().soft),

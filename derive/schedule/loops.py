@@ -37,6 +37,7 @@ from .steps import (
 )
 
 _MET = {"R_C": "closure.R_C", "r_e": "closure.end"}
+_OWN = {"W": "closure.W", "gap": "closure.gap"}
 _ROWS = {"J_A": "closure.J_A", "J_B": "closure.J_B", "l": "closure.l"}
 
 
@@ -49,17 +50,31 @@ _MEETING = (
     Do(whole=HINGE_MOTION, when="own"),
     call("frames.pose", when="staged", A_I="connection.R", x_I="connection.r", Rc="hinge.R",
          r="hinge.d", A="body.R", x="body.r"),
-    call("generic{nu}.complement", fails="hinge", H="hinge.H", W="closure.W"),
+    call("generic{nu}.complement", when="hinged", fails="hinge", H="hinge.H", W="closure.W"),
     call("loops.gap", A_C="body.A", x_C="body.x", A_B="outboard.A", x_B="outboard.x",
          R_e="closure.turn", r_e="closure.end", **BODY, R_C="closure.R_C",
          r_A="closure.lever", d="closure.d", gap="closure.gap"),
     call("loops.slip", **_MET, d="closure.d", v_C="body.v", w_C="body.w", v_B="outboard.v",
          w_B="outboard.w", slip="closure.slip"),
 )  # fmt: skip
+#: A constraint has directions and a gap of its own.
+_CONSTRAINED = (
+    call("loops.distance", when="distance", p="closure.p", d="closure.d", **_OWN),
+    call("loops.plane", when="plane", p="closure.p", d="closure.d", **_OWN),
+    call("loops.rolling", when="rolling", fails="loop", p="closure.p", R_C="closure.R_C",
+         d="closure.d", **_OWN),
+)  # fmt: skip
+_DRIFT = call("loops.drift", **_MET, d="closure.d", slip="closure.slip", motion_C="body.motion",
+              motion_B="outboard.motion", drift="local.drift")  # fmt: skip
+#: And directions that turn.
+_BENT = (
+    call("loops.distance_drift", when="distance", d="closure.d", slip="closure.slip",
+         drift="local.drift"),
+    call("loops.rolling_drift", when="rolling", p="closure.p", R_C="closure.R_C",
+         slip="closure.slip", drift="local.drift"),
+)  # fmt: skip
 #: Rows of accelerations; the load of the hinge's laws.
 _DRIVEN = (
-    call("loops.drift", **_MET, d="closure.d", slip="closure.slip", motion_C="body.motion",
-         motion_B="outboard.motion", drift="local.drift"),
     _rows("local.drift", ""),
 )  # fmt: skip
 _EFFORTS = EachSpeed(
@@ -95,13 +110,14 @@ def _efforts_of_own(x: str, when: str) -> Each:
 
 
 CLOSURES = Pass(
-    "closures", "body", "Rows of a hinge that closes a loop, and the load of its laws.",
+    "closures", "body", "Rows of what closes a loop, and the load of a hinge's laws.",
     (
         *_MEETING,
+        *_CONSTRAINED,
         _rows("closure.gap", "gaping"),
         _rows("closure.slip", "slipping"),
         _efforts_of_own("own.told", "!staged refined"),
-        *only("!corrected", *_DRIVEN),
+        *only("!corrected", _DRIFT, *_BENT, *_DRIVEN),
         _EFFORTS,
         Each(
             of="rows",
@@ -131,6 +147,7 @@ CLOSURES_LOADED = Pass(
     " on its bodies.",
     (
         *_MEETING,
+        _DRIFT,
         *_DRIVEN,
         _EFFORTS,
         Each(

@@ -142,6 +142,7 @@ inner.S | 21 | S of what hangs on the link
 inner.e | 6 | e of what hangs on the link
 closure.turn | 9 | rotation, axes of C to axes of B where the loop is closed
 closure.end | 3 | the end of B that the hinge holds, axes of B
+closure.p | 5 | numbers of a constraint
 closure.R_C | 9 | rotation, axes of C to axes of B
 closure.d | 3 | the end of B from the origin of C, axes of C
 closure.lever | 3 | the end of B from P of A, axes of A
@@ -186,9 +187,6 @@ own.known | 1 | its known part
 own.x | 1 | its multiplier
 own.told | 1 | its multiplier in the answer before
 coupling.x | 1 | multiplier of a coupling
-coupling.drift | 1 | its second rate while no speed that is free changes
-coupling.gap | 1 | its value
-coupling.slip | 1 | its rate
 coupling.still | 1 | its rate at rest, by what it is to equal
 coupling.told | 1 | its multiplier in the answer before
 pending.modes | n | its column on the modes of the body that an end belongs to
@@ -358,6 +356,10 @@ TRAITS: dict[str, str] = {
     "united": "a load is one in a right-hand side",
     "looped": "loops are closed",
     "cut": "the hinge closes a loop",
+    "hinged": "its own speeds and what it holds part six directions",
+    "distance": "a constraint keeps a distance",
+    "plane": "a constraint holds a point on a plane",
+    "rolling": "a constraint is of a rolling disc or ball",
     "aside": "the hinge closes a loop, or the body is idle",
     "residual": "what accelerations need is asked for with the multipliers of closed loops",
     "corrected": "a gap or a slip is to be corrected",

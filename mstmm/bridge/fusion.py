@@ -327,6 +327,8 @@ def _obstacle(packed: Packed, most: int) -> str:
         return "the product of classical matrices is looped"
     if packed.qr:
         return "the sweep as least squares is looped"
+    if any(cut.constraint is not None for cut in packed.expanded.cuts):
+        return "constraints are looped"
     if closed := _looped_closure(packed):
         return closed
     if packed.model.refines:

@@ -167,6 +167,11 @@ class Calls:
         packed = self.packed
         return packed.scene.hinges.name(packed.topology.at(position)[1])
 
+    def closing(self, position: int) -> str:
+        """What closes a loop by the frame at this place of the topology, for a message."""
+        name, _, table = self.hinge_name(position).partition("/")
+        return f'{table or "hinge"} "{name}"'
+
     def is_flexible(self, position: int) -> bool:
         """Whether the body at this place of the topology belongs to a flexible one."""
         expanded = self.packed.expanded
@@ -237,6 +242,11 @@ class Calls:
                 "inertia, stiffness or damping holds it, or a negative stiffness cancels them; "
                 "take a shorter step, or give the motion inertia (law.inertia) or a spring"
             )
+        if reason == Failed.LOOP and int(failure.code):
+            return (
+                f"{self.closing(element)} {at}: the disc lies flat on its plane and touches it in "
+                "more than a point; end the run before, by an [[event]], or start it upright"
+            )
         if reason == Failed.LOOP:
             bodies = self.packed.system.count
             if element >= bodies:
@@ -246,7 +256,7 @@ class Calls:
                     "see whether drives and other couplings ask for something else"
                 )
             return (
-                f'hinge "{self.hinge_name(element)}" {at}: the loop that it closes is open, and '
+                f"{self.closing(element)} {at}: the loop that it closes is open, and "
                 "no state near closes it; start from model.assemble(q, u), or see whether a drive "
                 "asks for more than the mechanism can do"
             )

@@ -26,6 +26,7 @@ from .laws import laws_of
 from .letting_go import releasable
 from .loops.closures import closures_of
 from .loops.couplings import couplings_of
+from .loops.curves import elements_of
 from .loops.opened import opened
 from .loops.unknown import refuse_beside_bending
 from .slots import layout_of
@@ -71,7 +72,8 @@ def system_of(
 
     Raises SceneError for hinges that do not form a tree or types that nobody defines.
     """
-    expanded, elements = expansion_of(scene, flexible), Elements(known or {})
+    expanded = expansion_of(scene, flexible)
+    elements = Elements({**(known or {}), **elements_of(scene.constraint)})
     nodes, tree = expanded.scene, build(expanded.scene)
     releases = {name: i for i, name in enumerate(releasable(scene))}
     layout = layout_of(expanded, releases, elements)

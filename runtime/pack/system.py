@@ -222,15 +222,24 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class ClosureNumbers:
-    """A hinge that closes a loop: the body without mass at place `frame` is to be where an end of
-    the body at place `outboard` is, its axes turned by `turn` (9) and its origin at `end` (3) in
-    that body's.  `directions` are those of the rows: 0 to 5, the hinge's speeds first."""
+    """What closes a loop: a hinge, behind which the body without mass at place `frame` is to be
+    where an end of the body at place `outboard` (-1: the ground) is, its axes turned by `turn` (9)
+    and its origin at `end` (3) in that body's.  `directions` are those of the rows: 0 to 5, the
+    hinge's speeds first.
+
+    Constraints ask less of the two: as `kind` says, one of those in derive/equations/constraints.py
+    with its numbers `p`, or "hinge".  `of_speeds` are the directions in which nothing is asked of
+    positions.
+    """
 
     frame: int
     outboard: int
     turn: Numbers
     end: Numbers
     directions: tuple[int, ...]
+    kind: str = "hinge"
+    p: Numbers = ()
+    of_speeds: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,8 +276,8 @@ class System:
     of each of `driven` (place of the body, coordinate).  `inputs` are inputs and signals over time,
     whose numbers expressions read, of which some may be `held`; `by_time` says whether an
     effort or load names the time, or an input that does not stand still.  `moving` are the numbers
-    in expressions that carry derivatives, by their places in the port "moving".  `closures` are the
-    hinges that close loops; `coupled` gives the numbers of the `couplings` (pack/loops/couplings).
+    in expressions that carry derivatives, by their places in the port "moving".  `closures` are
+    what closes loops; `coupled` gives the numbers of the `couplings` (pack/loops/couplings).
     """
 
     nq: int

@@ -109,14 +109,21 @@ def momentum(result: Record) -> list[Drift]:
 
 
 def _isolated(scene: Scene) -> bool:
-    """Nothing but hinges and gravity acts between the scene and the ground."""
+    """Nothing but uncoupled hinges and gravity acts between the scene and the ground."""
     loads = any(
         not e.is_zero
         for load in scene.load
         for e in (*load.force, *load.moment, *(load.force_per_length or ()))
     )
-    grounded = any("ground" in (one.from_, one.to) for one in scene.forces)
-    return not loads and not grounded and all(_passive(hinge) for hinge in _roots(scene))
+    joined = (*scene.forces, *scene.constraint)
+    coupled = {name.hinge for coupling in scene.coupling for name in coupling.names}
+    roots = _roots(scene)
+    return (
+        not loads
+        and not any("ground" in (one.from_, one.to) for one in joined)
+        and not any(hinge.name in coupled for hinge in roots)
+        and all(_passive(hinge) for hinge in roots)
+    )
 
 
 def _roots(scene: Scene) -> list[Hinge]:

@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-import mstmm
 from mstmm.errors import SceneError
 from mstmm.scene import Scene, load_scene
 from mstmm.scene.checks import topology
@@ -93,6 +92,12 @@ def test_members_of_a_chain_may_carry_what_closes_a_loop() -> None:
     assert sorted(tree.order) == list(range(len(scene.bodies)))
 
 
+def wire(**changes: Any) -> Data:
+    """The arm's tip on a curve that is fixed to the ground."""
+    row = {"type": "point-on-curve", "from": "ground", "to": "rod2.tip", "curve": ["s", "s", 0]}
+    return arm(constraint=[row | changes])
+
+
 def boomed(*hinges: Data, **changes: Any) -> Data:
     """A beam that the ground holds at its root and these hinges hold too."""
     return {"gravity": [0, 0, 0], "beam": [beam("boom", **changes)],
@@ -153,7 +158,8 @@ def test_what_else_closes_is_counted_behind_the_hinges() -> None:
                   rocker={"inboard": "b", "outboard": "c"}),
          'body "b": held by no hinge; turn hinge "knee" round'),
         (arm(constraint=[{"type": "rope", "from": "rod1", "to": "rod2"}]),
-         'constraint number 1: type: expected "distance" or "point-on-plane", found'),
+         'constraint number 1: type: expected "distance" or "point-on-plane" or "point-on-curve" '
+         'or "rolling", found'),
         (arm(constraint=[{"type": "distance", "from": "rod1", "to": "rod3.tip", "length": 1}]),
          'constraint number 1: to: there is no body "rod3"; did you mean "rod'),
         (arm(constraint=[{"type": "distance", "from": "rod1", "to": "rod1.tip", "length": 1}]),
@@ -174,6 +180,16 @@ def test_what_else_closes_is_counted_behind_the_hinges() -> None:
         (arm(constraint=[{"type": "distance", "from": "rod1", "to": "rod2.tip", "length": 1},
                          {"type": "distance", "from": "rod2.tip", "to": "rod1", "length": 2}]),
          "constraint number 2: constraint number 1 says the same; leave one out"),
+        (wire(curve=["s", "s"]), "curve: expected three expressions of s"),
+        (wire(curve=["s", "t", 0]), "curve[1]: a curve goes by s alone, found 't'"),
+        (wire(curve=["s", "abs(s)", 0]), "curve[1]: it has no slope where 'abs(s)' switches"),
+        (wire(curve=["s", "sqrt(s)", 0]), "its first two slopes is not finite at s = 0"),
+        (wire(curve=["s^2", "cos(s)", 1]), "curve: it stands still at s = 0, so it has no"),
+        (wire(radius=1), 'radius: a "point-on-curve" has no radius; leave it out'),
+        (arm(constraint=[{"type": "rolling", "from": "ground", "to": "rod2", "normal": [0, 1, 0]}]),
+         "radius: missing; expected a number in m, more than 0"),
+        (arm(constraint=[{"type": "rolling", "from": "rod2", "to": "ground", "normal": [0, 1, 0],
+                          "radius": 1}]), "to: the ground does not roll; swap from and to"),
     ],
 )  # fmt: skip
 def test_refused_with_element_key_and_way_out(data: Data, message: str) -> None:
@@ -197,6 +213,10 @@ def test_a_scene_with_loops_comes_back_from_its_file(tmp_path: Any) -> None:
         {"type": "distance", "from": "a.tip", "to": "boom", "length": 2.5},
         {"type": "point-on-plane", "from": "ground", "to": "c.tip", "normal": [0, 0, 2],
          "offset": 0.5, "position": [1, 0, 0]},
+        {"type": "point-on-curve", "from": "ground", "to": "b.tip", "start": 0.5,
+         "curve": ["cos(s)", "sin(s)", 0]},
+        {"type": "rolling", "from": "ground", "to": "a.tip", "normal": [0, 1, 0], "radius": 0.2,
+         "axis": [0, 0, 1]},
     ]  # fmt: skip
     data["coupling"] = [
         {"name": "gear", "expression": "crank.angle - 3*rocker.q", "equals": "0.1*sin(t)"},
@@ -208,18 +228,3 @@ def test_a_scene_with_loops_comes_back_from_its_file(tmp_path: Any) -> None:
     path.write_text(scene.to_toml())
     assert load_scene(path) == scene
     assert [coupling.name for coupling in scene.coupling] == ["gear", "coupling2"]
-
-
-@pytest.mark.parametrize(
-    ("data", "what"),
-    [
-        (arm(constraint=[{"type": "distance", "from": "ground", "to": "rod2.tip", "length": 1}]),
-         'constraint "constraint1"'),
-        (arm(coupling=[{"expression": "shoulder.q + elbow.q"}]),
-         'coupling "coupling1"'),
-    ],
-)  # fmt: skip
-def test_what_closes_is_not_compiled_yet(data: Data, what: str) -> None:
-    with pytest.raises(SceneError, match=what) as caught:
-        mstmm.compile(Scene(**data))
-    assert "not compiled yet; a hinge that closes the loop is" in str(caught.value)

@@ -26,12 +26,12 @@ def rows_of(hinge: HingeTable) -> int:
 def rows_of_closures(scene: SceneTables) -> Iterator[Rows]:
     """The rows of the scene's constraints, then those of its couplings, between its bodies."""
     for constraint in scene.constraint:
-        yield _row(scene, (constraint.from_, constraint.to))
+        yield _rows(scene, (constraint.from_, constraint.to), constraint.rows)
     for coupling in scene.coupling:
         joined = (
             scene.hinges.by_name[name] for name in dict.fromkeys(n.hinge for n in coupling.names)
         )
-        yield _row(scene, [end for hinge in joined for end in (hinge.inboard, hinge.outboard)])
+        yield _rows(scene, [end for hinge in joined for end in (hinge.inboard, hinge.outboard)], 1)
 
 
 def coordinate(scene: SceneTables, name: Name) -> tuple[int, str, int]:
@@ -50,7 +50,7 @@ def coordinate(scene: SceneTables, name: Name) -> tuple[int, str, int]:
     return hinge, "q", own.index(name.quantity)
 
 
-def _row(scene: SceneTables, ends: Sequence[str]) -> Rows:
-    """One row between ends of bodies, the ground among them."""
+def _rows(scene: SceneTables, ends: Sequence[str], count: int) -> Rows:
+    """Rows between ends of bodies, the ground among them."""
     bodies = (scene.bodies.find(split(end)[0]) for end in ends)
-    return Rows(tuple(GROUND if body is None else body for body in bodies), 1)
+    return Rows(tuple(GROUND if body is None else body for body in bodies), count)

@@ -30,7 +30,7 @@ def problems(scene: SceneTables) -> list[Problem]:
     found = _first(_duplicates(scene), _references(scene), _inertias(scene),
                    inputs.problems(scene), flexible_bodies.problems(scene))  # fmt: skip
     return found or _first(
-        _expressions(scene), inputs.drives(scene), constraints.repeated(scene),
+        _expressions(scene), inputs.drives(scene), constraints.problems(scene),
         couplings.problems(scene), _tree(scene), flexible_bodies.spins(scene),
     )  # fmt: skip
 

@@ -156,9 +156,18 @@ typedef struct {
     int release;   /* place in memory that is non-zero once the row is let go; -1: never */
 } mstmm_loop_row;
 
-/* A hinge that closes a loop: its frame C, a body without mass, is to be where an end of B is. */
+/* Whose directions rows of a closure are. */
+#define MSTMM_HINGE 0
+#define MSTMM_DISTANCE 1
+#define MSTMM_PLANE 2
+#define MSTMM_ROLLING 3
+
+/* What closes a loop: the frame C of a hinge, a body without mass, is to be where an end of B is, or
+ * a constraint asks less of the two. */
 typedef struct {
     int outboard; /* B */
+    int kind;
+    real p[5];    /* of a constraint */
     int rows[6];  /* of its directions, -1: none */
     int64_t inner[6], outer[6]; /* their columns on A and on B */
     real turn[9], end[3];       /* axes of C and its origin in B */
@@ -196,7 +205,7 @@ typedef struct {
     const mstmm_own *own;
     int n_bent; /* that ends of the flexible body bring: y is S_ff^-1 times the modes' column */
     const mstmm_pending *bent;
-    const mstmm_closure *closure; /* the body is the frame C of a hinge that closes a loop */
+    const mstmm_closure *closure; /* the body is the frame C of what closes a loop */
 } mstmm_looped;
 
 /* What is corrected of closed loops, instead of what accelerates. */

@@ -161,7 +161,7 @@ class Assembly:
         turning = np.zeros(calls.count, bool)
         for one in calls.records.closures:
             directions = calls.numbers_of(one, "W")
-            for direction, row in one.rows.items():
+            for direction, row in one.rows.items() if one.kind == "hinge" else ():
                 force, moment = directions[direction, :3], directions[direction, 3:]
                 turning[row] = moment @ moment > force @ force
         coupling = np.zeros(calls.count, bool)
@@ -187,32 +187,23 @@ class Assembly:
     def _names(self) -> str:
         return ", ".join(f'"{name}"' for name in self.held) or "driven hinges"
 
-    def _hinge(self, row: int) -> str:
-        """The hinge whose row it is; "" for a row of a coupling."""
-        for one in self.calls.records.closures:
-            if row in one.rows.values():
-                return f'hinge "{self.calls.engine.hinge_name(one.frame)}"'
-        return ""
-
-    def _coupling(self, row: int) -> str:
-        found = (one for one in self.calls.records.couplings if one.row == row)
-        return f'coupling "{next(found).coupling.name}"'
-
     def _where(self, row: int) -> str:
-        hinge = self._hinge(row)
-        return f"where {hinge} closes a loop" if hinge else f"in {self._coupling(row)}"
+        closing = self.calls.closing(row)
+        return f"in {closing}" if self.calls.coupling_of(row) else f"where {closing} closes a loop"
 
     def _subject(self, row: int) -> str:
-        hinge = self._hinge(row)
-        if hinge:
-            return f"the loop that {hinge} closes stays open"
-        return f"{self._coupling(row)} cannot hold"
+        closing = self.calls.closing(row)
+        if self.calls.coupling_of(row):
+            return f"{closing} cannot hold"
+        return f"the loop that {closing} closes stays open"
 
     def _remedy(self, row: int) -> str:
-        if self._hinge(row):
-            return "correct the lengths, or start nearer to where it closes"
-        return "leave it or another coupling out, or correct what they equal"
+        if self.calls.coupling_of(row):
+            return "leave it or another coupling out, or correct what they equal"
+        return "correct the lengths, or start nearer to where it closes"
 
     def _amount(self, row: int, missing: Array, digits: str, per: str = "") -> str:
-        unit = f" {'rad' if self._turning[row] else 'm'}{per}" if self._hinge(row) else ""
-        return f"{abs(missing[row]):{digits}}{unit}"
+        amount = f"{abs(missing[row]):{digits}}"
+        if self.calls.coupling_of(row):
+            return amount
+        return f"{amount} {'rad' if self._turning[row] else 'm'}{per}"

@@ -24,6 +24,11 @@ from .stress import outboard_axes
 _DIRECTIONS = ("x", "y", "z", "mx", "my", "mz")
 #: The row of a coupling of coordinates, and of one of speeds.
 _COUPLED = ("expression", "speeds")
+#: And of constraints, by whose directions their rows are; "hinge": of a point on a curve.
+_OF_CONSTRAINTS = {
+    "distance": ("length",), "plane": ("normal",), "rolling": ("x", "y", "normal"),
+    "hinge": ("", "across1", "across2"),
+}  # fmt: skip
 #: Gaps at which it may still be that rows repeat others but for a misfit, in parts of the length of
 #: the scene.
 _NEARLY = 1e-2
@@ -39,7 +44,8 @@ class Loops:
         cut: hinges that close loops; which of a loop's hinges does changes nothing but the work.
         rows: (hinge, direction) of every row, in the order in which they are closed: "x" to "mz"
             for the outboard axis of the hinge along or about which it lies, or nearly so, "u1",
-            ... for its own speeds.
+            ... for its own speeds; or (constraint, direction): "length", "normal", "x" and "y"
+            where it rolls, "across1" and "across2" of a curve.
         rank: how many rows say something of their own.
         redundant: rows that repeat others, so that the loads along them are not determined.
         not_unique: components of the loads of hinges, "fx" to "mz" along and about their outboard
@@ -145,7 +151,8 @@ class Closed:
             records = calls.records
         calls.judge_by(rank.states)
         told = Loops(
-            tuple(cut.hinge for cut in packed.expanded.cuts), tuple(names), rows,
+            tuple(cut.hinge for cut in packed.expanded.cuts if cut.constraint is None),
+            tuple(names), rows,
             tuple(names[row] for row in sorted(rank.here)),
             free_speeds - self._shared() - rows, records.width, rank.singular,
             rank.not_unique,
@@ -157,7 +164,7 @@ class Closed:
         packed = self.engine.packed
         if self.loops.mobility > 0 or packed.system.driven or packed.releases:
             return
-        closing = [*self.loops.cut, *(one.name for one in packed.described.coupling)]
+        closing = list(dict.fromkeys(name for name, _ in self.loops.rows))
         cut = ", ".join(f'"{name}"' for name in closing[:_NAMED])
         more = " ..." if len(closing) > _NAMED else ""
         raise SceneError(
@@ -174,15 +181,15 @@ class Closed:
         slips = np.abs(calls.correction(calls.slip, q, u)[1])
         of_couplings = [one.row for one in calls.records.couplings]
         missing[of_couplings] = np.maximum(missing, slips)[of_couplings]
-        for row, (hinge, direction) in repeating.items():
+        for row, (closing, direction) in repeating.items():
             if missing[row] > much:
                 if direction in _COUPLED:
                     raise SceneError(
-                        f'scene: coupling "{hinge}" contradicts what others ask, by '
+                        f'scene: coupling "{closing}" contradicts what others ask, by '
                         f"{missing[row]:.3g} at the start; leave it out, or correct what it equals"
                     )
                 raise SceneError(
-                    f'scene: direction {direction} of hinge "{hinge}" repeats what other hinges '
+                    f"scene: direction {direction} of {calls.closing(row)} repeats what others "
                     f"do, but for a gap of {missing[row]:.3g}: as a rigid mechanism it would lock; "
                     "make axes parallel and points meet, or use a ball or cylindrical hinge"
                 )
@@ -197,7 +204,12 @@ class Closed:
         """(hinge, direction) of every row."""
         names, system = [("", "")] * calls.count, self.engine.packed.system
         for one in calls.records.closures:
-            hinge, speeds = calls.engine.hinge_name(one.frame), system.body(one.frame).nu
+            hinge, _, table = calls.engine.hinge_name(one.frame).partition("/")
+            if table:
+                for direction, row in one.rows.items():
+                    names[row] = (hinge, _OF_CONSTRAINTS[one.kind][direction])
+                continue
+            speeds = system.body(one.frame).nu
             held = [direction for direction in range(6) if direction >= speeds]
             axes = outboard_axes(calls, one.frame)
             W = calls.numbers_of(one, "W")[held].reshape(-1, 2, 3) @ axes

@@ -18,6 +18,18 @@ class LoopNumbers:
         self.engine, self.records = engine, records
         self.count = records.count
 
+    def closing(self, row: int) -> str:
+        """What a row belongs to, for a message."""
+        for one in self.records.closures:
+            if row in one.rows.values():
+                return self.engine.closing(one.frame)
+        return f'coupling "{self.coupling_of(row)}"'
+
+    def coupling_of(self, row: int) -> str:
+        """The coupling whose row it is; "" where it is none's."""
+        found = (one.coupling.name for one in self.records.couplings if one.row == row)
+        return next(found, "")
+
     def inverses(self) -> Array:
         """1 / pivot of every row in the last correction, 0 for rows without a multiplier."""
         return self._of_rows("INVERSE")

@@ -34,7 +34,7 @@ def not_unique(calls: LoopCalls, q: Array) -> dict[str, tuple[str, ...]]:
     for number, hinge in enumerate(packed.scene.hinges):
         marks = touched[packed.topology.place_of_hinge(number)]
         words = tuple(word for word, mark in zip(_COMPONENTS, marks, strict=True) if mark)
-        if words:
+        if words and number not in packed.layout.internal:
             found[hinge.name] = words
     return found
 

@@ -37,17 +37,22 @@ def refuse_couplings(packed: Packed, what: str) -> None:
         )
 
 
+def refuse_constraints(packed: Packed, what: str) -> None:
+    """SceneError where constraints close loops, which `what` cannot follow."""
+    for one in packed.described.constraint[:1]:
+        raise SceneError(
+            f'scene: constraint "{one.name}" closes a loop, and {what} cannot follow that yet; '
+            f"{INSTEAD}"
+        )
+
+
 def refuse_beyond_hinges(packed: Packed, what: str) -> None:
     """SceneError where more than hinges of rigid bodies closes loops, which `what` cannot follow
     yet."""
     refuse_couplings(packed, what)
     if packed.flexible:
         refuse(packed, f"{what} with flexible bodies", INSTEAD)
-    for one in packed.described.constraint[:1]:
-        raise SceneError(
-            f'scene: constraint "{one.name}" closes a loop, and {what} cannot follow that yet; '
-            f"{INSTEAD}"
-        )
+    refuse_constraints(packed, what)
 
 
 #: Methods that take increments of loads or an exponential of the whole motion, which closed loops

@@ -23,15 +23,6 @@ def may_close(scene: Scene) -> bool:
     return more or bool(scene.constraint or scene.coupling)
 
 
-def refuse_unknown(scene: Scene) -> None:
-    """SceneError for what closes loops and is read and checked, but not compiled yet."""
-    if scene.constraint:
-        raise SceneError(
-            f'scene: constraint "{scene.constraint[0].name}" is read and checked, but not '
-            "compiled yet; a hinge that closes the loop is, or put a stiff [[spring]] there"
-        )
-
-
 def refuse_beside_bending(scene: Scene, one_way: Collection[str]) -> None:
     """SceneError for what flexible bodies cannot be beside in a scene with loops: constraints and
     couplings, and bodies that bend without acting back."""
@@ -49,8 +40,10 @@ def refuse_beside_bending(scene: Scene, one_way: Collection[str]) -> None:
 
 
 def named_loop(scene: SceneTables, plan: Plan) -> str:
-    """The first loop by its hinges, or the first coupling where no hinge closes one."""
+    """The first loop by its hinges, or by what closes one without hinges."""
     if not plan.cut:
+        for constraint in scene.constraint[:1]:
+            return f'loop of constraint "{constraint.name}"'
         return f'loop of coupling "{scene.coupling[0].name}"'
     around = plan.loop(plan.cut[0])
     names = " - ".join(scene.hinges.name(hinge) for hinge in around[:_NAMED])

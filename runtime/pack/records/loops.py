@@ -16,12 +16,14 @@ from .memory import Memory
 
 @dataclass(frozen=True)
 class WrittenClosure:
-    """A hinge that closes a loop: the place of its frame, those of its bodies, where its numbers
-    begin behind those of all loops, and the row of each direction that has one."""
+    """What closes a loop: the place of its frame, those of its bodies, whose directions its rows
+    are, where its numbers begin behind those of all loops, and the row of each direction that has
+    one."""
 
     frame: int
     inboard: int
     outboard: int
+    kind: str
     numbers: int
     rows: dict[int, int]
 
@@ -245,6 +247,9 @@ class _Loops:
         record = self.shelves["mstmm_closure"].take(1)
         record.outboard = closure.outboard
         record.turn, record.end = list(closure.turn), list(closure.end)
+        record.kind = getattr(self.lib, f"MSTMM_{closure.kind.upper()}")
+        for k, number in enumerate(closure.p):
+            record.p[k] = number
         record.numbers = self._take(int(self.lib.MSTMM_CLOSURE))
         record.rows = [-1] * 6
         body, own = self.system.body(closure.frame), dict[int, int]()
@@ -254,14 +259,16 @@ class _Loops:
             record.rows[direction] = own[direction] = row
             record.inner[direction] = self._side(inboard, row)
             record.outer[direction] = self._side(closure.outboard, row)
+            rows[row].of_speeds = int(direction in closure.of_speeds)
             if direction >= body.nu:
                 continue
             if body.imposed[direction]:
                 rows[row].release = body.release
             else:
                 rows[row].softness = 1.0 / body.rotor[direction]
-        told = WrittenClosure(closure.frame, inboard, closure.outboard, record.numbers, own)
-        return record, told
+        return record, WrittenClosure(
+            closure.frame, inboard, closure.outboard, closure.kind, record.numbers, own
+        )
 
     def _side(self, body: int, row: int) -> int:
         """Place of a row's column on a body, a dump on the ground."""

@@ -1,0 +1,26 @@
+"""What holds the frames of constraints."""
+
+from __future__ import annotations
+
+from mstmm.numbers.rotations import IDENTITY, to_quaternion
+from mstmm.scene import Constraint, Hinge
+from mstmm.scene.rules.values import GROUND, split
+from mstmm.scene.tables.closures import CURVE
+from mstmm.scene.tables.hinge_frames import about
+
+from .curves import along
+
+
+def holding(constraint: Constraint) -> Hinge:
+    """The hinge that holds the frame of a constraint where it begins: a weld, with z along the
+    normal where there is one, or a way along the curve.  Their names are those of no scene."""
+    name, normal = f"{constraint.name}/constraint", constraint.unit_normal
+    turned = IDENTITY if normal is None else about(normal, None)
+    weld = Hinge(name="frame", type="fixed", inboard=GROUND, outboard="frame",
+                 orientation=to_quaternion(turned))  # fmt: skip
+    on_ground = split(constraint.from_)[0] == GROUND
+    held = weld.model_copy(update={
+        "name": name, "inboard": constraint.from_, "outboard": f"{name}/frame",
+        "position": constraint.position if on_ground else (0.0, 0.0, 0.0),
+    })  # fmt: skip
+    return along(constraint, held) if constraint.type == CURVE else held
