@@ -25,6 +25,7 @@ def test_c_has_the_numbers_of_the_table(tmp_path: Path) -> None:
 def test_every_reason_has_a_sentence_of_its_own() -> None:
     path = ROOT / "examples" / "branched_tree" / "scene.toml"
     tables = tomllib.loads(path.read_text())
+    tables["event"] = [{"when": "shoulder.q > 3", "do": "bounce", "restitution": 0.5}]
     tables["input"] = [{"name": "motor", "unit": "N*m", "value": 0.0}]
     tables["controller"] = [{
         "name": "regulator", "D": [[1.0]], "sample_time": 0.1, "inputs": ["shoulder.angle"],

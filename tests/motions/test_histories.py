@@ -36,9 +36,9 @@ def load(name: str) -> dict[str, Any]:
 def test_every_example_is_compared() -> None:
     """All trees of rigid bodies are; a chain with the same scene written out in tests/scene,
     flexible bodies with references of their own in tests/flexible and in the examples' checks, as
-    are signals, closed loops in tests/loops and there."""
+    are signals, closed loops and couplings in tests/loops and there."""
     scenes = {path.parent.name: load(path.parent.name) for path in EXAMPLES.glob("*/scene.toml")}
-    elsewhere = {"chain", "beam", "elastic", "signal"}
+    elsewhere = {"chain", "beam", "elastic", "signal", "constraint", "coupling"}
     assert set(SPANS) == {
         name for name, scene in scenes.items()
         if not elsewhere & scene.keys() and len(scene["hinge"]) == len(scene["body"])
