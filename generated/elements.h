@@ -1344,6 +1344,18 @@ int mstmm_sweep_loops_act_slope(const real *restrict J, const real *restrict tau
     const real *restrict d_J, const real *restrict d_tau, real *restrict d_e);
 int mstmm_sweep_loops_loaded_slope(const real *restrict K, const real *restrict x,
     const real *restrict d_K, const real *restrict d_x, real *restrict d_e);
+int mstmm_sweep_loops_distance_slope(const real *restrict p, const real *restrict d,
+    const real *restrict d_d, real *restrict d_W);
+int mstmm_sweep_loops_distance_drift_slope(const real *restrict d, const real *restrict slip,
+    const real *restrict d_d, const real *restrict d_slip, real *restrict d_drift);
+int mstmm_sweep_loops_plane_slope(const real *restrict p, const real *restrict d,
+    const real *restrict d_d, real *restrict d_W);
+int mstmm_sweep_loops_rolling_slope(const real *restrict p, const real *restrict R_C,
+    const real *restrict d, const real *restrict d_R_C, const real *restrict d_d,
+    real *restrict d_W);
+int mstmm_sweep_loops_rolling_drift_slope(const real *restrict p, const real *restrict R_C,
+    const real *restrict slip, const real *restrict d_R_C, const real *restrict d_slip,
+    real *restrict d_drift);
 
 extern const mstmm_element mstmm_sweep_modal;
 int mstmm_sweep_modal_residual(int n, const real *restrict p, const real *restrict C,

@@ -1985,6 +1985,76 @@ static inline int mstmm_loops_loaded_slope_by(struct mstmm_loops_loaded_slope to
 }
 #define mstmm_loops_loaded_slope(...) mstmm_loops_loaded_slope_by((struct mstmm_loops_loaded_slope){__VA_ARGS__})
 
+struct mstmm_loops_distance_slope {
+    const real *p;
+    const real *d;
+    const real *d_d;
+    real *d_W;
+};
+static inline int mstmm_loops_distance_slope_by(struct mstmm_loops_distance_slope to)
+{
+    return mstmm_sweep_loops_distance_slope(
+        to.p, to.d, to.d_d, to.d_W);
+}
+#define mstmm_loops_distance_slope(...) mstmm_loops_distance_slope_by((struct mstmm_loops_distance_slope){__VA_ARGS__})
+
+struct mstmm_loops_distance_drift_slope {
+    const real *d;
+    const real *slip;
+    const real *d_d;
+    const real *d_slip;
+    real *d_drift;
+};
+static inline int mstmm_loops_distance_drift_slope_by(struct mstmm_loops_distance_drift_slope to)
+{
+    return mstmm_sweep_loops_distance_drift_slope(
+        to.d, to.slip, to.d_d, to.d_slip, to.d_drift);
+}
+#define mstmm_loops_distance_drift_slope(...) mstmm_loops_distance_drift_slope_by((struct mstmm_loops_distance_drift_slope){__VA_ARGS__})
+
+struct mstmm_loops_plane_slope {
+    const real *p;
+    const real *d;
+    const real *d_d;
+    real *d_W;
+};
+static inline int mstmm_loops_plane_slope_by(struct mstmm_loops_plane_slope to)
+{
+    return mstmm_sweep_loops_plane_slope(
+        to.p, to.d, to.d_d, to.d_W);
+}
+#define mstmm_loops_plane_slope(...) mstmm_loops_plane_slope_by((struct mstmm_loops_plane_slope){__VA_ARGS__})
+
+struct mstmm_loops_rolling_slope {
+    const real *p;
+    const real *R_C;
+    const real *d;
+    const real *d_R_C;
+    const real *d_d;
+    real *d_W;
+};
+static inline int mstmm_loops_rolling_slope_by(struct mstmm_loops_rolling_slope to)
+{
+    return mstmm_sweep_loops_rolling_slope(
+        to.p, to.R_C, to.d, to.d_R_C, to.d_d, to.d_W);
+}
+#define mstmm_loops_rolling_slope(...) mstmm_loops_rolling_slope_by((struct mstmm_loops_rolling_slope){__VA_ARGS__})
+
+struct mstmm_loops_rolling_drift_slope {
+    const real *p;
+    const real *R_C;
+    const real *slip;
+    const real *d_R_C;
+    const real *d_slip;
+    real *d_drift;
+};
+static inline int mstmm_loops_rolling_drift_slope_by(struct mstmm_loops_rolling_drift_slope to)
+{
+    return mstmm_sweep_loops_rolling_drift_slope(
+        to.p, to.R_C, to.slip, to.d_R_C, to.d_slip, to.d_drift);
+}
+#define mstmm_loops_rolling_drift_slope(...) mstmm_loops_rolling_drift_slope_by((struct mstmm_loops_rolling_drift_slope){__VA_ARGS__})
+
 struct mstmm_classical_body_transfer {
     const real *M;
     const real *r_IO;

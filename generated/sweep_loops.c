@@ -73,6 +73,18 @@ int mstmm_sweep_loops_act_slope(const real *restrict J, const real *restrict tau
     const real *restrict d_J, const real *restrict d_tau, real *restrict d_e);
 int mstmm_sweep_loops_loaded_slope(const real *restrict K, const real *restrict x,
     const real *restrict d_K, const real *restrict d_x, real *restrict d_e);
+int mstmm_sweep_loops_distance_slope(const real *restrict p, const real *restrict d,
+    const real *restrict d_d, real *restrict d_W);
+int mstmm_sweep_loops_distance_drift_slope(const real *restrict d, const real *restrict slip,
+    const real *restrict d_d, const real *restrict d_slip, real *restrict d_drift);
+int mstmm_sweep_loops_plane_slope(const real *restrict p, const real *restrict d,
+    const real *restrict d_d, real *restrict d_W);
+int mstmm_sweep_loops_rolling_slope(const real *restrict p, const real *restrict R_C,
+    const real *restrict d, const real *restrict d_R_C, const real *restrict d_d,
+    real *restrict d_W);
+int mstmm_sweep_loops_rolling_drift_slope(const real *restrict p, const real *restrict R_C,
+    const real *restrict slip, const real *restrict d_R_C, const real *restrict d_slip,
+    real *restrict d_drift);
 
 /* gap of a hinge that closes a loop
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -4660,6 +4672,707 @@ static const mstmm_port mstmm_sweep_loops_loaded_slope_outputs[] = {
     {"d_e", 6, "", 1, 0},
 };
 
+/* distance and its derivative along a direction
+ * in  p[1] (m) the distance that is kept
+ * in  d[3] (m) that end from the origin of C, axes of C
+ * in  d_d[3] (m) derivative of d
+ * out d_W[6][6] derivative of W
+ */
+int mstmm_sweep_loops_distance_slope(const real *restrict p, const real *restrict d,
+    const real *restrict d_d, real *restrict d_W)
+{
+    (void)p;
+    const real t0 = d[2] * d[2];
+    const real t1 = d[0] * d[0];
+    const real t2 = d[1] * d[1];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    const real t5 = 1e-24 < t4;
+    const real t6 = (t4 < 1e-24 || isnan(1e-24)) ? 1e-24 : t4;
+    const real t7 = sqrt(t6);
+    const real t8 = 1.0 / t7;
+    const real t9 = t8 * d_d[0];
+    const real t10 = t4 < 1e-24;
+    const real t11 = d[1] * d_d[1];
+    const real t12 = t11 + t11;
+    const real t13 = d[0] * d_d[0];
+    const real t14 = t13 + t13;
+    const real t15 = t12 + t14;
+    const real t16 = d[2] * d_d[2];
+    const real t17 = t16 + t16;
+    const real t18 = t15 + t17;
+    const real t19 = t10 != 0 ? 0.0 : t18;
+    const real t20 = t7 * 2.0;
+    const real t21 = t19 / t20;
+    const real t22 = t8 * t21;
+    const real t23 = t22 / t7;
+    const real t24 = d[0] * t23;
+    const real t25 = t9 - t24;
+    const real t26 = t5 != 0 ? t25 : 0.0;
+    d_W[0] = t26;
+    const real t27 = t8 * d_d[1];
+    const real t28 = d[1] * t23;
+    const real t29 = t27 - t28;
+    const real t30 = t5 != 0 ? t29 : 0.0;
+    d_W[1] = t30;
+    const real t31 = t8 * d_d[2];
+    const real t32 = d[2] * t23;
+    const real t33 = t31 - t32;
+    const real t34 = t5 != 0 ? t33 : 0.0;
+    d_W[2] = t34;
+    d_W[3] = 0.0;
+    d_W[4] = 0.0;
+    d_W[5] = 0.0;
+    d_W[6] = 0.0;
+    d_W[7] = 0.0;
+    d_W[8] = 0.0;
+    d_W[9] = 0.0;
+    d_W[10] = 0.0;
+    d_W[11] = 0.0;
+    d_W[12] = 0.0;
+    d_W[13] = 0.0;
+    d_W[14] = 0.0;
+    d_W[15] = 0.0;
+    d_W[16] = 0.0;
+    d_W[17] = 0.0;
+    d_W[18] = 0.0;
+    d_W[19] = 0.0;
+    d_W[20] = 0.0;
+    d_W[21] = 0.0;
+    d_W[22] = 0.0;
+    d_W[23] = 0.0;
+    d_W[24] = 0.0;
+    d_W[25] = 0.0;
+    d_W[26] = 0.0;
+    d_W[27] = 0.0;
+    d_W[28] = 0.0;
+    d_W[29] = 0.0;
+    d_W[30] = 0.0;
+    d_W[31] = 0.0;
+    d_W[32] = 0.0;
+    d_W[33] = 0.0;
+    d_W[34] = 0.0;
+    d_W[35] = 0.0;
+    return 0;
+}
+
+static int mstmm_sweep_loops_distance_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_distance_slope(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_distance_slope_inputs[] = {
+    {"p", 1, "m", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_distance_slope_outputs[] = {
+    {"d_W", 36, "", 0, 0},
+};
+
+/* distance_drift and its derivative along a direction
+ * in  d[3] (m) that end from the origin of C, axes of C
+ * in  slip[6] rate of d and relative angular velocity, axes of C
+ * in  d_d[3] (m) derivative of d
+ * in  d_slip[6] derivative of slip
+ * out d_drift[6] derivative of drift, added to what is there
+ */
+int mstmm_sweep_loops_distance_drift_slope(const real *restrict d, const real *restrict slip,
+    const real *restrict d_d, const real *restrict d_slip, real *restrict d_drift)
+{
+    const real t0 = d[2] * d[2];
+    const real t1 = d[0] * d[0];
+    const real t2 = d[1] * d[1];
+    const real t3 = t1 + t2;
+    const real t4 = t0 + t3;
+    const real t5 = (t4 < 1e-24 || isnan(1e-24)) ? 1e-24 : t4;
+    const real t6 = sqrt(t5);
+    const real t7 = 1.0 / t6;
+    const real t8 = slip[2] * slip[2];
+    const real t9 = slip[1] * slip[1];
+    const real t10 = slip[0] * slip[0];
+    const real t11 = 1e-24 < t4;
+    const real t12 = d[2] * t7;
+    const real t13 = t11 != 0 ? t12 : 0.0;
+    const real t14 = slip[2] * t13;
+    const real t15 = d[0] * t7;
+    const real t16 = t11 != 0 ? t15 : 1.0;
+    const real t17 = t16 * slip[0];
+    const real t18 = d[1] * t7;
+    const real t19 = t11 != 0 ? t18 : 0.0;
+    const real t20 = slip[1] * t19;
+    const real t21 = t17 + t20;
+    const real t22 = t14 + t21;
+    const real t23 = t22 * t22;
+    const real t24 = t10 - t23;
+    const real t25 = t9 + t24;
+    const real t26 = t8 + t25;
+    const real t27 = t7 * d_d[0];
+    const real t28 = t4 < 1e-24;
+    const real t29 = d[1] * d_d[1];
+    const real t30 = t29 + t29;
+    const real t31 = d[0] * d_d[0];
+    const real t32 = t31 + t31;
+    const real t33 = t30 + t32;
+    const real t34 = d[2] * d_d[2];
+    const real t35 = t34 + t34;
+    const real t36 = t33 + t35;
+    const real t37 = t28 != 0 ? 0.0 : t36;
+    const real t38 = t6 * 2.0;
+    const real t39 = t37 / t38;
+    const real t40 = t7 * t39;
+    const real t41 = t40 / t6;
+    const real t42 = d[0] * t41;
+    const real t43 = t27 - t42;
+    const real t44 = t11 != 0 ? t43 : 0.0;
+    const real t45 = t26 * t44;
+    const real t46 = slip[0] * d_slip[0];
+    const real t47 = t46 + t46;
+    const real t48 = t19 * d_slip[1];
+    const real t49 = t7 * d_d[1];
+    const real t50 = d[1] * t41;
+    const real t51 = t49 - t50;
+    const real t52 = t11 != 0 ? t51 : 0.0;
+    const real t53 = slip[1] * t52;
+    const real t54 = t48 + t53;
+    const real t55 = slip[0] * t44;
+    const real t56 = t16 * d_slip[0];
+    const real t57 = t55 + t56;
+    const real t58 = t54 + t57;
+    const real t59 = t13 * d_slip[2];
+    const real t60 = t7 * d_d[2];
+    const real t61 = d[2] * t41;
+    const real t62 = t60 - t61;
+    const real t63 = t11 != 0 ? t62 : 0.0;
+    const real t64 = slip[2] * t63;
+    const real t65 = t59 + t64;
+    const real t66 = t58 + t65;
+    const real t67 = t22 * t66;
+    const real t68 = t67 + t67;
+    const real t69 = t47 - t68;
+    const real t70 = slip[1] * d_slip[1];
+    const real t71 = t70 + t70;
+    const real t72 = t69 + t71;
+    const real t73 = slip[2] * d_slip[2];
+    const real t74 = t73 + t73;
+    const real t75 = t72 + t74;
+    const real t76 = t16 * t75;
+    const real t77 = t45 + t76;
+    const real t78 = t7 * t77;
+    const real t79 = t16 * t26;
+    const real t80 = t79 * t41;
+    const real t81 = t78 - t80;
+    d_drift[0] += t81;
+    const real t82 = t26 * t52;
+    const real t83 = t19 * t75;
+    const real t84 = t82 + t83;
+    const real t85 = t7 * t84;
+    const real t86 = t19 * t26;
+    const real t87 = t86 * t41;
+    const real t88 = t85 - t87;
+    d_drift[1] += t88;
+    const real t89 = t26 * t63;
+    const real t90 = t13 * t75;
+    const real t91 = t89 + t90;
+    const real t92 = t7 * t91;
+    const real t93 = t13 * t26;
+    const real t94 = t93 * t41;
+    const real t95 = t92 - t94;
+    d_drift[2] += t95;
+    d_drift[3] += 0.0;
+    d_drift[4] += 0.0;
+    d_drift[5] += 0.0;
+    return 0;
+}
+
+static int mstmm_sweep_loops_distance_drift_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_distance_drift_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_distance_drift_slope_inputs[] = {
+    {"d", 3, "m", 0, 0},
+    {"slip", 6, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+    {"d_slip", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_distance_drift_slope_outputs[] = {
+    {"d_drift", 6, "", 1, 0},
+};
+
+/* plane and its derivative along a direction
+ * in  p[1] (m) height of the plane over C
+ * in  d[3] (m) that end from the origin of C, axes of C
+ * in  d_d[3] (m) derivative of d
+ * out d_W[6][6] derivative of W
+ */
+int mstmm_sweep_loops_plane_slope(const real *restrict p, const real *restrict d,
+    const real *restrict d_d, real *restrict d_W)
+{
+    (void)p;
+    (void)d;
+    (void)d_d;
+    d_W[0] = 0.0;
+    d_W[1] = 0.0;
+    d_W[2] = 0.0;
+    d_W[3] = 0.0;
+    d_W[4] = 0.0;
+    d_W[5] = 0.0;
+    d_W[6] = 0.0;
+    d_W[7] = 0.0;
+    d_W[8] = 0.0;
+    d_W[9] = 0.0;
+    d_W[10] = 0.0;
+    d_W[11] = 0.0;
+    d_W[12] = 0.0;
+    d_W[13] = 0.0;
+    d_W[14] = 0.0;
+    d_W[15] = 0.0;
+    d_W[16] = 0.0;
+    d_W[17] = 0.0;
+    d_W[18] = 0.0;
+    d_W[19] = 0.0;
+    d_W[20] = 0.0;
+    d_W[21] = 0.0;
+    d_W[22] = 0.0;
+    d_W[23] = 0.0;
+    d_W[24] = 0.0;
+    d_W[25] = 0.0;
+    d_W[26] = 0.0;
+    d_W[27] = 0.0;
+    d_W[28] = 0.0;
+    d_W[29] = 0.0;
+    d_W[30] = 0.0;
+    d_W[31] = 0.0;
+    d_W[32] = 0.0;
+    d_W[33] = 0.0;
+    d_W[34] = 0.0;
+    d_W[35] = 0.0;
+    return 0;
+}
+
+static int mstmm_sweep_loops_plane_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_plane_slope(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_plane_slope_inputs[] = {
+    {"p", 1, "m", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_plane_slope_outputs[] = {
+    {"d_W", 36, "", 0, 0},
+};
+
+/* rolling and its derivative along a direction
+ * in  p[5] (m, -) height of the plane over C, radius of the disc, its axis in axes of B (a ball: 0)
+ * in  R_C[3][3] rotation, axes of C to axes of B
+ * in  d[3] (m) that end from the origin of C, axes of C
+ * in  d_R_C[3][3] derivative of R_C
+ * in  d_d[3] (m) derivative of d
+ * out d_W[6][6] derivative of W
+ */
+int mstmm_sweep_loops_rolling_slope(const real *restrict p, const real *restrict R_C,
+    const real *restrict d, const real *restrict d_R_C, const real *restrict d_d,
+    real *restrict d_W)
+{
+    (void)d;
+    (void)d_d;
+    d_W[0] = 0.0;
+    d_W[1] = 0.0;
+    d_W[2] = 0.0;
+    d_W[3] = 0.0;
+    const real t0 = p[2] * R_C[2];
+    const real t1 = p[3] * R_C[5];
+    const real t2 = t0 + t1;
+    const real t3 = p[4] * R_C[8];
+    const real t4 = t2 + t3;
+    const real t5 = t4 * t4;
+    const real t6 = 1.0 - t5;
+    const real t7 = t6 * p[1];
+    const real t8 = t6 * t6;
+    const real t9 = p[2] * R_C[0];
+    const real t10 = p[3] * R_C[3];
+    const real t11 = t9 + t10;
+    const real t12 = p[4] * R_C[6];
+    const real t13 = t11 + t12;
+    const real t14 = t4 * t13;
+    const real t15 = t14 * t14;
+    const real t16 = p[2] * R_C[1];
+    const real t17 = p[3] * R_C[4];
+    const real t18 = t16 + t17;
+    const real t19 = p[4] * R_C[7];
+    const real t20 = t18 + t19;
+    const real t21 = t4 * t20;
+    const real t22 = t21 * t21;
+    const real t23 = t15 + t22;
+    const real t24 = t8 + t23;
+    const real t25 = (t24 < 1e-24 || isnan(1e-24)) ? 1e-24 : t24;
+    const real t26 = sqrt(t25);
+    const real t27 = 1.0 / t26;
+    const real t28 = t24 < 1e-24;
+    const real t29 = p[4] * d_R_C[8];
+    const real t30 = p[3] * d_R_C[5];
+    const real t31 = p[2] * d_R_C[2];
+    const real t32 = t30 + t31;
+    const real t33 = t29 + t32;
+    const real t34 = t20 * t33;
+    const real t35 = p[4] * d_R_C[7];
+    const real t36 = p[3] * d_R_C[4];
+    const real t37 = p[2] * d_R_C[1];
+    const real t38 = t36 + t37;
+    const real t39 = t35 + t38;
+    const real t40 = t4 * t39;
+    const real t41 = t34 + t40;
+    const real t42 = t21 * t41;
+    const real t43 = t42 + t42;
+    const real t44 = t13 * t33;
+    const real t45 = p[4] * d_R_C[6];
+    const real t46 = p[3] * d_R_C[3];
+    const real t47 = p[2] * d_R_C[0];
+    const real t48 = t46 + t47;
+    const real t49 = t45 + t48;
+    const real t50 = t4 * t49;
+    const real t51 = t44 + t50;
+    const real t52 = t14 * t51;
+    const real t53 = t52 + t52;
+    const real t54 = t43 + t53;
+    const real t55 = t4 * t33;
+    const real t56 = t55 + t55;
+    const real t57 = t6 * t56;
+    const real t58 = t57 + t57;
+    const real t59 = t54 - t58;
+    const real t60 = t28 != 0 ? 0.0 : t59;
+    const real t61 = t26 * 2.0;
+    const real t62 = t60 / t61;
+    const real t63 = t27 * t62;
+    const real t64 = t63 / t26;
+    const real t65 = t7 * t64;
+    const real t66 = p[1] * t56;
+    const real t67 = t27 * t66;
+    const real t68 = t65 + t67;
+    d_W[4] = t68;
+    const real t69 = t21 * p[1];
+    const real t70 = t69 * t64;
+    const real t71 = p[1] * t41;
+    const real t72 = t27 * t71;
+    const real t73 = t70 - t72;
+    d_W[5] = t73;
+    d_W[6] = 0.0;
+    d_W[7] = 0.0;
+    d_W[8] = 0.0;
+    const real t74 = -t68;
+    d_W[9] = t74;
+    d_W[10] = 0.0;
+    const real t75 = p[1] * t51;
+    const real t76 = t27 * t75;
+    const real t77 = t14 * p[1];
+    const real t78 = t77 * t64;
+    const real t79 = t76 - t78;
+    d_W[11] = t79;
+    d_W[12] = 0.0;
+    d_W[13] = 0.0;
+    d_W[14] = 0.0;
+    const real t80 = t72 - t70;
+    d_W[15] = t80;
+    const real t81 = t78 - t76;
+    d_W[16] = t81;
+    d_W[17] = 0.0;
+    d_W[18] = 0.0;
+    d_W[19] = 0.0;
+    d_W[20] = 0.0;
+    d_W[21] = 0.0;
+    d_W[22] = 0.0;
+    d_W[23] = 0.0;
+    d_W[24] = 0.0;
+    d_W[25] = 0.0;
+    d_W[26] = 0.0;
+    d_W[27] = 0.0;
+    d_W[28] = 0.0;
+    d_W[29] = 0.0;
+    d_W[30] = 0.0;
+    d_W[31] = 0.0;
+    d_W[32] = 0.0;
+    d_W[33] = 0.0;
+    d_W[34] = 0.0;
+    d_W[35] = 0.0;
+    return 0;
+}
+
+static int mstmm_sweep_loops_rolling_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_rolling_slope(in[0], in[1], in[2], in[3], in[4], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_rolling_slope_inputs[] = {
+    {"p", 5, "m, -", 0, 0},
+    {"R_C", 9, "", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"d_R_C", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_rolling_slope_outputs[] = {
+    {"d_W", 36, "", 0, 0},
+};
+
+/* rolling_drift and its derivative along a direction
+ * in  p[5] (m, -) height of the plane over C, radius of the disc, its axis in axes of B (a ball: 0)
+ * in  R_C[3][3] rotation, axes of C to axes of B
+ * in  slip[6] rate of d and relative angular velocity, axes of C
+ * in  d_R_C[3][3] derivative of R_C
+ * in  d_slip[6] derivative of slip
+ * out d_drift[6] derivative of drift, added to what is there
+ */
+int mstmm_sweep_loops_rolling_drift_slope(const real *restrict p, const real *restrict R_C,
+    const real *restrict slip, const real *restrict d_R_C, const real *restrict d_slip,
+    real *restrict d_drift)
+{
+    const real t0 = p[2] * R_C[2];
+    const real t1 = p[3] * R_C[5];
+    const real t2 = t0 + t1;
+    const real t3 = p[4] * R_C[8];
+    const real t4 = t2 + t3;
+    const real t5 = t4 * t4;
+    const real t6 = 1.0 - t5;
+    const real t7 = t6 * t6;
+    const real t8 = p[2] * R_C[0];
+    const real t9 = p[3] * R_C[3];
+    const real t10 = t8 + t9;
+    const real t11 = p[4] * R_C[6];
+    const real t12 = t10 + t11;
+    const real t13 = t4 * t12;
+    const real t14 = t13 * t13;
+    const real t15 = p[2] * R_C[1];
+    const real t16 = p[3] * R_C[4];
+    const real t17 = t15 + t16;
+    const real t18 = p[4] * R_C[7];
+    const real t19 = t17 + t18;
+    const real t20 = t4 * t19;
+    const real t21 = t20 * t20;
+    const real t22 = t14 + t21;
+    const real t23 = t7 + t22;
+    const real t24 = (t23 < 1e-24 || isnan(1e-24)) ? 1e-24 : t23;
+    const real t25 = sqrt(t24);
+    const real t26 = 1.0 / t25;
+    const real t27 = t19 * slip[3];
+    const real t28 = t12 * slip[4];
+    const real t29 = t27 - t28;
+    const real t30 = t4 * t29;
+    const real t31 = t30 * 2.0;
+    const real t32 = t12 * t29;
+    const real t33 = t4 * slip[4];
+    const real t34 = t19 * slip[5];
+    const real t35 = t33 - t34;
+    const real t36 = t4 * t35;
+    const real t37 = t32 + t36;
+    const real t38 = t13 * t37;
+    const real t39 = t19 * t29;
+    const real t40 = t12 * slip[5];
+    const real t41 = t4 * slip[3];
+    const real t42 = t40 - t41;
+    const real t43 = t4 * t42;
+    const real t44 = t39 + t43;
+    const real t45 = t20 * t44;
+    const real t46 = t38 + t45;
+    const real t47 = t6 * t31;
+    const real t48 = t46 - t47;
+    const real t49 = t26 * t48;
+    const real t50 = t6 * t49;
+    const real t51 = t26 * t50;
+    const real t52 = t31 + t51;
+    const real t53 = p[1] * t52;
+    const real t54 = t26 * t53;
+    const real t55 = t54 * d_slip[4];
+    const real t56 = p[4] * d_R_C[8];
+    const real t57 = p[3] * d_R_C[5];
+    const real t58 = p[2] * d_R_C[2];
+    const real t59 = t57 + t58;
+    const real t60 = t56 + t59;
+    const real t61 = t29 * t60;
+    const real t62 = p[4] * d_R_C[7];
+    const real t63 = p[3] * d_R_C[4];
+    const real t64 = p[2] * d_R_C[1];
+    const real t65 = t63 + t64;
+    const real t66 = t62 + t65;
+    const real t67 = slip[3] * t66;
+    const real t68 = t19 * d_slip[3];
+    const real t69 = t67 + t68;
+    const real t70 = p[4] * d_R_C[6];
+    const real t71 = p[3] * d_R_C[3];
+    const real t72 = p[2] * d_R_C[0];
+    const real t73 = t71 + t72;
+    const real t74 = t70 + t73;
+    const real t75 = slip[4] * t74;
+    const real t76 = t12 * d_slip[4];
+    const real t77 = t75 + t76;
+    const real t78 = t69 - t77;
+    const real t79 = t4 * t78;
+    const real t80 = t61 + t79;
+    const real t81 = 2.0 * t80;
+    const real t82 = t19 * t60;
+    const real t83 = t4 * t66;
+    const real t84 = t82 + t83;
+    const real t85 = t44 * t84;
+    const real t86 = t42 * t60;
+    const real t87 = slip[5] * t74;
+    const real t88 = t12 * d_slip[5];
+    const real t89 = t87 + t88;
+    const real t90 = slip[3] * t60;
+    const real t91 = t4 * d_slip[3];
+    const real t92 = t90 + t91;
+    const real t93 = t89 - t92;
+    const real t94 = t4 * t93;
+    const real t95 = t86 + t94;
+    const real t96 = t29 * t66;
+    const real t97 = t19 * t78;
+    const real t98 = t96 + t97;
+    const real t99 = t95 + t98;
+    const real t100 = t20 * t99;
+    const real t101 = t85 + t100;
+    const real t102 = t12 * t60;
+    const real t103 = t4 * t74;
+    const real t104 = t102 + t103;
+    const real t105 = t37 * t104;
+    const real t106 = t35 * t60;
+    const real t107 = slip[4] * t60;
+    const real t108 = t4 * d_slip[4];
+    const real t109 = t107 + t108;
+    const real t110 = slip[5] * t66;
+    const real t111 = t19 * d_slip[5];
+    const real t112 = t110 + t111;
+    const real t113 = t109 - t112;
+    const real t114 = t4 * t113;
+    const real t115 = t106 + t114;
+    const real t116 = t29 * t74;
+    const real t117 = t12 * t78;
+    const real t118 = t116 + t117;
+    const real t119 = t115 + t118;
+    const real t120 = t13 * t119;
+    const real t121 = t105 + t120;
+    const real t122 = t101 + t121;
+    const real t123 = t6 * t81;
+    const real t124 = t4 * t60;
+    const real t125 = t124 + t124;
+    const real t126 = t31 * t125;
+    const real t127 = t123 - t126;
+    const real t128 = t122 - t127;
+    const real t129 = t26 * t128;
+    const real t130 = t23 < 1e-24;
+    const real t131 = t20 * t84;
+    const real t132 = t131 + t131;
+    const real t133 = t13 * t104;
+    const real t134 = t133 + t133;
+    const real t135 = t132 + t134;
+    const real t136 = t6 * t125;
+    const real t137 = t136 + t136;
+    const real t138 = t135 - t137;
+    const real t139 = t130 != 0 ? 0.0 : t138;
+    const real t140 = t25 * 2.0;
+    const real t141 = t139 / t140;
+    const real t142 = t26 * t141;
+    const real t143 = t142 / t25;
+    const real t144 = t48 * t143;
+    const real t145 = t129 - t144;
+    const real t146 = t6 * t145;
+    const real t147 = t49 * t125;
+    const real t148 = t146 - t147;
+    const real t149 = t26 * t148;
+    const real t150 = t50 * t143;
+    const real t151 = t149 - t150;
+    const real t152 = t81 + t151;
+    const real t153 = p[1] * t152;
+    const real t154 = t26 * t153;
+    const real t155 = t53 * t143;
+    const real t156 = t154 - t155;
+    const real t157 = slip[4] * t156;
+    const real t158 = t55 + t157;
+    const real t159 = t20 * t49;
+    const real t160 = t26 * t159;
+    const real t161 = t160 - t44;
+    const real t162 = t161 * p[1];
+    const real t163 = t26 * t162;
+    const real t164 = t163 * d_slip[5];
+    const real t165 = t49 * t84;
+    const real t166 = t20 * t145;
+    const real t167 = t165 + t166;
+    const real t168 = t26 * t167;
+    const real t169 = t159 * t143;
+    const real t170 = t168 - t169;
+    const real t171 = t170 - t99;
+    const real t172 = p[1] * t171;
+    const real t173 = t26 * t172;
+    const real t174 = t162 * t143;
+    const real t175 = t173 - t174;
+    const real t176 = slip[5] * t175;
+    const real t177 = t164 + t176;
+    const real t178 = t158 + t177;
+    d_drift[0] += t178;
+    const real t179 = t54 * d_slip[3];
+    const real t180 = slip[3] * t156;
+    const real t181 = t179 + t180;
+    const real t182 = t13 * t49;
+    const real t183 = t26 * t182;
+    const real t184 = t183 - t37;
+    const real t185 = p[1] * t184;
+    const real t186 = t26 * t185;
+    const real t187 = t186 * d_slip[5];
+    const real t188 = t49 * t104;
+    const real t189 = t13 * t145;
+    const real t190 = t188 + t189;
+    const real t191 = t26 * t190;
+    const real t192 = t182 * t143;
+    const real t193 = t191 - t192;
+    const real t194 = t193 - t119;
+    const real t195 = p[1] * t194;
+    const real t196 = t26 * t195;
+    const real t197 = t185 * t143;
+    const real t198 = t196 - t197;
+    const real t199 = slip[5] * t198;
+    const real t200 = t187 + t199;
+    const real t201 = t181 + t200;
+    const real t202 = -t201;
+    d_drift[1] += t202;
+    const real t203 = t186 * d_slip[4];
+    const real t204 = slip[4] * t198;
+    const real t205 = t203 + t204;
+    const real t206 = t163 * d_slip[3];
+    const real t207 = slip[3] * t175;
+    const real t208 = t206 + t207;
+    const real t209 = t205 - t208;
+    d_drift[2] += t209;
+    d_drift[3] += 0.0;
+    d_drift[4] += 0.0;
+    d_drift[5] += 0.0;
+    return 0;
+}
+
+static int mstmm_sweep_loops_rolling_drift_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_rolling_drift_slope(in[0], in[1], in[2], in[3], in[4], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_rolling_drift_slope_inputs[] = {
+    {"p", 5, "m, -", 0, 0},
+    {"R_C", 9, "", 0, 0},
+    {"slip", 6, "", 0, 0},
+    {"d_R_C", 9, "", 0, 0},
+    {"d_slip", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_rolling_drift_slope_outputs[] = {
+    {"d_drift", 6, "", 1, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
     {
         .name = "gap",
@@ -4949,13 +5662,73 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "distance_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_distance_slope,
+        .call = mstmm_sweep_loops_distance_slope_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_distance_slope_inputs,
+        .outputs = mstmm_sweep_loops_distance_slope_outputs,
+        .ir_hash = "d9bb9a513bb4c960d5afbcbd323790328943f2bfd40dcc3193f4978a75062751",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "distance_drift_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_distance_drift_slope,
+        .call = mstmm_sweep_loops_distance_drift_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_distance_drift_slope_inputs,
+        .outputs = mstmm_sweep_loops_distance_drift_slope_outputs,
+        .ir_hash = "f5c4790f069a6e9a67fa42ec25d08197b495778971c2c230240f2467ac1dfd45",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "plane_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_plane_slope,
+        .call = mstmm_sweep_loops_plane_slope_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_plane_slope_inputs,
+        .outputs = mstmm_sweep_loops_plane_slope_outputs,
+        .ir_hash = "be94bd57c8575f72d74c24553fa62cce78d2c861fe7499d360b2b37ba7b66656",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "rolling_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_rolling_slope,
+        .call = mstmm_sweep_loops_rolling_slope_call,
+        .n_inputs = 5,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_rolling_slope_inputs,
+        .outputs = mstmm_sweep_loops_rolling_slope_outputs,
+        .ir_hash = "54b66327eb529cdab24a8bc2294cda221ea1da4a821ff276f79a30db069d967f",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "rolling_drift_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_rolling_drift_slope,
+        .call = mstmm_sweep_loops_rolling_drift_slope_call,
+        .n_inputs = 5,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_rolling_drift_slope_inputs,
+        .outputs = mstmm_sweep_loops_rolling_drift_slope_outputs,
+        .ir_hash = "081ad1c642f57a5ec5a966b456239b65a6501019bf3235d3ed9c3b5b7191f742",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_loops = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "loops",
-    .hash = "c5e4a0d4e99a96e188e7e1424c9006a11c18d1c8678b950006d5ebfb682b8d1d",
+    .hash = "95ed049c9b5634aa3487d04e7aabc52146cc95ac8209813a5745f0846348422c",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4965,6 +5738,6 @@ const mstmm_element mstmm_sweep_loops = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 24,
+    .n_kernels = 29,
     .kernels = mstmm_sweep_loops_kernels,
 };

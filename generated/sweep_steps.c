@@ -1591,10 +1591,35 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
         .v_C = block + MSTMM_BLOCK_V, .w_C = block + MSTMM_BLOCK_MOTION,
         .v_B = outboard + MSTMM_BLOCK_V, .w_B = outboard + MSTMM_BLOCK_MOTION,
         .slip = closed + MSTMM_CLOSURE_SLIP);
+    if (closure->kind == MSTMM_DISTANCE) {
+        mstmm_loops_distance(
+            .p = closure->p, .d = closed + MSTMM_CLOSURE_D, .W = closed + MSTMM_CLOSURE_W,
+            .gap = closed + MSTMM_CLOSURE_GAP);
+    }
+    if (closure->kind == MSTMM_PLANE) {
+        mstmm_loops_plane(
+            .p = closure->p, .d = closed + MSTMM_CLOSURE_D, .W = closed + MSTMM_CLOSURE_W,
+            .gap = closed + MSTMM_CLOSURE_GAP);
+    }
+    if (closure->kind == MSTMM_ROLLING) {
+        code = mstmm_loops_rolling(
+            .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C, .d = closed + MSTMM_CLOSURE_D,
+            .W = closed + MSTMM_CLOSURE_W, .gap = closed + MSTMM_CLOSURE_GAP);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_LOOP, index, code);
+    }
     mstmm_loops_drift(
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
         .slip = closed + MSTMM_CLOSURE_SLIP, .motion_C = block + MSTMM_BLOCK_MOTION,
         .motion_B = outboard + MSTMM_BLOCK_MOTION, .drift = drift);
+    if (closure->kind == MSTMM_DISTANCE) {
+        mstmm_loops_distance_drift(
+            .d = closed + MSTMM_CLOSURE_D, .slip = closed + MSTMM_CLOSURE_SLIP, .drift = drift);
+    }
+    if (closure->kind == MSTMM_ROLLING) {
+        mstmm_loops_rolling_drift(
+            .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .slip = closed + MSTMM_CLOSURE_SLIP, .drift = drift);
+    }
     mstmm_loops_rows(
         .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
         .Rc = block + MSTMM_BLOCK_R, .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = drift,
@@ -2363,6 +2388,22 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
         .d_v_C = d_block + MSTMM_BLOCK_V, .d_w_C = d_block + MSTMM_BLOCK_MOTION,
         .d_v_B = d_outboard + MSTMM_BLOCK_V, .d_w_B = d_outboard + MSTMM_BLOCK_MOTION,
         .d_slip = d_closed + MSTMM_CLOSURE_SLIP);
+    if (closure->kind == MSTMM_DISTANCE) {
+        mstmm_loops_distance_slope(
+            .p = closure->p, .d = closed + MSTMM_CLOSURE_D, .d_d = d_closed + MSTMM_CLOSURE_D,
+            .d_W = d_closed + MSTMM_CLOSURE_W);
+    }
+    if (closure->kind == MSTMM_PLANE) {
+        mstmm_loops_plane_slope(
+            .p = closure->p, .d = closed + MSTMM_CLOSURE_D, .d_d = d_closed + MSTMM_CLOSURE_D,
+            .d_W = d_closed + MSTMM_CLOSURE_W);
+    }
+    if (closure->kind == MSTMM_ROLLING) {
+        mstmm_loops_rolling_slope(
+            .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C, .d = closed + MSTMM_CLOSURE_D,
+            .d_R_C = d_closed + MSTMM_CLOSURE_R_C, .d_d = d_closed + MSTMM_CLOSURE_D,
+            .d_W = d_closed + MSTMM_CLOSURE_W);
+    }
     mstmm_loops_drift(
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
         .slip = closed + MSTMM_CLOSURE_SLIP, .motion_C = block + MSTMM_BLOCK_MOTION,
@@ -2374,6 +2415,18 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
         .d_d = d_closed + MSTMM_CLOSURE_D, .d_slip = d_closed + MSTMM_CLOSURE_SLIP,
         .d_motion_C = d_block + MSTMM_BLOCK_MOTION,
         .d_motion_B = d_outboard + MSTMM_BLOCK_MOTION, .d_drift = d_drift);
+    if (closure->kind == MSTMM_DISTANCE) {
+        mstmm_loops_distance_drift_slope(
+            .d = closed + MSTMM_CLOSURE_D, .slip = closed + MSTMM_CLOSURE_SLIP,
+            .d_d = d_closed + MSTMM_CLOSURE_D, .d_slip = d_closed + MSTMM_CLOSURE_SLIP,
+            .d_drift = d_drift);
+    }
+    if (closure->kind == MSTMM_ROLLING) {
+        mstmm_loops_rolling_drift_slope(
+            .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .slip = closed + MSTMM_CLOSURE_SLIP, .d_R_C = d_closed + MSTMM_CLOSURE_R_C,
+            .d_slip = d_closed + MSTMM_CLOSURE_SLIP, .d_drift = d_drift);
+    }
     mstmm_loops_rows_slope(
         .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
         .Rc = block + MSTMM_BLOCK_R, .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = drift,

@@ -62,6 +62,11 @@ _MOVING: dict[str, dict[str, tuple[str, str]]] = {
         "rows": ("W R_C Rc r_A relative", ""),
         "act": ("J tau", ""),
         "loaded": ("K x", ""),
+        "distance": ("d", "W"),
+        "distance_drift": ("d slip", ""),
+        "plane": ("d", "W"),
+        "rolling": ("R_C d", "W"),
+        "rolling_drift": ("R_C slip", ""),
     },
     "modal": {
         "residual": ("eta etad motion", "S_rf e e_f"),

@@ -147,7 +147,9 @@ CLOSURES_LOADED = Pass(
     " on its bodies.",
     (
         *_MEETING,
+        *_CONSTRAINED,
         _DRIFT,
+        *_BENT,
         *_DRIVEN,
         _EFFORTS,
         Each(

@@ -17,7 +17,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
-from ..pack.loops.refusal import refuse_constraints, refuse_couplings
+from ..pack.loops.refusal import refuse_couplings
 
 if TYPE_CHECKING:
     from .engine import Engine
@@ -33,7 +33,6 @@ class Tangent:
     def __init__(self, engine: Engine, memory: Array | None = None) -> None:
         self.engine = engine
         packed, ffi = engine.packed, engine.ffi
-        refuse_constraints(packed, "the tangent of the equations")
         refuse_couplings(packed, "the tangent of the equations")
         self.nq, self.nu = engine.nq, engine.nu
         self.state = np.zeros(self.nq), np.zeros(self.nu)

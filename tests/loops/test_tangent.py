@@ -12,6 +12,7 @@ import mstmm
 from mstmm.runtime.engine.tangent import Tangent
 
 from . import test_four_bar as pins
+from .constraints.scenes import cycloid, governor, on_a_road
 from .linkages import bricard, cranks, legs
 from .scenes import andrews
 
@@ -47,6 +48,9 @@ CASES: dict[str, tuple[dict[str, Any], float, float]] = {
     "redundant across loops": (cranks(), 37.0, 0.0),
     "legs": (legs(law=100.0), 37.0, 1e-2),
     "loops in one point": (andrews(), 1e5, 1e-5),
+    "distances": (governor("constraint"), 37.0, 1e-2),
+    "a disc that rolls": (on_a_road(), 37.0, 1e-2),
+    "a bead on a wire": (cycloid(0.4), 37.0, 1e-2),
 }
 
 

@@ -14,6 +14,7 @@ from mstmm.ir import KernelIR, Port
 from mstmm.ir.facts import HingeFacts
 from mstmm.ir.graph import Graph
 from mstmm.ir.param import Param
+from mstmm.ir.tangent import tangent
 from mstmm.ir.tape import compile_tape
 from mstmm.scene import Constraint, Hinge
 from mstmm.scene.tables.hinge_keys import Initial
@@ -45,12 +46,16 @@ def along(constraint: Constraint, held: Hinge) -> Hinge:
 def elements_of(constraints: Iterable[Constraint]) -> dict[Key, Element]:
     """The hinges along curves, run by the interpreter."""
     curves = [one for one in constraints if one.curve is not None]
-    return {
-        ("hinge", _type(curve)): Element(
-            "hinge", _type(curve), 1, 1, (), {}, {}, None, compile_tape(_kernel(curve))
-        )
-        for curve in curves
-    }
+    return {("hinge", _type(curve)): _element(curve) for curve in curves}
+
+
+def _element(constraint: Constraint) -> Element:
+    kernel = _kernel(constraint)
+    slope = tangent(kernel, ("q", "u"), None, values=False, guards=False)
+    return Element(
+        "hinge", _type(constraint), 1, 1, (), {}, {}, None, compile_tape(kernel),
+        compile_tape(slope),
+    )  # fmt: skip
 
 
 def _type(constraint: Constraint) -> str:

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import math
-from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
 import scipy.linalg
-import sympy as sp
-import sympy.physics.mechanics as me
 from reference import newton_euler as dense
 from reference.algebra import attitude, orientation, to_quaternion
 from reference.compare import worst
@@ -22,14 +18,10 @@ from reference.tree import Tree, read
 
 import mstmm
 
-Scene = dict[str, Any]
-GRAVITY = 9.81
+from .scenes import GRAVITY, MASS, RADIUS, Scene, compiled, cycloid, disc, governor, kane
+
 SEEDS = range(12)
 KINDS = ("distance", "point-on-plane", "point-on-curve", "rolling", "ball")
-
-
-def compiled(scene: Scene) -> mstmm.Model:
-    return mstmm.compile(mstmm.Scene(**scene))
 
 
 # --- random trees ---------------------------------------------------------------------------------
@@ -103,51 +95,6 @@ def test_random_trees(seed: int) -> None:
 
 # --- a disc that rolls ----------------------------------------------------------------------------
 
-RADIUS, MASS = 0.3, 2.0
-
-
-@cache
-def disc() -> mstmm.Model:
-    """A thin disc with its axis along y on the ground, 0.3 rad off upright, rolling fast."""
-    lean = orientation([0.3, 0.0, 0.0])
-    free = {"name": "at", "type": "free", "inboard": "ground", "outboard": "disc",
-            "initial": {"q": [0, 0, RADIUS * math.cos(0.3), *map(float, to_quaternion(lean))],
-                        "u": [2.4, 0, 0, 0, 8, 0]}}  # fmt: skip
-    moment = MASS * RADIUS**2 / 4
-    return compiled({
-        "gravity": [0, 0, -GRAVITY], "hinge": [free],
-        "body": [{"name": "disc", "mass": MASS, "inertia": [moment, 2 * moment, moment]}],
-        "constraint": [{"name": "road", "type": "rolling", "from": "ground", "to": "disc",
-                        "normal": [0, 0, 1], "radius": RADIUS, "axis": [0, 1, 0]}],
-    })  # fmt: skip
-
-
-@cache
-def kane() -> Any:
-    """(lean, u) -> rates of the components of the angular velocity in axes that lean with the disc
-    but do not spin, by SymPy's KanesMethod: x forward, y along the axis of the disc."""
-    q, u = me.dynamicsymbols("q:3"), me.dynamicsymbols("u:3")
-    inertial = me.ReferenceFrame("N")
-    yaw = inertial.orientnew("Y", "Axis", [q[0], inertial.z])
-    lean = yaw.orientnew("L", "Axis", [q[1], yaw.x])
-    body = lean.orientnew("R", "Axis", [q[2], lean.y])
-    turning = body.ang_vel_in(inertial)
-    spin = u[0] * lean.x + u[1] * lean.y + u[2] * lean.z
-    body.set_ang_vel(inertial, spin)
-    contact = me.Point("C")
-    contact.set_vel(inertial, 0)
-    center = contact.locatenew("D", RADIUS * lean.z)
-    center.v2pt_theory(contact, inertial, body)
-    moment = MASS * RADIUS**2 / 4
-    inertia = me.inertia(lean, moment, 2 * moment, moment)
-    method = me.KanesMethod(inertial, q, u, kd_eqs=[me.dot(turning - spin, axis) for axis in lean])
-    rigid = me.RigidBody("disc", center, body, MASS, (inertia, center))
-    method.kanes_equations([rigid], [(center, -MASS * GRAVITY * inertial.z)])
-    plain = sp.symbols("x:4")
-    known = dict(zip([q[1], *u], plain, strict=True))
-    matrices = [m.xreplace(known) for m in (method.mass_matrix, method.forcing)]
-    return sp.lambdify(plain, matrices, "numpy")
-
 
 def test_a_rolling_disc_against_kane() -> None:
     """Twenty states: the angular acceleration, seen from the disc."""
@@ -206,48 +153,12 @@ def test_a_disc_that_falls_flat() -> None:
 def test_a_bead_on_a_cycloid_swings_in_a_time_that_is_always_the_same(start: float) -> None:
     """Along the arc sigma = 4 a sin(s / 2) it obeys sigma'' = -(g / 4 a) sigma (Huygens)."""
     a = 0.5
-    place = [a * (start + math.sin(start)), 0, -a * math.cos(start)]
-    free = {"name": "at", "type": "free", "inboard": "ground", "outboard": "bead",
-            "initial": {"q": [*place, 1, 0, 0, 0]}}  # fmt: skip
-    model = compiled({
-        "gravity": [0, 0, -GRAVITY], "hinge": [free],
-        "body": [{"name": "bead", "mass": 0.3, "inertia": [0.1, 0.1, 0.1]}],
-        "constraint": [{"name": "wire", "type": "point-on-curve", "from": "ground", "to": "bead",
-                        "curve": [f"{a}*(s + sin(s))", 0, f"-{a}*cos(s)"], "start": start}],
-    })  # fmt: skip
+    model = compiled(cycloid(start, a))
     times = np.linspace(0.0, 4.0, 9)
     result = model.simulate(4.0, "dop853", rtol=1e-11, atol=1e-12, output_times=times)
     assert result.success, result.message
     wanted = 4 * a * math.sin(start / 2) * np.cos(math.sqrt(GRAVITY / (4 * a)) * times)
     assert np.abs(4 * a * np.sin(result.q[:, 7] / 2) - wanted).max() < 1e-9
-
-
-def governor(rods: str) -> Scene:
-    """Two balls on arms at a shaft that is driven, and a sleeve that two rods hang on them."""
-    arm = {"mass": 1.0, "inertia": [0.002, 0.02, 0.02], "center_of_mass": [0.3, 0, 0],
-           "ends": {"ball": [0.3, 0, 0]}}  # fmt: skip
-    arms = [arm | {"name": f"arm{k}"} for k in range(2)]
-    hinges = [
-        {"name": "turn", "type": "pin", "inboard": "ground", "outboard": "shaft", "drive": "10*t"},
-        {"name": "slide", "type": "prismatic", "inboard": "shaft", "outboard": "sleeve",
-         "initial": {"q": -0.3 * math.sqrt(2)}},
-        *({"name": f"hip{k}", "type": "pin", "inboard": "shaft", "outboard": f"arm{k}",
-           "orientation": [0, 0, math.pi * k], "axis": [0, 1, 0],
-           "initial": {"q": math.pi / 4}} for k in range(2)),
-    ]  # fmt: skip
-    scene: Scene = {
-        "gravity": [0, 0, -GRAVITY], "hinge": hinges,
-        "body": [{"name": "shaft", "mass": 1.0, "inertia": [0.1, 0.1, 0.1]},
-                 {"name": "sleeve", "mass": 2.0, "inertia": [0.1, 0.1, 0.1]}, *arms],
-    }  # fmt: skip
-    for k in range(2):
-        rod = {"from": f"arm{k}.ball", "to": "sleeve"}
-        if rods == "constraint":
-            scene.setdefault("constraint", []).append(rod | {"type": "distance", "length": 0.3})
-        else:
-            law = {"stiffness": 8e5, "rest": 0.3}
-            scene.setdefault("spring", []).append(rod | {"law": law})
-    return scene
 
 
 def test_a_governor_is_stiff_by_springs_alone() -> None:
