@@ -156,6 +156,18 @@ def test_cutting_another_hinge_changes_nothing() -> None:
     assert mstmm.compile(mstmm.Scene(**slider_crank())).loops.rank == 2
 
 
+def test_a_start_that_is_bent_stays_bent() -> None:
+    """Deflections and their rates are start values as any others; the loop changes them little."""
+    scene = slider_crank()
+    bent, rates = [0.01, -0.002], [0.3, 0.1]
+    scene["beam"][0]["initial"] = {"eta": bent, "etad": rates}
+    model = mstmm.compile(mstmm.Scene(**scene))
+    q, u = model.initial_state()
+    slots = model.layout.modal["bar"]
+    np.testing.assert_allclose(q[slots.q_slice], bent, rtol=0.05)
+    np.testing.assert_allclose(u[slots.u_slice], rates, rtol=0.05)
+
+
 def test_a_stiff_rod_moves_as_a_rigid_one() -> None:
     """What it bends by goes with 1 / EI."""
     scene = slider_crank()

@@ -98,7 +98,7 @@ class Closed:
             hinge.name for hinge in hinges
             if hinge.drive is None and hinge.initial is not None and any(hinge.initial.u or ())
         ]  # fmt: skip
-        q, u = start_values(packed.scene, packed.layout)
+        q, u = start_values(packed.scene, packed.layout, packed.flexible)
         calls = LoopCalls(engine, q)
         q, u = calls.driven(q, u)
         length = length_of(packed.system)
