@@ -28,6 +28,8 @@ _DENSE = 600
 #: Loops are followed in steps no longer than this, in sizes: longer ones may end where they are
 #: closed another way.
 _PART = 0.1
+#: Efforts along motions of loops that are rounding, in parts of the work of all that cancel.
+_CANCELLED = 1e-14
 
 
 class Equilibrium(np.ndarray[Any, np.dtype[np.float64]]):
@@ -135,7 +137,10 @@ def _of_mechanism(
 
     def needed(q: Array) -> Array:
         efforts = engine.inverse_dynamics(t, q, still, still, memory)
-        return np.asarray(freedom.following(q, places).T @ efforts)
+        found = np.asarray(freedom.following(q, places).T @ efforts)
+        # What nothing pushes must not go by rounding of what cancels.
+        whole = float(np.abs(efforts) @ freedom.sizes)
+        return np.where(np.abs(found) * sizes > _CANCELLED * whole, found, 0.0)
 
     def moved(q: Array, increment: Array) -> Array:
         parts = max(1, int(np.ceil(float(np.abs(increment / sizes).max(initial=0.0)) / _PART)))

@@ -17,7 +17,7 @@ from ..linear.judged import refuse_unrest
 from ..linear.linear import Linear
 from ..linear.loops.mechanism import mechanism_at, refuse_motions
 from ..linear.matrices import State, matrices
-from ..pack.loops.refusal import refuse_beyond_hinges
+from ..pack.loops.refusal import refuse_bending
 from ..run.start import initial_state
 from ..run.system import SceneSystem
 from .derivatives import Differentiation
@@ -52,7 +52,7 @@ class Linearising:
         disturbances: Sequence[str] | None,
     ) -> Linear:
         """See `Model.linearize`."""
-        refuse_beyond_hinges(self._model.packed, "a linear model")
+        refuse_bending(self._model.packed, "a linear model")
         pushes, others = self._inputs, self._ground
         if inputs is not None:
             pushes = pushes_of(self._model, "inputs", inputs)

@@ -229,7 +229,8 @@ class ClosureNumbers:
 
     Constraints ask less of the two: as `kind` says, one of those in derive/equations/constraints.py
     with its numbers `p`, or "hinge".  `of_speeds` are the directions in which nothing is asked of
-    positions.
+    positions.  Of the six directions the first `asked` say something; those without a row repeat
+    what others do.
     """
 
     frame: int
@@ -240,6 +241,7 @@ class ClosureNumbers:
     kind: str = "hinge"
     p: Numbers = ()
     of_speeds: tuple[int, ...] = ()
+    asked: int = 6
 
 
 @dataclass(frozen=True, slots=True)

@@ -177,6 +177,7 @@ class SceneSystem:
             [np.asarray(q, float), np.asarray(u, float), np.zeros(int(self.with_power))]
         )
         y = np.ascontiguousarray(y)
+        self.run.failure.reason = 0  # of another state that did not close
         self.engine.lib.mstmm_scene_settle(self.run, t, self.engine.pointer(y))
         if self.run.failure.reason == Failed.LOOP:
             raise SceneError(f"scene: {self.engine.failure_text(self.run.failure, t)}")

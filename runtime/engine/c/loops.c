@@ -170,7 +170,7 @@ static real largest(const mstmm_state *state, int repeated, int *where)
             state->workspace + model->loops + closure->numbers + MSTMM_CLOSURE_L;
         for (int c = 0; c < 6; c++) {
             const int row = closure->rows[c];
-            if (row >= 0 && let_go(state, &model->rows[row])) continue;
+            if (row < -1 || (row >= 0 && let_go(state, &model->rows[row]))) continue;
             const int counts = row >= 0 ? row_numbers(state, row)[MSTMM_ROW_INVERSE] > 0
                                         : c < model->bodies[i].nu;
             if (counts == repeated || fabs(known[c]) <= found) continue;

@@ -168,7 +168,7 @@ typedef struct {
     int outboard; /* B */
     int kind;
     real p[5];    /* of a constraint */
-    int rows[6];  /* of its directions, -1: none */
+    int rows[6];  /* of its directions, -1: none, it repeats others; -2: nothing is asked */
     int64_t inner[6], outer[6]; /* their columns on A and on B */
     real turn[9], end[3];       /* axes of C and its origin in B */
     int64_t numbers;            /* of its own */

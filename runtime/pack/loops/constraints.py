@@ -25,13 +25,13 @@ def asked(constraint: Constraint, frames: Frames, place: int) -> ClosureNumbers:
     held = (place, body, _SELF, end)
     if constraint.type == DISTANCE:
         assert constraint.length is not None
-        return ClosureNumbers(*held, (0,), "distance", (constraint.length,))
+        return ClosureNumbers(*held, (0,), "distance", (constraint.length,), asked=1)
     if constraint.type == CURVE:  # behind the speed along it, what is across it
-        return ClosureNumbers(*held, (1, 2))
+        return ClosureNumbers(*held, (1, 2), asked=3)
     height = constraint.offset or 0.0
     if constraint.type == PLANE:
-        return ClosureNumbers(*held, (0,), "plane", (height,))
+        return ClosureNumbers(*held, (0,), "plane", (height,), asked=1)
     assert constraint.radius is not None
     axis = apply((axes[0:3], axes[3:6], axes[6:9]), constraint.unit_axis)  # type: ignore[arg-type]
     p = (height, constraint.radius, *axis)
-    return ClosureNumbers(*held, (0, 1, 2), "rolling", p, of_speeds=(0, 1))
+    return ClosureNumbers(*held, (0, 1, 2), "rolling", p, of_speeds=(0, 1), asked=3)

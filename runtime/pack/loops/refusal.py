@@ -46,12 +46,18 @@ def refuse_constraints(packed: Packed, what: str) -> None:
         )
 
 
-def refuse_beyond_hinges(packed: Packed, what: str) -> None:
-    """SceneError where more than hinges of rigid bodies closes loops, which `what` cannot follow
-    yet."""
+def refuse_bending(packed: Packed, what: str) -> None:
+    """SceneError where couplings, or loops with flexible bodies, are there, which `what` cannot
+    follow yet."""
     refuse_couplings(packed, what)
     if packed.flexible:
         refuse(packed, f"{what} with flexible bodies", INSTEAD)
+
+
+def refuse_beyond_hinges(packed: Packed, what: str) -> None:
+    """SceneError where more than hinges of rigid bodies closes loops, which `what` cannot follow
+    yet."""
+    refuse_bending(packed, what)
     refuse_constraints(packed, what)
 
 

@@ -251,7 +251,7 @@ class _Loops:
         for k, number in enumerate(closure.p):
             record.p[k] = number
         record.numbers = self._take(int(self.lib.MSTMM_CLOSURE))
-        record.rows = [-1] * 6
+        record.rows = [-1 if k < closure.asked else -2 for k in range(6)]
         body, own = self.system.body(closure.frame), dict[int, int]()
         inboard = self.parents[closure.frame]
         for k, direction in enumerate(closure.directions):
