@@ -48,7 +48,8 @@ def compile_scene(
         sweep: "riccati" (any tree), "qr" (the same as least squares: slower, but it keeps its
             digits where heavy bodies hang behind light ones; rigid bodies, looped engine, and
             explicit methods; the equilibrium and derivatives stay with the Riccati sweep), or
-            "product" (the plain product of classical transfer matrices, chains only, guarded).
+            "product" (the plain product of classical transfer matrices along a chain and
+            loops closed on it, guarded).
         accuracy: with "product", the largest deviation from the Riccati sweep, relative to the
             largest acceleration, that is not an error.
         bake: with "fused", make the scene's numbers part of the code instead of reading them at run

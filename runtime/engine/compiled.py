@@ -12,10 +12,11 @@ from mstmm.scene import Scene
 from ..flexible.modal_body import ModalBody
 from ..kernels import store
 from ..pack import parameters as named_parameters
+from ..pack import product
 from ..pack.elements import Known
 from ..pack.layout import Layout
 from ..pack.pack import pack
-from ..pack.packed import Packed
+from ..pack.packed import Packed, resize
 from .code import Fusing, NotFused
 from .engine import Engine
 from .given import GivenInput, at_once, with_inputs
@@ -55,6 +56,9 @@ class Compiled:
             except NumericalFailure as failure:
                 raise SceneError(f"scene: {failure}") from None
             self.looped = self.closed.engine
+            if product_accuracy is not None:
+                product.attach(self.packed, product_accuracy)
+                resize(self.packed, self.packed.written.slots)
         self.fusion: Fusing = fusing(self.packed, known or {}) if fusing else NotFused()
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -34,7 +34,7 @@ def pack(
     """
     system, frames = system_of(scene, known, align=align, flexible=flexible)
     packed = packed_system(system, frames)
-    if product_accuracy is not None:
+    if product_accuracy is not None and not system.closes:  # closed loops go first
         product.attach(packed, product_accuracy)
     if least_squares:
         qr.attach(packed)

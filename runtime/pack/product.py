@@ -1,4 +1,5 @@
-"""The plain product of classical transfer matrices as a way to the accelerations of a chain.
+"""The plain product of classical transfer matrices as a way to the accelerations of a chain, and of
+loops closed on it.
 
 A didactic reference, not a solver: its pivots belong to one body and may vanish, and its error
 grows geometrically with the number of bodies.  Every evaluation is compared with the Riccati
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from mstmm.errors import SceneError
 
-from .loops.refusal import refuse
+from .loops.refusal import refuse_beyond_hinges
 
 if TYPE_CHECKING:
     from mstmm.scene import Hinge
@@ -35,15 +36,42 @@ def _kind(hinge: Hinge) -> str | None:
 def attach(packed: Packed, accuracy: float) -> None:
     """Let the packed scene use the product.  SceneError for a scene it has no matrices for."""
     scene, lib = packed.scene, packed.lib
-    refuse(packed, 'sweep = "product"', 'use sweep = "riccati"')
     _refuse(packed)
     packed.product = record = packed.ffi.new("mstmm_product *")
     record.kind = getattr(lib, f"MSTMM_PRODUCT_{_kind(scene.hinges[0])}")
     record.accuracy = accuracy
     # Its numbers stand between the blocks and what lies behind them: one workspace per thread.
     record.place = packed.scratch
-    packed.scratch += len(scene.bodies) * int(lib.MSTMM_PRODUCT_PER_BODY) + packed.layout.nu
+    packed.scratch += packed.system.count * int(lib.MSTMM_PRODUCT_PER_BODY) + packed.layout.nu
+    loops = packed.written.loops
+    packed.scratch += 0 if loops is None else (loops.count + 1) ** 2
     packed.model.product = record
+    packed.model.refines = 0
+
+
+def _along_chain(packed: Packed) -> list[Hinge]:
+    """Hinges from the ground to the tip, without those that close loops on the chain.  SceneError
+    for a tree with branches, and for closing hinges that let go."""
+    frames = {one.frame for one in packed.system.closures}
+    carried = -1
+    hinges: list[Hinge] = []
+    for place, link in enumerate(packed.topology.links):
+        if place in frames:
+            continue
+        if link.parent != carried:
+            cut = ", the hinges that close its loops cut (cut = true)" if frames else ""
+            raise SceneError(
+                "the product of transfer matrices needs an unbranched chain"
+                f'{cut}; use sweep = "riccati"'
+            )
+        carried = place
+        hinges.append(packed.scene.hinges[link.hinge])
+    if frames and packed.releases:
+        raise SceneError(
+            "the product of transfer matrices keeps the loops of its chain closed, and hinges are "
+            'released; use sweep = "riccati"'
+        )
+    return hinges
 
 
 def _refuse(packed: Packed) -> None:
@@ -53,9 +81,8 @@ def _refuse(packed: Packed) -> None:
     if packed.flexible:
         name = next(iter(packed.flexible))
         raise SceneError(f'"{name}" is flexible; the product runs rigid chains only; {way_out}')
-    if not packed.topology.is_chain:
-        raise SceneError(f"the product of transfer matrices needs an unbranched chain; {way_out}")
-    hinges = [scene.hinges[link.hinge] for link in packed.topology.links]
+    refuse_beyond_hinges(packed, 'sweep = "product"')
+    hinges = _along_chain(packed)
     for hinge in hinges:
         if _kind(hinge) is None:
             raise SceneError(
@@ -68,8 +95,10 @@ def _refuse(packed: Packed) -> None:
                 "classical matrix: "
                 f"its condition does not determine the free accelerations before it; {way_out}"
             )
+    places = [packed.topology.links[one.frame] for one in packed.system.closures]
+    frames = {scene.bodies.name(link.body) for link in places}
     for body in scene.bodies:
-        if body.type != "rigid" or body.mass == 0:
+        if body.name not in frames and (body.type != "rigid" or body.mass == 0):
             raise SceneError(
                 f'body "{body.name}": the classical matrix needs a rigid body with mass; {way_out}'
             )

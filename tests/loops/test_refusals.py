@@ -34,7 +34,6 @@ ASKED: dict[str, Callable[[mstmm.Model], Any]] = {
     },
     "laws alone": lambda m: m.simulate(0.1, "esdirk436", tangent="laws"),
     "least squares": lambda m: mstmm.compile(m.scene, sweep="qr"),
-    "product": lambda m: mstmm.compile(m.scene, sweep="product"),
 }
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import copy
 from typing import Any
 
+from mstmm.scene.checks.topology import Topology
+
 Data = dict[str, Any]
 
 
@@ -69,3 +71,8 @@ def bladed(**changes: Any) -> Data:
     """One beam on a fixed hinge; `changes` are to the beam."""
     held = {"name": "hub", "type": "fixed", "inboard": "ground", "outboard": "blade"}
     return {"gravity": [0, 0, -9.81], "beam": [beam(**changes)], "hinge": [held]}
+
+
+def is_chain(tree: Topology) -> bool:
+    """Whether it is one unbranched chain from the ground."""
+    return all(run.parent == run.place - 1 for run in tree.runs)

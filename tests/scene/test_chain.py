@@ -10,7 +10,7 @@ import pytest
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
 from mstmm.scene.checks import topology
-from scene.scenes import Data, arm, body, hinge
+from scene.scenes import Data, arm, body, hinge, is_chain
 
 LINK = {key: value for key, value in body().items() if key != "name"}
 TWO_ENDS = LINK | {"ends": {"tip": [1, 0, 0], "side": [0, 1, 0]}}
@@ -93,7 +93,7 @@ def test_a_chain_is_one_run_whatever_its_length() -> None:
         assert tree.at(place) == (link.body, link.hinge)
         assert tree.place_of_body(link.body) == tree.position[link.body] == place
         assert tree.place_of_hinge(link.hinge) == place
-    assert not tree.is_chain and topology.build(Scene(**roped())).is_chain
+    assert not is_chain(tree) and is_chain(topology.build(Scene(**roped())))
 
 
 def test_subtrees_are_contiguous() -> None:

@@ -162,11 +162,6 @@ class Topology:
         """Positions of the bodies hinged to the ground."""
         return tuple(run.place for run in self.runs if run.parent == GROUND)
 
-    @property
-    def is_chain(self) -> bool:
-        """True for one unbranched chain from the ground."""
-        return all(run.parent == run.place - 1 for run in self.runs)
-
 
 def build(scene: SceneTables) -> Topology:
     """The tree of a scene.  O(tables) without loops, no recursion.

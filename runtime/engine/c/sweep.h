@@ -217,14 +217,13 @@ typedef struct {
 #define MSTMM_PRODUCT_BALL 1
 #define MSTMM_PRODUCT_ACCELERATION 2
 
-/* Numbers per body: two transfer matrices, scales, a state; applied loads. */
-#define MSTMM_PRODUCT_MATRICES 400
-#define MSTMM_PRODUCT_PER_BODY 406
+/* Numbers per body: two transfer matrices, scales, its motion and its load. */
+#define MSTMM_PRODUCT_PER_BODY 386
 
 typedef struct {
     int kind;
     real accuracy; /* largest relative deviation from the Riccati sweep that is accepted */
-    int64_t place; /* of its numbers in the workspace: MSTMM_PRODUCT_PER_BODY a body, then nu */
+    int64_t place; /* of its numbers in the workspace: those of bodies, nu, (rows + 1)^2 of loops */
 } mstmm_product;
 
 typedef struct {
