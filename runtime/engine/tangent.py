@@ -189,8 +189,11 @@ def _rows_of_loops(engine: Engine) -> list[tuple[int, int, int, int]]:
     """(frame, direction, speed, row) of what hinges that close loops leave unknown: accelerations
     of their speeds, and multipliers of their rows; -1 for the other of the two."""
     packed, loops = engine.packed, engine.packed.written.loops
-    first, found = packed.system.places["u"], list[tuple[int, int, int, int]]()
-    for one in () if loops is None else loops.closures:
+    found = list[tuple[int, int, int, int]]()
+    if loops is None:
+        return found
+    first = packed.system.places["u"]
+    for one in loops.closures:
         speeds = range(packed.system.body(one.frame).nu)
         found += [(one.frame, k, int(first[one.frame]) + k, -1) for k in speeds]
         found += [(one.frame, direction, -1, row) for direction, row in one.rows.items()]

@@ -168,35 +168,43 @@ class Run:
         bounds: tuple[ArrayLike, ArrayLike] = ((), ()),
         capacity: int | None = None,
     ) -> None:
-        self._ffi, self._lib, self._system, self.tableau = ffi, lib, system, tableau
-        self._refuse_unsuited(tableau)
-        if settings.tangent == "laws" and not system.implicit.laws:
-            raise SceneError('tangent = "laws": this system has none by laws alone')
-        self._kept: list[Any] = [system]
-        self._samples: list[Samples] = []
-        self.kept_bytes = 0  # of all samples so far
+        self._ffi, self._lib, self._system = ffi, lib, system
         self._run = run = ffi.new("mstmm_run *")
         run.system = system
-        run.tableau = c_tableau(ffi, tableau)
+        self._outputs(run, settings.output_times)
+        self.map_times(breaks, bounds)
+        self._buffer(run, capacity)
+        self.begin(tableau, settings, y0, atol)
+
+    def begin(
+        self, tableau: Tableau, settings: Settings, y0: ArrayLike, atol: ArrayLike | None = None
+    ) -> None:
+        """Stand at the start of a run, which may be another one: by another method or to other
+        tolerances, over the same times with the same samples.  What was not taken is dropped."""
+        self._refuse_unsuited(tableau)
+        system, run = self._system, self._run
+        if settings.tangent == "laws" and not system.implicit.laws:
+            raise SceneError('tangent = "laws": this system has none by laws alone')
+        if settings.step is not None and not settings.step > 0.0:
+            raise SceneError(
+                f"step = {settings.step!r}: a fixed step is a time above zero, in seconds"
+            )
+        self.tableau, run.tableau = tableau, c_tableau(self._ffi, tableau)
         run.t_start, run.t_end, run.rtol = settings.t_start, settings.t_end, settings.rtol
         run.fixed_step = 0.0 if settings.step is None else settings.step
         run.first_step, run.min_step = settings.first_step, settings.min_step
         run.max_step, run.max_steps = settings.max_step, settings.max_steps
         run.tangents = TANGENTS.index(settings.tangent)
-        if settings.step is not None and not settings.step > 0.0:
-            raise SceneError(
-                f"step = {settings.step!r}: a fixed step is a time above zero, in seconds"
-            )
+        self.call_back(0)
         given = np.asarray(settings.atol if atol is None else atol, dtype=np.float64)
-        run.atol = self._doubles(np.broadcast_to(given, (system.n_error,)))
-        self._outputs(run, settings.output_times)
-        self.map_times(breaks, bounds)
-        self._buffer(run, capacity)
+        run.atol = self._atol = self._doubles(np.broadcast_to(given, (system.n_error,)))
         run.workspace = self._space = self._room(run.tableau)
+        self._samples: list[Samples] = []
+        self.kept_bytes = 0  # of all samples so far
         start = np.array(y0, dtype=np.float64)
         if start.shape != (system.n_state,):
             raise SceneError(f"y0 has shape {start.shape}, expected ({system.n_state},)")
-        if lib.mstmm_run_start(run, self._doubles(start)) == Status.BAD_ARGUMENT:
+        if self._lib.mstmm_run_start(run, self._doubles(start)) == Status.BAD_ARGUMENT:
             raise SceneError(f"{tableau.name}: check {_ARGUMENTS[run.count.code]}")
 
     def _refuse_unsuited(self, tableau: Tableau) -> None:
@@ -215,17 +223,15 @@ class Run:
         return self._ffi.from_buffer("double[]", np.zeros(max(size, 1)))
 
     def _doubles(self, array: ArrayLike) -> Any:
-        """`double *` to a contiguous copy that lives as long as the run."""
-        copy = np.array(array, dtype=np.float64, order="C")
-        pointer = self._ffi.from_buffer("double[]", copy)
-        self._kept += [copy, pointer]
-        return pointer
+        """`double *` to a contiguous copy, which lives as long as what is returned."""
+        return self._ffi.from_buffer("double[]", np.array(array, dtype=np.float64, order="C"))
 
     def _outputs(self, run: Any, output_times: ArrayLike | None) -> None:
         run.n_outputs = -1
         if output_times is not None:
             outputs = np.atleast_1d(np.asarray(output_times, dtype=np.float64))
-            run.n_outputs, run.outputs = len(outputs), self._doubles(outputs)
+            self._output_times = self._doubles(outputs)
+            run.n_outputs, run.outputs = len(outputs), self._output_times
 
     def _buffer(self, run: Any, capacity: int | None) -> None:
         n, nm = self._system.n_state, self._system.n_memory

@@ -207,8 +207,9 @@ def differences(
 
 def rotation_between(a: Array, b: Array) -> Array:
     """Angle (...) in rad between orientations given by unit quaternions (..., 4)."""
-    chord = np.minimum(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
-    return np.asarray(4.0 * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0)))
+    apart, other = a - b, a + b
+    chord = np.sqrt(np.minimum((apart * apart).sum(axis=-1), (other * other).sum(axis=-1)))
+    return np.asarray(4.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)))
 
 
 def excursions(layout: Layout, q: Array, but: str = "") -> dict[str, float]:

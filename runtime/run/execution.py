@@ -17,16 +17,17 @@ from ..integrate.loop import Run, Samples, Status
 from ..integrate.settings import Settings
 from . import classical, second_opinion
 from . import engine_choice as compiled_run
+from .beginnings import Beginnings
 from .checkpoint import Checkpoint, State
 from .error_estimate import ErrorEstimate, alike, compare, tighter
 from .method_choice import Choice
-from .simulate import advance, choice_of, make_run, said, trajectory
-from .system import SceneSystem
+from .simulate import advance, choice_of, said, trajectory
 from .trajectory import Trajectory
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
     from .stability import StepCheck
+    from .system import SceneSystem
 
 Progress = Callable[[float, float], None]
 
@@ -91,10 +92,10 @@ def _joined(earlier: Samples | None, samples: Samples) -> Samples:
 
 def first_run(
     model: Compiled, settings: Settings, q: Array, u: Array, watch: Watch, resume: bool = False,
-    step: StepCheck | None = None,
+    step: StepCheck | None = None, beginnings: Beginnings | None = None,
 ) -> Trajectory:  # fmt: skip
     """The run from (q, u), or from the checkpoint.  Its failures are put down to the fixed step
-    where `step` has found that too long."""
+    where `step` has found that too long.  `beginnings` are those of further runs from there."""
     if settings.method in classical.METHODS or settings.method in second_opinion.METHODS:
         if watch.checkpoint is not None:
             raise SceneError(f'method "{settings.method}" keeps no checkpoints; use dop853')
@@ -104,8 +105,8 @@ def first_run(
     state, earlier = _continued(watch.checkpoint) if resume else (None, None)
     recorded = None if state is None else str(state["engine"])
     engine, compiled = model.looped, compiled_run.at_once(model, settings, recorded)
-    system = SceneSystem(engine, compiled)
-    run = make_run(system, settings, q, u)
+    begin = (Beginnings() if beginnings is None else beginnings).begin
+    system, run = begin(engine, compiled, settings, q, u)
     watch.choice = choice_of(system, settings, run)
     message = "" if run.status is Status.RUNNING else said(system, run, run.status)
     if state is not None and earlier is not None and watch.checkpoint is not None:
@@ -119,8 +120,7 @@ def first_run(
         if status is Status.RUNNING:
             compiled = compiled_run.worth_compiling(model, settings, run)
         if compiled is not None:
-            system, earlier = SceneSystem(engine, compiled), None
-            run = make_run(system, settings, q, u)
+            (system, run), earlier = begin(engine, compiled, settings, q, u), None
             watch.choice = choice_of(system, settings, run)
     watch.engine = compiled_run.FUSED if compiled else compiled_run.LOOPED
     if status is Status.RUNNING:

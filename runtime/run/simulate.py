@@ -14,7 +14,7 @@ from mstmm.errors import NumericalFailure
 from ..host.interruptible import interruptible
 from ..integrate.loop import Run, Samples, Statistics, Status
 from ..integrate.settings import Settings
-from ..integrate.steppers import AUTO, check_steps, get
+from ..integrate.steppers import AUTO, Tableau, check_steps, get
 from ..pack.loops.refusal import refuse_method
 from .endings import message_of
 from .method_choice import Choice
@@ -39,11 +39,7 @@ def make_run(
     system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike, capacity: int | None = None
 ) -> Run:
     """The integrator at the start of the run, with room for so many samples at a time."""
-    tableau = get(settings.first_method, settings.radius)
-    if tableau.implicit:
-        refuse_method(system.engine.packed, settings.method, settings.tangent)
-        system.offer_tangent()
-    check_steps(tableau, settings.step)
+    tableau = suited(system, settings)
     start = system.begin(settings.t_start, q, u)
     known = system.engine.packed.time_map(settings.t_start, settings.t_end)
     return Run(
@@ -53,16 +49,28 @@ def make_run(
     )  # fmt: skip
 
 
-def tolerances(system: SceneSystem, settings: Settings, start: Array) -> Array:
+def suited(system: SceneSystem, settings: Settings) -> Tableau:
+    """The method by which a run begins, of a system that has what it asks for."""
+    tableau = get(settings.first_method, settings.radius)
+    if tableau.implicit:
+        refuse_method(system.engine.packed, settings.method, settings.tangent)
+        system.offer_tangent()
+    check_steps(tableau, settings.step)
+    return tableau
+
+
+def tolerances(
+    system: SceneSystem, settings: Settings, start: Array, energy: float | None = None
+) -> Array:
     """Absolute tolerance per component; that of the work follows the energy of the start (J)."""
     found = np.full(len(start), settings.atol)
     if system.with_power:
-        energy = _energy(system, settings.t_start, start) or 1.0
-        found[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * energy
+        known = energy_at(system, settings.t_start, start) if energy is None else energy
+        found[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * (known or 1.0)
     return found
 
 
-def _energy(system: SceneSystem, t: float, y: Array) -> float:
+def energy_at(system: SceneSystem, t: float, y: Array) -> float:
     """Sum of the sizes of the energies of a state, J; 0 where the motion itself cannot be computed,
     which the run will say.
 

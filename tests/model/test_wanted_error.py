@@ -266,8 +266,8 @@ def test_an_implicit_run_that_finds_no_step_gives_way(monkeypatch: pytest.Monkey
     model = stiff(2, 1e8, 1.0)
     real = execution.first_run
 
-    def first_run(model: Any, settings: Settings, *rest: Any) -> Any:
-        run = real(model, settings, *rest)
+    def first_run(model: Any, settings: Settings, *rest: Any, **more: Any) -> Any:
+        run = real(model, settings, *rest, **more)
         failing = settings.method == "rodas4p2"
         return replace(run, status=Status.STEP_TOO_SMALL) if failing else run
 

@@ -24,6 +24,7 @@ from ...integrate.reached import Attempt, ReachedError
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO
 from ...result.measure import Coordinates, Measure, Quantities
+from ...run.beginnings import Beginnings
 from ...run.error_estimate import compare
 from ...run.execution import Watch, first_run
 from ..results import certified, result_of
@@ -69,6 +70,7 @@ class Search:
         self._wanted, self._progress = wanted, progress
         self._times = settings.output_times
         self._settings = replace(settings, output_times=_looked_at(settings))
+        self._beginnings = Beginnings()
         self._family = Family(model, settings, wanted.error, q, u)
         self._measure: Measure | None = None if wanted.of else Coordinates(model)
         self._rough = has_stops(model)
@@ -112,7 +114,7 @@ class Search:
         settings = replace(self._settings, rtol=rtol, atol=atol, method=method, max_steps=most)
         watch = Watch(self._told(), settings)
         begin = time.process_time()
-        run = first_run(self._model, settings, self._q, self._u, watch)
+        run = first_run(self._model, settings, self._q, self._u, watch, beginnings=self._beginnings)
         spent = time.process_time() - begin
         self._notes += [note for note in watch.notes if note not in self._notes]
         if not run.success:
