@@ -14,7 +14,7 @@ from mstmm.risk import RUN, Risk
 
 from ..integrate.steppers import AUTO, get
 from ..run import classical, second_opinion
-from ..run.fastest import Fastest, may_be_fast
+from ..run.fastest import fastest_at_start, may_be_fast
 from .implicit_pays import Cheaper, cheaper
 from .shapes import squares
 
@@ -62,7 +62,7 @@ def many_steps(model: Compiled, settings: Settings, q: Array, u: Array) -> Itera
     if not (span > 0 and _may_be(model, _MANY / span)):
         return
     try:
-        rate = Fastest(model.looped, model.looped.start_memory()).rate(settings.t_start, q, u)
+        rate = fastest_at_start(model.looped, settings.t_start, q, u)
     except MstmmError:  # a scene without tangent, or a start that the run itself will blame
         return
     if not rate * span > _MANY:

@@ -10,20 +10,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
 from mstmm.scene import Scene
 
 from ..engine.engine import Engine
-from ..engine.tangent import Tangent
+from ..engine.motions import motions
+from ..engine.tangent import Tangent, tangent_of
 
 #: Power iterations; the first one is in the choice of their start.
 _ITERATIONS = 4
 
 #: Speeds among which the start is chosen: those on which slopes are largest.
 _CANDIDATES = 64
+
+#: Coordinates and speeds together up to which all motions are looked at.
+_FEW = 24
 
 Operator = Callable[[Array], Array]
 
@@ -51,6 +57,23 @@ def fastest_possible(scene: Scene) -> float:
     if not least > 0:
         return math.inf
     return max(math.sqrt(max(stiffest, 0.0) / least), damped / least)
+
+
+def fastest_at_start(engine: Engine, t: float, q: Array, u: Array) -> float:
+    """|lambda| (1/s) at a state (nq,), (nu,) with nothing released: of few components by all
+    motions, which costs less than to look for one.
+
+    Raises SceneError for scenes without tangent, NumericalFailure where the state cannot be
+    evaluated.
+    """
+    tangent_of(engine)
+    memory, y = engine.start_memory(), np.concatenate([q, u])
+    if len(y) > _FEW:
+        return Fastest(engine, memory).rate(t, q, u)
+    try:
+        return float(np.abs(motions(engine, t, y, memory)[0]).max(initial=0.0))
+    except np.linalg.LinAlgError:
+        raise NumericalFailure(f"the motions at t = {t:.9g} s are not finite") from None
 
 
 class Fastest:
@@ -116,7 +139,7 @@ class Fastest:
         """M^-1 e of the speed with the largest slope times (M^-1)_jj, of norm 1; slopes by one
         product, exact where each speed has its own."""
         nu = self.engine.nu
-        signs = np.random.default_rng(0).choice([-1.0, 1.0], nu)
+        signs = _signs(nu)
         own = np.abs(signs * slope(signs))
         places = np.argsort(-own, kind="stable")[:_CANDIDATES]
         columns = np.zeros((len(places), nu))
@@ -130,3 +153,9 @@ class Fastest:
 
     def _solved(self, q: Array, columns: Array) -> Array:
         return self.engine.solve(q, columns, self.memory)
+
+
+@cache
+def _signs(count: int) -> Array:
+    """(count,) of 1 and -1 without order, always the same."""
+    return np.random.default_rng(0).choice([-1.0, 1.0], count)

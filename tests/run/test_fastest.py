@@ -13,8 +13,9 @@ from support.result_scenes import pins
 
 import mstmm
 from benchmarks.stiff.cases import CASES
+from mstmm.errors import SceneError
 from mstmm.runtime.engine.motions import fastest
-from mstmm.runtime.run.fastest import Fastest
+from mstmm.runtime.run.fastest import Fastest, fastest_at_start
 
 TREES, STIFF = 200, 300.0
 
@@ -65,6 +66,19 @@ def test_stiff_scenes(name: str) -> None:
     model = mstmm.compile(mstmm.Scene(**CASES[name].scene()), engine="looped")
     found, exact = both(model, *model.initial_state())
     assert 0.85 * exact < found < 1.1 * exact
+    assert 0.85 * exact < fastest_at_start(model.looped, 0.0, *model.initial_state()) < 1.1 * exact
+
+
+def test_at_the_start_of_a_scene_without_tangent() -> None:
+    """A stiff spring asks for an implicit method; a coupling leaves none."""
+    scene = pins(2, [0.3, 0.2]).model_dump(mode="json")
+    scene["hinge"][1]["law"] = {"stiffness": [1e8]}
+    scene["coupling"] = [{"name": "gear", "expression": "pin0.q - 1.5*pin1.q"}]
+    model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
+    with pytest.raises(SceneError, match="coupling"):
+        fastest_at_start(model.looped, 0.0, *model.initial_state())
+    reached = model.simulate(0.1, error=1e-3).error_estimate
+    assert reached is not None and reached.method != "rodas4p2"
 
 
 def test_many_bodies_cost_no_more_columns() -> None:
@@ -100,3 +114,4 @@ def test_nothing_that_moves() -> None:
         model = mstmm.compile(scene, engine="looped")
         found = Fastest(model.looped, model.looped.start_memory())
         assert found.rate(0.0, *model.initial_state()) == 0.0
+        assert fastest_at_start(model.looped, 0.0, *model.initial_state()) == 0.0

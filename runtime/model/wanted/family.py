@@ -22,7 +22,7 @@ from ...integrate.loop import Status
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO, AUTO_EXPLICIT, get
 from ...run import second_opinion
-from ...run.fastest import Fastest, fastest_possible
+from ...run.fastest import fastest_at_start, fastest_possible
 from ...run.method_choice import implicit_method
 from .looks import Kind
 from .shaken import shaken
@@ -135,8 +135,7 @@ class Family:
         if not self._free or _fastest_possible(model) * span <= few:
             return
         try:
-            fastest = Fastest(model.looped, model.looped.start_memory())
-            self._rate = fastest.rate(settings.t_start, q, u)
+            self._rate = fastest_at_start(model.looped, settings.t_start, q, u)
             if self._rate * span > _SWINGING and error >= _PAYS:
                 self._tried = shaken(model, settings.t_start, q, u)
         except MstmmError:  # a scene without tangent, or a start that the run itself will blame
