@@ -3069,6 +3069,42 @@ static inline int mstmm_generic_complement_slope_by(int speeds, struct mstmm_gen
 }
 #define mstmm_generic_complement_slope(speeds, ...) mstmm_generic_complement_slope_by(speeds, (struct mstmm_generic_complement_slope){__VA_ARGS__})
 
+struct mstmm_generic_answered_slope {
+    const real *y;
+    const real *z;
+    const real *d_y;
+    const real *d_z;
+    real *d_l;
+};
+typedef int mstmm_generic_answered_slope_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    real *restrict);
+extern mstmm_generic_answered_slope_kernel *const mstmm_generic_answered_slope_table[];
+static inline int mstmm_generic_answered_slope_by(int speeds, struct mstmm_generic_answered_slope to)
+{
+    return mstmm_generic_answered_slope_table[speeds](
+        to.y, to.z, to.d_y, to.d_z, to.d_l);
+}
+#define mstmm_generic_answered_slope(speeds, ...) mstmm_generic_answered_slope_by(speeds, (struct mstmm_generic_answered_slope){__VA_ARGS__})
+
+struct mstmm_generic_pull_slope {
+    const real *y;
+    const real *x;
+    const real *d_y;
+    const real *d_x;
+    real *d_y_0;
+};
+typedef int mstmm_generic_pull_slope_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    real *restrict);
+extern mstmm_generic_pull_slope_kernel *const mstmm_generic_pull_slope_table[];
+static inline int mstmm_generic_pull_slope_by(int speeds, struct mstmm_generic_pull_slope to)
+{
+    return mstmm_generic_pull_slope_table[speeds](
+        to.y, to.x, to.d_y, to.d_x, to.d_y_0);
+}
+#define mstmm_generic_pull_slope(speeds, ...) mstmm_generic_pull_slope_by(speeds, (struct mstmm_generic_pull_slope){__VA_ARGS__})
+
 struct mstmm_generic_tangent_carrier {
     const real *H;
     const real *s;

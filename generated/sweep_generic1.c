@@ -97,6 +97,10 @@ int mstmm_sweep_generic1_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic1_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
+int mstmm_sweep_generic1_answered_slope(const real *restrict y, const real *restrict z,
+    const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
+int mstmm_sweep_generic1_pull_slope(const real *restrict y, const real *restrict x,
+    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
@@ -5489,6 +5493,79 @@ static const mstmm_port mstmm_sweep_generic1_complement_slope_outputs[] = {
     {"d_W", 36, "", 0, 0},
 };
 
+/* answered and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[1] tau - H^T e
+ * in  z[1] of the row
+ * in  d_y[1] derivative of y
+ * in  d_z[1] derivative of z
+ * out d_l[1] derivative of l, added to what is there
+ */
+int mstmm_sweep_generic1_answered_slope(const real *restrict y, const real *restrict z,
+    const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
+{
+    const real t0 = z[0] * d_y[0];
+    const real t1 = y[0] * d_z[0];
+    const real t2 = t0 + t1;
+    const real t3 = -t2;
+    d_l[0] += t3;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_answered_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_answered_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_answered_slope_inputs[] = {
+    {"y", 1, "", 0, 0},
+    {"z", 1, "", 0, 0},
+    {"d_y", 1, "", 0, 0},
+    {"d_z", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_answered_slope_outputs[] = {
+    {"d_l", 1, "", 1, 0},
+};
+
+/* pull and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[1] of the row
+ * in  x[1] (N, N*m) multiplier
+ * in  d_y[1] derivative of y
+ * in  d_x[1] (N, N*m) derivative of x
+ * out d_y_0[1] derivative of y_0, added to what is there
+ */
+int mstmm_sweep_generic1_pull_slope(const real *restrict y, const real *restrict x,
+    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
+{
+    const real t0 = x[0] * d_y[0];
+    const real t1 = y[0] * d_x[0];
+    const real t2 = t0 + t1;
+    d_y_0[0] += t2;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_pull_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_pull_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_pull_slope_inputs[] = {
+    {"y", 1, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+    {"d_y", 1, "", 0, 0},
+    {"d_x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_pull_slope_outputs[] = {
+    {"d_y_0", 1, "", 1, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
     {
         .name = "forward",
@@ -5826,13 +5903,37 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "answered_slope",
+        .function = (void (*)(void))mstmm_sweep_generic1_answered_slope,
+        .call = mstmm_sweep_generic1_answered_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_answered_slope_inputs,
+        .outputs = mstmm_sweep_generic1_answered_slope_outputs,
+        .ir_hash = "b3ce9acda5a4c29fe3d53bbaef29d877062d785892e3e196fd99f124043a2a6d",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "pull_slope",
+        .function = (void (*)(void))mstmm_sweep_generic1_pull_slope,
+        .call = mstmm_sweep_generic1_pull_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_pull_slope_inputs,
+        .outputs = mstmm_sweep_generic1_pull_slope_outputs,
+        .ir_hash = "4488aa14c7e91a0a80236bf077cf7a19fc3737b4df4b27394c926fd05c190be7",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "89043460c3388ae7a319d33994a87f52b3523c9fc09cb0e9ba047954b7fba452",
+    .hash = "4a669535f17121ced88c56f2b4f81abcadccdbc46640e5ad4924478edc9d0069",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -5842,6 +5943,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 28,
+    .n_kernels = 30,
     .kernels = mstmm_sweep_generic1_kernels,
 };

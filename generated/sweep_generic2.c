@@ -97,6 +97,10 @@ int mstmm_sweep_generic2_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic2_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
+int mstmm_sweep_generic2_answered_slope(const real *restrict y, const real *restrict z,
+    const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
+int mstmm_sweep_generic2_pull_slope(const real *restrict y, const real *restrict x,
+    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
@@ -7467,6 +7471,87 @@ static const mstmm_port mstmm_sweep_generic2_complement_slope_outputs[] = {
     {"d_W", 36, "", 0, 0},
 };
 
+/* answered and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[2] tau - H^T e
+ * in  z[2] of the row
+ * in  d_y[2] derivative of y
+ * in  d_z[2] derivative of z
+ * out d_l[1] derivative of l, added to what is there
+ */
+int mstmm_sweep_generic2_answered_slope(const real *restrict y, const real *restrict z,
+    const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
+{
+    const real t0 = z[1] * d_y[1];
+    const real t1 = y[1] * d_z[1];
+    const real t2 = t0 + t1;
+    const real t3 = z[0] * d_y[0];
+    const real t4 = y[0] * d_z[0];
+    const real t5 = t3 + t4;
+    const real t6 = t2 + t5;
+    const real t7 = -t6;
+    d_l[0] += t7;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_answered_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_answered_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_answered_slope_inputs[] = {
+    {"y", 2, "", 0, 0},
+    {"z", 2, "", 0, 0},
+    {"d_y", 2, "", 0, 0},
+    {"d_z", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_answered_slope_outputs[] = {
+    {"d_l", 1, "", 1, 0},
+};
+
+/* pull and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[2] of the row
+ * in  x[1] (N, N*m) multiplier
+ * in  d_y[2] derivative of y
+ * in  d_x[1] (N, N*m) derivative of x
+ * out d_y_0[2] derivative of y_0, added to what is there
+ */
+int mstmm_sweep_generic2_pull_slope(const real *restrict y, const real *restrict x,
+    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
+{
+    const real t0 = x[0] * d_y[0];
+    const real t1 = y[0] * d_x[0];
+    const real t2 = t0 + t1;
+    d_y_0[0] += t2;
+    const real t3 = y[1] * d_x[0];
+    const real t4 = x[0] * d_y[1];
+    const real t5 = t3 + t4;
+    d_y_0[1] += t5;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_pull_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_pull_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_pull_slope_inputs[] = {
+    {"y", 2, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+    {"d_y", 2, "", 0, 0},
+    {"d_x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_pull_slope_outputs[] = {
+    {"d_y_0", 2, "", 1, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
     {
         .name = "forward",
@@ -7804,13 +7889,37 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "answered_slope",
+        .function = (void (*)(void))mstmm_sweep_generic2_answered_slope,
+        .call = mstmm_sweep_generic2_answered_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic2_answered_slope_inputs,
+        .outputs = mstmm_sweep_generic2_answered_slope_outputs,
+        .ir_hash = "21fb2a8d27fa9c13c7612fb0d15a2cf2b6344abc78cffb5e3d927027fff4283c",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "pull_slope",
+        .function = (void (*)(void))mstmm_sweep_generic2_pull_slope,
+        .call = mstmm_sweep_generic2_pull_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic2_pull_slope_inputs,
+        .outputs = mstmm_sweep_generic2_pull_slope_outputs,
+        .ir_hash = "8008683b6fec47e359c459b126751205dcfbca72876b8d0e5754ebbe423df5b6",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "97651d7cb13b19be203df9137f7f263cda55ea4ee8e7c8a3bfbc2426330abb9c",
+    .hash = "1ac0fee33f3b9cb84c9a9002d5200398191141eb72440b1cb3b9a727afc3cdc4",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -7820,6 +7929,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 28,
+    .n_kernels = 30,
     .kernels = mstmm_sweep_generic2_kernels,
 };

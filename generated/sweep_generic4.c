@@ -97,6 +97,10 @@ int mstmm_sweep_generic4_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic4_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
+int mstmm_sweep_generic4_answered_slope(const real *restrict y, const real *restrict z,
+    const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
+int mstmm_sweep_generic4_pull_slope(const real *restrict y, const real *restrict x,
+    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
@@ -12155,6 +12159,103 @@ static const mstmm_port mstmm_sweep_generic4_complement_slope_outputs[] = {
     {"d_W", 36, "", 0, 0},
 };
 
+/* answered and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[4] tau - H^T e
+ * in  z[4] of the row
+ * in  d_y[4] derivative of y
+ * in  d_z[4] derivative of z
+ * out d_l[1] derivative of l, added to what is there
+ */
+int mstmm_sweep_generic4_answered_slope(const real *restrict y, const real *restrict z,
+    const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
+{
+    const real t0 = z[3] * d_y[3];
+    const real t1 = y[3] * d_z[3];
+    const real t2 = t0 + t1;
+    const real t3 = z[2] * d_y[2];
+    const real t4 = y[2] * d_z[2];
+    const real t5 = t3 + t4;
+    const real t6 = z[1] * d_y[1];
+    const real t7 = y[1] * d_z[1];
+    const real t8 = t6 + t7;
+    const real t9 = z[0] * d_y[0];
+    const real t10 = y[0] * d_z[0];
+    const real t11 = t9 + t10;
+    const real t12 = t8 + t11;
+    const real t13 = t5 + t12;
+    const real t14 = t2 + t13;
+    const real t15 = -t14;
+    d_l[0] += t15;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_answered_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_answered_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_answered_slope_inputs[] = {
+    {"y", 4, "", 0, 0},
+    {"z", 4, "", 0, 0},
+    {"d_y", 4, "", 0, 0},
+    {"d_z", 4, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_answered_slope_outputs[] = {
+    {"d_l", 1, "", 1, 0},
+};
+
+/* pull and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[4] of the row
+ * in  x[1] (N, N*m) multiplier
+ * in  d_y[4] derivative of y
+ * in  d_x[1] (N, N*m) derivative of x
+ * out d_y_0[4] derivative of y_0, added to what is there
+ */
+int mstmm_sweep_generic4_pull_slope(const real *restrict y, const real *restrict x,
+    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
+{
+    const real t0 = x[0] * d_y[0];
+    const real t1 = y[0] * d_x[0];
+    const real t2 = t0 + t1;
+    d_y_0[0] += t2;
+    const real t3 = y[1] * d_x[0];
+    const real t4 = x[0] * d_y[1];
+    const real t5 = t3 + t4;
+    d_y_0[1] += t5;
+    const real t6 = y[2] * d_x[0];
+    const real t7 = x[0] * d_y[2];
+    const real t8 = t6 + t7;
+    d_y_0[2] += t8;
+    const real t9 = y[3] * d_x[0];
+    const real t10 = x[0] * d_y[3];
+    const real t11 = t9 + t10;
+    d_y_0[3] += t11;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_pull_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_pull_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_pull_slope_inputs[] = {
+    {"y", 4, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+    {"d_y", 4, "", 0, 0},
+    {"d_x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_pull_slope_outputs[] = {
+    {"d_y_0", 4, "", 1, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
     {
         .name = "forward",
@@ -12492,13 +12593,37 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "answered_slope",
+        .function = (void (*)(void))mstmm_sweep_generic4_answered_slope,
+        .call = mstmm_sweep_generic4_answered_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic4_answered_slope_inputs,
+        .outputs = mstmm_sweep_generic4_answered_slope_outputs,
+        .ir_hash = "110f1881d89e20589e6ed601a491a49ec2d725fcf6fa404b146f9f7b3a7cbda2",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "pull_slope",
+        .function = (void (*)(void))mstmm_sweep_generic4_pull_slope,
+        .call = mstmm_sweep_generic4_pull_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic4_pull_slope_inputs,
+        .outputs = mstmm_sweep_generic4_pull_slope_outputs,
+        .ir_hash = "f8dc6f4853765310cfab1e13386498da7210606a24e2c0473dea591bc9b1da82",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "9734c7bf2cc83eae29ac43dc1df3790b64e3f12e99db4e0d0d907a2d6866f3bf",
+    .hash = "e8472057245a39d979ed37810f66620e261d53672e5d99b71fe68ed839e15386",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -12508,6 +12633,6 @@ const mstmm_element mstmm_sweep_generic4 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 28,
+    .n_kernels = 30,
     .kernels = mstmm_sweep_generic4_kernels,
 };

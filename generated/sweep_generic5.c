@@ -97,6 +97,10 @@ int mstmm_sweep_generic5_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic5_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
+int mstmm_sweep_generic5_answered_slope(const real *restrict y, const real *restrict z,
+    const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
+int mstmm_sweep_generic5_pull_slope(const real *restrict y, const real *restrict x,
+    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
@@ -14948,6 +14952,111 @@ static const mstmm_port mstmm_sweep_generic5_complement_slope_outputs[] = {
     {"d_W", 36, "", 0, 0},
 };
 
+/* answered and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[5] tau - H^T e
+ * in  z[5] of the row
+ * in  d_y[5] derivative of y
+ * in  d_z[5] derivative of z
+ * out d_l[1] derivative of l, added to what is there
+ */
+int mstmm_sweep_generic5_answered_slope(const real *restrict y, const real *restrict z,
+    const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
+{
+    const real t0 = z[4] * d_y[4];
+    const real t1 = y[4] * d_z[4];
+    const real t2 = t0 + t1;
+    const real t3 = z[3] * d_y[3];
+    const real t4 = y[3] * d_z[3];
+    const real t5 = t3 + t4;
+    const real t6 = z[2] * d_y[2];
+    const real t7 = y[2] * d_z[2];
+    const real t8 = t6 + t7;
+    const real t9 = z[1] * d_y[1];
+    const real t10 = y[1] * d_z[1];
+    const real t11 = t9 + t10;
+    const real t12 = z[0] * d_y[0];
+    const real t13 = y[0] * d_z[0];
+    const real t14 = t12 + t13;
+    const real t15 = t11 + t14;
+    const real t16 = t8 + t15;
+    const real t17 = t5 + t16;
+    const real t18 = t2 + t17;
+    const real t19 = -t18;
+    d_l[0] += t19;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_answered_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_answered_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_answered_slope_inputs[] = {
+    {"y", 5, "", 0, 0},
+    {"z", 5, "", 0, 0},
+    {"d_y", 5, "", 0, 0},
+    {"d_z", 5, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_answered_slope_outputs[] = {
+    {"d_l", 1, "", 1, 0},
+};
+
+/* pull and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[5] of the row
+ * in  x[1] (N, N*m) multiplier
+ * in  d_y[5] derivative of y
+ * in  d_x[1] (N, N*m) derivative of x
+ * out d_y_0[5] derivative of y_0, added to what is there
+ */
+int mstmm_sweep_generic5_pull_slope(const real *restrict y, const real *restrict x,
+    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
+{
+    const real t0 = x[0] * d_y[0];
+    const real t1 = y[0] * d_x[0];
+    const real t2 = t0 + t1;
+    d_y_0[0] += t2;
+    const real t3 = y[1] * d_x[0];
+    const real t4 = x[0] * d_y[1];
+    const real t5 = t3 + t4;
+    d_y_0[1] += t5;
+    const real t6 = y[2] * d_x[0];
+    const real t7 = x[0] * d_y[2];
+    const real t8 = t6 + t7;
+    d_y_0[2] += t8;
+    const real t9 = y[3] * d_x[0];
+    const real t10 = x[0] * d_y[3];
+    const real t11 = t9 + t10;
+    d_y_0[3] += t11;
+    const real t12 = y[4] * d_x[0];
+    const real t13 = x[0] * d_y[4];
+    const real t14 = t12 + t13;
+    d_y_0[4] += t14;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_pull_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_pull_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_pull_slope_inputs[] = {
+    {"y", 5, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+    {"d_y", 5, "", 0, 0},
+    {"d_x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_pull_slope_outputs[] = {
+    {"d_y_0", 5, "", 1, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
     {
         .name = "forward",
@@ -15285,13 +15394,37 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "answered_slope",
+        .function = (void (*)(void))mstmm_sweep_generic5_answered_slope,
+        .call = mstmm_sweep_generic5_answered_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic5_answered_slope_inputs,
+        .outputs = mstmm_sweep_generic5_answered_slope_outputs,
+        .ir_hash = "231dba3430d6f5306b27581fb0b75f9d1ad41e1b35f3c100d79ca09a7138c5f0",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "pull_slope",
+        .function = (void (*)(void))mstmm_sweep_generic5_pull_slope,
+        .call = mstmm_sweep_generic5_pull_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic5_pull_slope_inputs,
+        .outputs = mstmm_sweep_generic5_pull_slope_outputs,
+        .ir_hash = "b1c437f27f3f1a27657e7bb8df313f26e047b28314b4d8c93bbee7805e582f9f",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic5 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic5",
-    .hash = "0b1a3ab0a8dd735fcc4d1bf68e51f6fa90bec75ac89d1f39ba15f5fd928c922b",
+    .hash = "a5ed8b346ed0faefab116021107d95032adab6d74c3e5a7e8e683d8200f1e00e",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -15301,6 +15434,6 @@ const mstmm_element mstmm_sweep_generic5 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 28,
+    .n_kernels = 30,
     .kernels = mstmm_sweep_generic5_kernels,
 };

@@ -97,6 +97,10 @@ int mstmm_sweep_generic6_effort_slope(const real *restrict H, const real *restri
     const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
 int mstmm_sweep_generic6_complement_slope(const real *restrict H, const real *restrict d_H,
     real *restrict d_W);
+int mstmm_sweep_generic6_answered_slope(const real *restrict y, const real *restrict z,
+    const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
+int mstmm_sweep_generic6_pull_slope(const real *restrict y, const real *restrict x,
+    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
@@ -16866,6 +16870,119 @@ static const mstmm_port mstmm_sweep_generic6_complement_slope_outputs[] = {
     {"d_W", 36, "", 0, 0},
 };
 
+/* answered and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[6] tau - H^T e
+ * in  z[6] of the row
+ * in  d_y[6] derivative of y
+ * in  d_z[6] derivative of z
+ * out d_l[1] derivative of l, added to what is there
+ */
+int mstmm_sweep_generic6_answered_slope(const real *restrict y, const real *restrict z,
+    const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
+{
+    const real t0 = z[5] * d_y[5];
+    const real t1 = y[5] * d_z[5];
+    const real t2 = t0 + t1;
+    const real t3 = z[4] * d_y[4];
+    const real t4 = y[4] * d_z[4];
+    const real t5 = t3 + t4;
+    const real t6 = z[3] * d_y[3];
+    const real t7 = y[3] * d_z[3];
+    const real t8 = t6 + t7;
+    const real t9 = z[2] * d_y[2];
+    const real t10 = y[2] * d_z[2];
+    const real t11 = t9 + t10;
+    const real t12 = z[1] * d_y[1];
+    const real t13 = y[1] * d_z[1];
+    const real t14 = t12 + t13;
+    const real t15 = z[0] * d_y[0];
+    const real t16 = y[0] * d_z[0];
+    const real t17 = t15 + t16;
+    const real t18 = t14 + t17;
+    const real t19 = t11 + t18;
+    const real t20 = t8 + t19;
+    const real t21 = t5 + t20;
+    const real t22 = t2 + t21;
+    const real t23 = -t22;
+    d_l[0] += t23;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_answered_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_answered_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_answered_slope_inputs[] = {
+    {"y", 6, "", 0, 0},
+    {"z", 6, "", 0, 0},
+    {"d_y", 6, "", 0, 0},
+    {"d_z", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_answered_slope_outputs[] = {
+    {"d_l", 1, "", 1, 0},
+};
+
+/* pull and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  y[6] of the row
+ * in  x[1] (N, N*m) multiplier
+ * in  d_y[6] derivative of y
+ * in  d_x[1] (N, N*m) derivative of x
+ * out d_y_0[6] derivative of y_0, added to what is there
+ */
+int mstmm_sweep_generic6_pull_slope(const real *restrict y, const real *restrict x,
+    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
+{
+    const real t0 = x[0] * d_y[0];
+    const real t1 = y[0] * d_x[0];
+    const real t2 = t0 + t1;
+    d_y_0[0] += t2;
+    const real t3 = y[1] * d_x[0];
+    const real t4 = x[0] * d_y[1];
+    const real t5 = t3 + t4;
+    d_y_0[1] += t5;
+    const real t6 = y[2] * d_x[0];
+    const real t7 = x[0] * d_y[2];
+    const real t8 = t6 + t7;
+    d_y_0[2] += t8;
+    const real t9 = y[3] * d_x[0];
+    const real t10 = x[0] * d_y[3];
+    const real t11 = t9 + t10;
+    d_y_0[3] += t11;
+    const real t12 = y[4] * d_x[0];
+    const real t13 = x[0] * d_y[4];
+    const real t14 = t12 + t13;
+    d_y_0[4] += t14;
+    const real t15 = y[5] * d_x[0];
+    const real t16 = x[0] * d_y[5];
+    const real t17 = t15 + t16;
+    d_y_0[5] += t17;
+    return 0;
+}
+
+static int mstmm_sweep_generic6_pull_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic6_pull_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic6_pull_slope_inputs[] = {
+    {"y", 6, "", 0, 0},
+    {"x", 1, "N, N*m", 0, 0},
+    {"d_y", 6, "", 0, 0},
+    {"d_x", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic6_pull_slope_outputs[] = {
+    {"d_y_0", 6, "", 1, 0},
+};
+
 static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
     {
         .name = "forward",
@@ -17203,13 +17320,37 @@ static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "answered_slope",
+        .function = (void (*)(void))mstmm_sweep_generic6_answered_slope,
+        .call = mstmm_sweep_generic6_answered_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic6_answered_slope_inputs,
+        .outputs = mstmm_sweep_generic6_answered_slope_outputs,
+        .ir_hash = "b3d1558502185ae27387728837d5c8a07d37fc301fcf65fce21c3b99507220c5",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "pull_slope",
+        .function = (void (*)(void))mstmm_sweep_generic6_pull_slope,
+        .call = mstmm_sweep_generic6_pull_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic6_pull_slope_inputs,
+        .outputs = mstmm_sweep_generic6_pull_slope_outputs,
+        .ir_hash = "6f4802012577aa6b50db05bc066b6158f0a0f58244120bd8f5da589bd5e5736e",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_sweep_generic6 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic6",
-    .hash = "03915b8ef1a4ef427d8d7c75406c55a7983c1c78cb677e5c39f7fec414015ed9",
+    .hash = "8bc7a8edf81bf7812fd433821724a11a11d756ecddacb7b9417326d3e9bb2001",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -17219,6 +17360,6 @@ const mstmm_element mstmm_sweep_generic6 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 28,
+    .n_kernels = 30,
     .kernels = mstmm_sweep_generic6_kernels,
 };

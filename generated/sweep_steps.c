@@ -179,6 +179,26 @@ mstmm_generic_complement_slope_kernel *const mstmm_generic_complement_slope_tabl
     mstmm_sweep_generic6_complement_slope,
 };
 
+mstmm_generic_answered_slope_kernel *const mstmm_generic_answered_slope_table[] = {
+    NULL,
+    mstmm_sweep_generic1_answered_slope,
+    mstmm_sweep_generic2_answered_slope,
+    mstmm_sweep_generic3_answered_slope,
+    mstmm_sweep_generic4_answered_slope,
+    mstmm_sweep_generic5_answered_slope,
+    mstmm_sweep_generic6_answered_slope,
+};
+
+mstmm_generic_pull_slope_kernel *const mstmm_generic_pull_slope_table[] = {
+    NULL,
+    mstmm_sweep_generic1_pull_slope,
+    mstmm_sweep_generic2_pull_slope,
+    mstmm_sweep_generic3_pull_slope,
+    mstmm_sweep_generic4_pull_slope,
+    mstmm_sweep_generic5_pull_slope,
+    mstmm_sweep_generic6_pull_slope,
+};
+
 mstmm_generic_tangent_carrier_kernel *const mstmm_generic_tangent_carrier_table[] = {
     mstmm_sweep_generic0_tangent_carrier,
     mstmm_sweep_generic1_tangent_carrier,
@@ -1556,6 +1576,32 @@ static int mstmm_at_couplings_answered(mstmm_state *state, int index)
     return 0;
 }
 
+/* Rows of couplings at the accelerations that are given, and the efforts of their multipliers. */
+static int mstmm_at_couplings_loaded(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    real *loops = state->workspace + state->model->loops;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    for (int c = 0; c < looped->n_pending; c++) {
+        const mstmm_pending *pending = &looped->pending[c];
+        if ((pending->tau >= 0)) {
+            mstmm_generic_pull(nu,
+                .y = loops + pending->tau,
+                .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
+                .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
+        }
+        if ((pending->tau >= 0)) {
+            mstmm_generic_answered(nu,
+                .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + pending->tau,
+                .l = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_KNOWN);
+        }
+    }
+    return 0;
+}
+
 /* Rows of a hinge that closes a loop, and all the load that it puts on its bodies. */
 static int mstmm_at_closures_loaded(mstmm_state *state, int index)
 {
@@ -1625,6 +1671,12 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
         .Rc = block + MSTMM_BLOCK_R, .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = drift,
         .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
         .l = closed + MSTMM_CLOSURE_L);
+    for (int c = 0; c < looped->n_own; c++) {
+        const mstmm_own *own = &looped->own[c];
+        mstmm_generic_pull(nu,
+            .y = loops + own->tau, .x = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_X,
+            .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
+    }
     for (int k = 0; k < body->nu; k++) {
         mstmm_loops_act(
             .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
@@ -1644,6 +1696,15 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
             .K = closed + MSTMM_CLOSURE_J_B + 6 * c,
             .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
             .e = outboard + MSTMM_BLOCK_E);
+    }
+    for (int c = 0; c < looped->n_own; c++) {
+        const mstmm_own *own = &looped->own[c];
+        mstmm_generic_answered(nu,
+            .y = closed + MSTMM_CLOSURE_L, .z = loops + own->tau,
+            .l = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
+        mstmm_generic_answered(nu,
+            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + own->tau,
+            .l = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
     }
     return 0;
 }
@@ -2132,6 +2193,38 @@ static int mstmm_at_laws_slope(mstmm_state *state, int index)
     return 0;
 }
 
+/* Derivatives: rows of couplings at the accelerations that are given, and the efforts of their multipliers. */
+static int mstmm_at_couplings_loaded_slope(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    real *loops = state->workspace + state->model->loops;
+    real *d_block = state->slope->workspace + body->block;
+    real *d_loops = state->slope->workspace + state->model->loops;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    for (int c = 0; c < looped->n_pending; c++) {
+        const mstmm_pending *pending = &looped->pending[c];
+        if ((pending->tau >= 0)) {
+            mstmm_generic_pull_slope(nu,
+                .y = loops + pending->tau,
+                .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
+                .d_y = d_loops + pending->tau,
+                .d_x = d_loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
+                .d_y_0 = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU));
+        }
+        if ((pending->tau >= 0)) {
+            mstmm_generic_answered_slope(nu,
+                .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + pending->tau,
+                .d_y = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S),
+                .d_z = d_loops + pending->tau,
+                .d_l = d_loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_KNOWN);
+        }
+    }
+    return 0;
+}
+
 /* Derivatives: axes, position and velocity of P of a body, inertial axes. */
 static int mstmm_at_poses_slope(mstmm_state *state, int index)
 {
@@ -2434,6 +2527,14 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
         .d_Rc = d_block + MSTMM_BLOCK_R, .d_r_A = d_closed + MSTMM_CLOSURE_LEVER,
         .d_relative = d_drift, .d_J_A = d_closed + MSTMM_CLOSURE_J_A,
         .d_J_B = d_closed + MSTMM_CLOSURE_J_B, .d_l = d_closed + MSTMM_CLOSURE_L);
+    for (int c = 0; c < looped->n_own; c++) {
+        const mstmm_own *own = &looped->own[c];
+        mstmm_generic_pull_slope(nu,
+            .y = loops + own->tau, .x = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_X,
+            .d_y = d_loops + own->tau,
+            .d_x = d_loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_X,
+            .d_y_0 = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU));
+    }
     for (int k = 0; k < body->nu; k++) {
         mstmm_loops_act_slope(
             .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
@@ -2462,6 +2563,17 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
             .d_K = d_closed + MSTMM_CLOSURE_J_B + 6 * c,
             .d_x = d_loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
             .d_e = d_outboard + MSTMM_BLOCK_E);
+    }
+    for (int c = 0; c < looped->n_own; c++) {
+        const mstmm_own *own = &looped->own[c];
+        mstmm_generic_answered_slope(nu,
+            .y = closed + MSTMM_CLOSURE_L, .z = loops + own->tau,
+            .d_y = d_closed + MSTMM_CLOSURE_L, .d_z = d_loops + own->tau,
+            .d_l = d_loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
+        mstmm_generic_answered_slope(nu,
+            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + own->tau,
+            .d_y = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S), .d_z = d_loops + own->tau,
+            .d_l = d_loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
     }
     return 0;
 }
@@ -2685,6 +2797,45 @@ static int mstmm_at_forces_across(mstmm_state *state, int index)
         .A = from + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_f, .F = F_back,
         .M = M_back, .d_A = d_from + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = d_F_back,
         .d_M = d_M_back, .d_e = d_from + MSTMM_BLOCK_E);
+    return 0;
+}
+
+/* Derivatives: laws on hinge coordinates, added to the efforts. */
+static int mstmm_at_laws_across(mstmm_state *state, int index)
+{
+    real effort[6];
+    real tau[1];
+    real V[1];
+    real P[1];
+    real d_effort[6];
+    real d_tau[6];
+    const mstmm_law *law = &state->model->laws[index];
+    const mstmm_body *body = &state->model->bodies[law->body];
+    real *d_block = state->slope->workspace + body->block;
+    if (!state->model->looped[law->body].closure) return 0;
+    for (int j = 0; j < law->n; j++)
+        effort[j] = mstmm_value_at(state, law->effort[j]);
+    for (int j = 0; j < law->n; j++)
+        d_effort[j] = mstmm_value_at(state->slope, law->effort[j]);
+    if (law->kind == 0) {
+        mstmm_law_coordinate(law->evaluate,
+            .p = law->p, .q = state->q + body->q + law->coordinate,
+            .u = state->u + body->u + law->speed, .effort = effort, .tau = tau, .V = V, .P = P);
+        mstmm_law_coordinate_slope(law->evaluate_slope,
+            .p = law->p, .q = state->q + body->q + law->coordinate,
+            .u = state->u + body->u + law->speed, .effort = effort,
+            .d_q = state->slope->q + body->q + law->coordinate,
+            .d_u = state->slope->u + body->u + law->speed, .d_effort = d_effort, .d_tau = d_tau);
+    } else {
+        mstmm_law_quaternion_slope(law->evaluate_slope,
+            .p = law->p, .q = state->q + body->q + law->coordinate,
+            .u = state->u + body->u + law->speed, .B = law->axes, .effort = effort,
+            .twist_ref = state->memory + law->twist,
+            .d_q = state->slope->q + body->q + law->coordinate,
+            .d_u = state->slope->u + body->u + law->speed, .d_effort = d_effort, .d_tau = d_tau);
+    }
+    for (int j = 0; j < law->n; j++)
+        (d_block + MSTMM_BLOCK_FIXED + MSTMM_SPEED_TAU * body->nu + law->speed)[j] += d_tau[j];
     return 0;
 }
 
@@ -5153,6 +5304,16 @@ static int mstmm_pass_couplings_answered(mstmm_state *state)
     return 0;
 }
 
+static int mstmm_pass_couplings_loaded(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_couplings_loaded(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 MSTMM_AT_ONCE void mstmm_fetch_closures_loaded(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -5331,6 +5492,16 @@ static int mstmm_pass_laws_slope(mstmm_state *state)
     return 0;
 }
 
+static int mstmm_pass_couplings_loaded_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_couplings_loaded_slope(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 MSTMM_AT_ONCE void mstmm_fetch_poses_slope(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -5479,6 +5650,16 @@ static int mstmm_pass_forces_across(mstmm_state *state)
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_forces; i++) {
         const int code = mstmm_at_forces_across(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_laws_across(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_laws; i++) {
+        const int code = mstmm_at_laws_across(state, i);
         if (code) return code;
     }
     return 0;
@@ -5940,6 +6121,12 @@ static int mstmm_tiles_required_slope(mstmm_state *state)
         for (int i = law; i < behind; i++) {
             code = mstmm_at_laws_slope(state, i);
             if (code) return code;
+        }
+        if (model->n_couplings) {
+            for (int i = begun - 1; i >= least; i--) {
+                code = mstmm_at_couplings_loaded_slope(state, i);
+                if (code) return code;
+            }
         }
         if ((model->needs_pose || model->product) && model->n_flexible) {
             for (int i = begun - 1; i >= least; i--) {
@@ -6467,6 +6654,14 @@ int mstmm_run_inverse_dynamics(mstmm_state *state)
         code = mstmm_pass_forces(state);
         if (code) return code;
     }
+    if (model->n_couplings && state->residual) {
+        code = mstmm_hook_couplings_valued(state);
+        if (code) return code;
+    }
+    if (model->n_couplings && state->residual) {
+        code = mstmm_pass_couplings_loaded(state);
+        if (code) return code;
+    }
     if (model->looped && state->residual) {
         code = mstmm_pass_closures_loaded(state);
         if (code) return code;
@@ -6635,11 +6830,19 @@ int mstmm_run_required_slope(mstmm_state *state)
         code = mstmm_chain_required_slope(state);
         if (code) return code;
     }
-    if ((model->needs_pose || model->product) || model->looped) {
+    if (model->n_couplings || (model->needs_pose || model->product) || model->looped) {
         code = mstmm_pass_efforts_slope(state);
         if (code) return code;
         code = mstmm_pass_laws_slope(state);
         if (code) return code;
+        if (model->n_couplings) {
+            code = mstmm_hook_coupling_slopes(state);
+            if (code) return code;
+        }
+        if (model->n_couplings) {
+            code = mstmm_pass_couplings_loaded_slope(state);
+            if (code) return code;
+        }
         if ((model->needs_pose || model->product)) {
             code = mstmm_pass_poses_slope(state);
             if (code) return code;
@@ -6715,8 +6918,16 @@ int mstmm_run_applied_slope(mstmm_state *state)
         code = mstmm_pass_efforts_slope(state);
         if (code) return code;
     }
+    if (model->n_couplings) {
+        code = mstmm_hook_coupling_slopes(state);
+        if (code) return code;
+    }
+    if (model->n_couplings) {
+        code = mstmm_pass_couplings_loaded_slope(state);
+        if (code) return code;
+    }
     if (model->looped) {
-        code = mstmm_pass_laws_slope(state);
+        code = mstmm_pass_laws_across(state);
         if (code) return code;
     }
     if (model->looped) {

@@ -30,6 +30,8 @@ int mstmm_run_laws_alone(mstmm_state *state);
 int mstmm_run_laws_solution(mstmm_state *state);
 
 /* Pieces of the engine's own. */
+int mstmm_hook_coupling_slopes(mstmm_state *state);
+int mstmm_hook_couplings_valued(mstmm_state *state);
 int mstmm_hook_drive_slopes(mstmm_state *state);
 int mstmm_hook_drive_values(mstmm_state *state);
 int mstmm_hook_expression_slopes(mstmm_state *state);

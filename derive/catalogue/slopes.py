@@ -42,6 +42,8 @@ _MOVING: dict[str, dict[str, tuple[str, str]]] = {
         "forward": ("R d H v w c s motion_I", ""),
         "effort": ("H f", ""),
         "complement": ("H", ""),
+        "answered": ("y z", ""),
+        "pull": ("y x", ""),
     },
     "frames": {
         "pose": ("A_I x_I Rc r", ""),

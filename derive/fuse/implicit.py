@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.graph import Graph, Node
+from mstmm.ir.inline import Nodes
 from mstmm.ir.structure import Structure
 from mstmm.ir.tangent import derivatives
 from mstmm.ir.unrolled import lu_from_the_last, solve_by_rows, solve_from_the_last
@@ -16,7 +17,6 @@ from mstmm.ir.unrolled import lu_from_the_last, solve_by_rows, solve_from_the_la
 from ..schedule.motion import FORWARD, PRESCRIBED
 from ..schedule.steps import Run, Sweep
 from ..schedule.sweeps import INVERSE_DYNAMICS
-from .inline import Nodes
 from .passes.balance import balance
 from .replay import Replay
 from .scene import Fused, inputs_of

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .inline import Nodes
+from mstmm.ir.inline import Nodes
 
 #: Axes of which the sweep has screws; a turn about y is carried as any other.
 _AXES = ("x", "", "z")

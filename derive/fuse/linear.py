@@ -10,13 +10,13 @@ from collections.abc import Sequence
 
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.graph import Node
+from mstmm.ir.inline import Nodes
 from mstmm.ir.structure import Structure
 from mstmm.ir.tangent import derivative, derivatives
 from mstmm.ir.unrolled import solve_symmetric
 
 from ..schedule.sweeps import INVERSE_DYNAMICS
 from .implicit import RATES
-from .inline import Nodes
 from .passes.balance import balance
 from .replay import Replay
 from .scene import Fused, fuse, inputs_of

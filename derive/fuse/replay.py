@@ -10,6 +10,7 @@ from mstmm.border.failures import Failed
 from mstmm.errors import ElementError
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.graph import Node
+from mstmm.ir.inline import Nodes
 from mstmm.ir.structure import BodyStructure, ExpressionStructure, Key
 
 from ..schedule.motion import POSES
@@ -34,7 +35,6 @@ from ..schedule.steps import (
     Sweep,
 )
 from ..schedule.words import SLOTS
-from .inline import Nodes
 from .known import along_a_screw, screw_axis, unit_row
 from .rows import RowSlots, closure_at, row_subject
 from .slots import GROUND, Subject

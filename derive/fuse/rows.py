@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator
 from dataclasses import replace
 
+from mstmm.ir.inline import Nodes
 from mstmm.ir.structure import ClosureStructure, RowStructure, Structure
 
-from .inline import Nodes
 from .slots import Slots, Subject
 
 #: Whose entry of L a slot is: fields of the subject.

@@ -6,6 +6,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
 from mstmm.ir.graph import Node
+from mstmm.ir.inline import Nodes
 from mstmm.ir.structure import (
     BodyStructure,
     Entries,
@@ -17,7 +18,6 @@ from mstmm.ir.structure import (
 )
 
 from ..schedule.words import ROLES
-from .inline import Nodes
 from .state import FusionState
 
 #: The ground, a body without a number.

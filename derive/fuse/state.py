@@ -6,9 +6,8 @@ from collections.abc import Callable, Sequence
 
 from mstmm.ir import KernelIR
 from mstmm.ir.graph import Graph, Node
+from mstmm.ir.inline import Inliner, Nodes
 from mstmm.ir.structure import Entries, ExpressionStructure, Key, Structure
-
-from .inline import Inliner, Nodes
 
 #: (element, kernel name) -> its IR.
 Kernels = Callable[[Key, str], KernelIR]

@@ -77,7 +77,8 @@ MOST_SPEEDS = 6
 GENERIC = (
     "forward", "condense", "recover", "effort", "project", "factor", "push", "answer",
     "qr_eliminate", "complement", "divide", "couple", "answered", "pull",
-    "forward_slope", "effort_slope", "complement_slope", "tangent_carrier", "tangent_column",
+    "forward_slope", "effort_slope", "complement_slope", "answered_slope", "pull_slope",
+    "tangent_carrier", "tangent_column",
     "tangent_along", "tangent_steady", "tangent_turning", "tangent_rows", "tangent_reduce",
     "tangent_push", "tangent_answer", "tangent_push_known", "tangent_answer_known",
 )  # fmt: skip

@@ -23,6 +23,7 @@ _TRAITS = {
     "looped": "model->looped", "cut": "looped->closure",
     "aside": "mstmm_aside(state->model, state->observed, index)", "corrected": "state->level",
     "residual": "state->residual",
+    "shut": "state->model->looped[law->body].closure",
     "hinged": "closure->kind == MSTMM_HINGE",
     "distance": "closure->kind == MSTMM_DISTANCE", "plane": "closure->kind == MSTMM_PLANE",
     "rolling": "closure->kind == MSTMM_ROLLING",

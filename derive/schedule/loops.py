@@ -7,6 +7,9 @@ scene stage by stage, as the load does there.  See derive/equations/loops.py.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from .couplings import OF_OWN, OWN_TOLD, TOLD, efforts_of, efforts_of_own
 from .flexible import ABSORBED, DISPLACED, MODAL_CONDENSE
 from .motion import HINGE_MOTION
 from .riccati import (
@@ -84,31 +87,6 @@ _EFFORTS = EachSpeed(
     ),
 )
 
-#: Rows of couplings that name the hinge's own speeds: they begin on both sides of it.
-_OF_OWN = Each(
-    of="own",
-    when="!staged",
-    steps=(
-        EachSpeed(
-            steps=(
-                call("loops.act", J="closure.J_A[6 * k]", tau="own.tau[k]", e="own.inner"),
-                call("loops.act", J="closure.J_B[6 * k]", tau="own.tau[k]", e="own.outer"),
-            ),
-        ),
-        call("generic{nu}.answered", y="closure.l", z="own.tau", l="own.known"),
-        call("generic{nu}.answered", y="body.s", z="own.tau", l="own.known"),
-    ),
-)  # fmt: skip
-
-
-def _efforts_of_own(x: str, when: str) -> Each:
-    """Efforts of couplings on own speeds, by their multipliers."""
-    return Each(
-        of="own", when=when,
-        steps=(call("generic{nu}.pull", y="own.tau", x=x, y_0="body.tau"),),
-    )  # fmt: skip
-
-
 CLOSURES = Pass(
     "closures", "body", "Rows of what closes a loop, and the load of a hinge's laws.",
     (
@@ -116,7 +94,7 @@ CLOSURES = Pass(
         *_CONSTRAINED,
         _rows("closure.gap", "gaping"),
         _rows("closure.slip", "slipping"),
-        _efforts_of_own("own.told", "!staged refined"),
+        efforts_of_own("own.told", "!staged refined"),
         *only("!corrected", _DRIFT, *_BENT, *_DRIVEN),
         _EFFORTS,
         Each(
@@ -136,7 +114,7 @@ CLOSURES = Pass(
                 ),
             ),
         ),
-        _OF_OWN,
+        OF_OWN,
     ),
     skip="!cut",
 )  # fmt: skip
@@ -151,6 +129,7 @@ CLOSURES_LOADED = Pass(
         _DRIFT,
         *_BENT,
         *_DRIVEN,
+        efforts_of_own("own.x", ""),
         _EFFORTS,
         Each(
             of="rows",
@@ -159,6 +138,7 @@ CLOSURES_LOADED = Pass(
                 call("loops.loaded", K="closure.J_B[6 * c]", x="line.x", e="outboard.e"),
             ),
         ),
+        OWN_TOLD,
     ),
     skip="!cut",
 )  # fmt: skip
@@ -295,7 +275,7 @@ _ALONE = only(
                 Pick(to="local.tau", source="pending.tau"),
                 call("generic{free}.push", **BODY, **_ACROSS, e="pending.K", tau="local.tau",
                      y="pending.y", e_I="pending.onward"),
-                call("generic{nu}.answered", y="body.s", z="pending.tau", l="pending.known"),
+                replace(TOLD, when=""),
             ),
             *_COUPLED,
         ),
@@ -323,16 +303,6 @@ _BY_STAGES = only(
 )
 
 
-def _efforts_of_couplings(x: str, when: str) -> Each:
-    """Efforts of the couplings of a hinge, by their multipliers."""
-    return Each(
-        of="pending", when=when,
-        steps=(
-            call("generic{nu}.pull", when="coupled", y="pending.tau", x=x, y_0="body.tau"),
-        ),
-    )  # fmt: skip
-
-
 CARRIED = Pass(
     "carried", "body", "S, e and the columns of open rows carried across the hinge to the parent.",
     (
@@ -341,7 +311,7 @@ CARRIED = Pass(
         *only("outward", ABSORBED),
         Do(whole=HINGE_MOTION, when="own"),
         *FREE,
-        _efforts_of_couplings("pending.told", "!staged refined"),
+        efforts_of("pending.told", "!staged refined"),
         FREE_EFFORTS,
         *_ALONE,
         *_BY_STAGES,
@@ -367,7 +337,7 @@ ANSWERED = Pass(
         *only(
             "!staged",
             _pulled("pending.y", "hinge.g"),
-            _efforts_of_couplings("pending.x", "kept"),
+            efforts_of("pending.x", "kept"),
             call("generic{free}.answer", **BODY, **_ACROSS, F="hinge.F", y="hinge.g",
                  delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
         ),
@@ -399,7 +369,7 @@ CLOSURES_ANSWERED = Pass(
         Each(of="rows", when="refined", steps=(Add(to="line.x", source="line.told"),)),
         *only(
             "kept",
-            _efforts_of_own("own.x", "!staged"),
+            efforts_of_own("own.x", "!staged"),
             Copy(to="body.e"),
             Copy(to="body.delta", when="staged"),  # what has no mass asks for none
             EachSpeed(
@@ -412,18 +382,4 @@ CLOSURES_ANSWERED = Pass(
         ),
     ),
     skip="!cut",
-)  # fmt: skip
-
-COUPLINGS_ANSWERED = Pass(
-    "couplings_answered", "coupling",
-    "Multipliers of couplings, and the power that those feed in whose values go by time.",
-    (
-        Add(to="coupling.x", source="coupling.told", when="refined"),
-        *only(
-            "balance",
-            call("frames.speed_power", tau="coupling.x", u="coupling.still", P="local.P"),
-            Add(to="sums.power", source="local.P"),
-        ),
-    ),
-    skip="unmet",
 )  # fmt: skip

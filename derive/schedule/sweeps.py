@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from .couplings import COUPLINGS_ANSWERED, COUPLINGS_LOADED
 from .flexible import DRAG, MOMENTUM, SECTION_MOTION, STRAIN
 from .inverse import REQUIRED
 from .laws_alone import LAWS_ALONE, LAWS_SOLUTION, RATES_CHANGE
@@ -15,7 +16,6 @@ from .loops import (
     CLOSURES,
     CLOSURES_ANSWERED,
     CLOSURES_LOADED,
-    COUPLINGS_ANSWERED,
     RESTATED,
     ROW_CLOSED,
     ROW_FOUND,
@@ -99,6 +99,8 @@ INVERSE_DYNAMICS = Sweep(
         Run(whole=STRAIN, when="balance flexible"),
         Run(whole=POSES, when="posed"),
         *_APPLIED,
+        Run(hook="couplings_valued", when="couplings residual"),
+        Run(whole=COUPLINGS_LOADED, when="couplings residual"),
         Run(whole=CLOSURES_LOADED, when="looped residual"),
         Run(whole=REQUIRED),
     ),

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from . import placed
+from .couplings import COUPLINGS_LOADED
 from .flexible import DRAG, MODAL_OWN, SECTION_MOTION
 from .inverse import REQUIRED
 from .loads import EFFORTS, FORCES, LAWS, LOADS
@@ -77,6 +78,10 @@ _ACTING = (
     Run(whole=sloped(LOADS), when="posed"),
     Run(whole=sloped(FORCES), when="posed"),
 )
+_COUPLED = (
+    Run(hook="coupling_slopes", when="couplings"),
+    Run(whole=sloped(COUPLINGS_LOADED), when="couplings"),
+)
 _CLOSED = Run(whole=sloped(_without_hinges(CLOSURES_LOADED)), when="looped")
 DIRECTIONAL = Sweep(
     "required_slope", "Derivative of the efforts that given accelerations need.",
@@ -84,6 +89,7 @@ DIRECTIONAL = Sweep(
         *_MOVED_ALONG,
         Run(whole=sloped(EFFORTS)),
         Run(whole=sloped(LAWS)),
+        *_COUPLED,
         _POSED,
         *_ACTING,
         _CLOSED,
@@ -111,7 +117,9 @@ APPLIED_SLOPE = Sweep(
         _across(LOADS, "own_load"),
         _across(FORCES, "own_force"),
         Run(whole=sloped(EFFORTS), when="looped"),
-        Run(whole=sloped(LAWS), when="looped"),
+        *_COUPLED,
+        # In the tree the elimination sees them.
+        Run(whole=replace(sloped(LAWS), name="laws_across", skip="!shut"), when="looped"),
         _CLOSED,
     ),
 )  # fmt: skip

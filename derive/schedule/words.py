@@ -356,6 +356,7 @@ TRAITS: dict[str, str] = {
     "united": "a load is one in a right-hand side",
     "looped": "loops are closed",
     "cut": "the hinge closes a loop",
+    "shut": "the hinge that a law acts on closes a loop",
     "hinged": "its own speeds and what it holds part six directions",
     "distance": "a constraint keeps a distance",
     "plane": "a constraint holds a point on a plane",

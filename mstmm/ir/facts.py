@@ -49,6 +49,8 @@ class HingeFacts:
         varies: per speed, six letters for the rows v, w of H: "0" zero and "1" one in every
             position, "p" a number of the parameters alone, "q" any other.
         start_motion: kernel p -> H (6 nu) at the start values of the coordinates.
+        rates: kernel p, q, u -> rates of the coordinates; None where these are the speeds, and of a
+            definition that was generated before there was one.
     """
 
     name: str
@@ -64,6 +66,7 @@ class HingeFacts:
     in_place: bool
     varies: tuple[str, ...]
     start_motion: KernelIR
+    rates: KernelIR | None = None
 
     @property
     def start(self) -> tuple[float, ...]:
@@ -166,6 +169,7 @@ def facts_of(
     return HingeFacts(
         name, allows, coordinates, speeds, parameters, frame, keys, name, quaternion, straight,
         _in_place(hinge, start, frame), varies, _at(hinge, start),
+        None if straight else _only(hinge, "qdot", "rates"),
     )  # fmt: skip
 
 
@@ -223,18 +227,29 @@ def _at(kernel: KernelIR, start: Sequence[float]) -> KernelIR:
             return Constant(str(int(value)))
         return operand
 
-    port = next(port for port in kernel.outputs if port.name == "H")
+    alone = _only(kernel, "H", "start_motion")
+    p = next(port for port in kernel.inputs if port.name == "p")
+    statements = tuple(
+        replace(one, args=tuple(map(fixed, one.args))) if isinstance(one, Assign)
+        else replace(one, value=fixed(one.value))
+        for one in alone.statements if isinstance(one, (Assign, Store))
+    )  # fmt: skip
+    return replace(alone, inputs=(p,), statements=statements)
+
+
+def _only(kernel: KernelIR, output: str, name: str) -> KernelIR:
+    """The part of a kernel that makes one of its outputs."""
+    port = next(port for port in kernel.outputs if port.name == output)
     kept: list[Assign | Store] = []
     needed: set[int] = set()
     for statement in reversed(kernel.statements):
-        if isinstance(statement, Store) and statement.port == "H":
-            kept.append(replace(statement, value=fixed(statement.value)))
+        if isinstance(statement, Store) and statement.port == output:
+            kept.append(statement)
             needed |= _numbers([statement.value])
         elif isinstance(statement, Assign) and statement.number in needed:
-            kept.append(replace(statement, args=tuple(map(fixed, statement.args))))
+            kept.append(statement)
             needed |= _numbers(statement.args)
-    p = next(port for port in kernel.inputs if port.name == "p")
-    return KernelIR("start_motion", (p,), (port,), tuple(reversed(kept)))
+    return KernelIR(name, kernel.inputs, (port,), tuple(reversed(kept)))
 
 
 def _numbers(operands: Sequence[Operand]) -> set[int]:
@@ -294,11 +309,12 @@ def facts_to_data(facts: HingeFacts) -> dict[str, Any]:
         key: [list(astuple(p)) for p in getattr(facts, key)]
         for key in ("coordinates", "speeds", "parameters")
     }
+    rates = {} if facts.rates is None else {"rates": json.loads(to_json(facts.rates))}
     return {
         "name": facts.name, "allows": facts.allows, **groups, "frame": facts.frame,
         "keys": list(facts.keys), "runs_as": facts.runs_as, "quaternion": facts.quaternion,
         "straight": facts.straight, "in_place": facts.in_place, "varies": list(facts.varies),
-        "start_motion": json.loads(to_json(facts.start_motion)),
+        "start_motion": json.loads(to_json(facts.start_motion)), **rates,
     }  # fmt: skip
 
 
@@ -313,6 +329,7 @@ def facts_from_data(data: dict[str, Any]) -> HingeFacts:
         **rest, **groups, keys=tuple(data["keys"]), straight=data["straight"],
         in_place=data["in_place"],
         varies=tuple(data["varies"]), start_motion=from_json(json.dumps(data["start_motion"])),
+        rates=from_json(json.dumps(data["rates"])) if "rates" in data else None,
     )  # fmt: skip
 
 

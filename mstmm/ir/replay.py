@@ -1,6 +1,6 @@
 """The one walk over the statements of a KernelIR that computes: what a number is, others say.
 
-`run` takes any arithmetic of plain numbers.  Nodes of a graph (`derive.fuse.inline`, `tangent`) and
+`run` takes any arithmetic of plain numbers.  Nodes of a graph (`inline`, `tangent`) and
 numpy arrays (`runtime.kernels.vectorized`) come as classes of their own: they differ in what an
 entry of an array is, and in what becomes of guards and of solves.
 """

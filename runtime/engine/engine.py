@@ -11,7 +11,6 @@ from mstmm.arrays import Array
 from mstmm.border.failures import Failed
 from mstmm.errors import NumericalFailure, UndeterminedMotion
 
-from ..pack.loops.refusal import refuse_couplings
 from .calls import Calls
 from .culprit import culprit
 
@@ -112,13 +111,15 @@ class Engine(Calls):
         squares and with closed loops there is no factor to keep, and each column is a sweep at rest
         with its efforts.
         Without `memory` nothing is released."""
-        refuse_couplings(self.packed, "the solution with columns of efforts")
         engine = self.inertia_alone
         memory = engine.start_memory() if memory is None else memory
-        if self.packed.qr or self.packed.system.closures:
+        if self.packed.qr or self.packed.system.closes:
+            # Couplings whose values go by time move without efforts, which the last column has not.
+            columns = np.vstack([columns, np.zeros(self.nu)])
             n, still = len(columns), np.zeros(columns.shape)
             many = np.tile(q, (n, 1)), still, np.tile(memory, (n, 1))
-            return engine.accelerations(0.0, *many, np.ascontiguousarray(columns))[1]
+            found = engine.accelerations(0.0, *many, columns)[1]
+            return np.asarray(found[:-1] - found[-1])
         answers = np.empty(columns.shape)
         failure = self.ffi.new("mstmm_failure *")
         code = self.lib.mstmm_solve(

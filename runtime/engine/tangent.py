@@ -9,15 +9,13 @@ equilibrium or a linear model asks for is R and its tangent, eliminated from the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
-
-from ..pack.loops.refusal import refuse_couplings
 
 if TYPE_CHECKING:
     from .engine import Engine
@@ -33,7 +31,6 @@ class Tangent:
     def __init__(self, engine: Engine, memory: Array | None = None) -> None:
         self.engine = engine
         packed, ffi = engine.packed, engine.ffi
-        refuse_couplings(packed, "the tangent of the equations")
         self.nq, self.nu = engine.nq, engine.nu
         self.state = np.zeros(self.nq), np.zeros(self.nu)
         slopes = packed.slopes()
@@ -171,23 +168,43 @@ def tangent_of(engine: Engine) -> Tangent:
 def _couplings(engine: Engine) -> tuple[list[Any], int]:
     """The record of what reaches across the tree with what keeps it, and how many numbers it is."""
     ffi, reach, rows = engine.ffi, engine.packed.written.reach, _rows_of_loops(engine)
-    record = ffi.new("mstmm_couplings *")
+    record, efforts = ffi.new("mstmm_couplings *"), list(_efforts(engine))
     kept = [record]
-    values, speeds = [v for v, _ in reach.efforts], [j for _, j in reach.efforts]
-    for name, numbers in (("bodies", reach.across), ("values", values), ("speeds", speeds)):
-        array = ffi.new("int[]", list(numbers) or [0])
+    for name, kind, numbers in (
+        ("bodies", "int[]", list(reach.across)), ("efforts", "int64_t[]", [e for e, _ in efforts]),
+        ("speeds", "int[]", [speed for _, speed in efforts]),
+    ):  # fmt: skip
+        array = ffi.new(kind, numbers or [0])
         kept.append(array)
         setattr(record, name, array)
     kept.append(ffi.new("mstmm_coupled_row[]", rows or [(0, 0, -1, -1)]))
     record.rows = kept[-1]
-    record.n_bodies, record.n_efforts = len(reach.across), len(reach.efforts)
+    record.n_bodies, record.n_efforts = len(reach.across), len(efforts)
     record.n_rows = len(rows)
-    return kept, 6 * len(reach.across) + len(reach.efforts) + len(rows)
+    return kept, 6 * len(reach.across) + len(efforts) + len(rows)
+
+
+def _efforts(engine: Engine) -> Iterator[tuple[int, int]]:
+    """(place in the workspace, speed) of efforts that expressions of the state and couplings give,
+    these for hinges of the tree."""
+    packed, lib, model = engine.packed, engine.lib, engine.packed.model
+    values = packed.scratch + engine.nq + engine.nu
+    for value, speed in packed.written.reach.efforts:
+        yield values + value, speed
+    first, loops = packed.system.places["u"], packed.written.loops
+    frames = {one.frame for one in packed.system.closures}
+    coupled = {place for one in loops.couplings for place in one.columns} if loops else set()
+    for place in sorted(coupled - frames):
+        body = model.bodies[place]
+        at = body.block + lib.MSTMM_BLOCK_FIXED + lib.MSTMM_SPEED_TAU * body.nu
+        for k in range(body.nu):
+            yield int(at) + k, int(first[place]) + k
 
 
 def _rows_of_loops(engine: Engine) -> list[tuple[int, int, int, int]]:
     """(frame, direction, speed, row) of what hinges that close loops leave unknown: accelerations
-    of their speeds, and multipliers of their rows; -1 for the other of the two."""
+    of their speeds, and multipliers of their rows; -1 for the other of the two, and for the frame
+    of a coupling."""
     packed, loops = engine.packed, engine.packed.written.loops
     found = list[tuple[int, int, int, int]]()
     if loops is None:
@@ -197,6 +214,7 @@ def _rows_of_loops(engine: Engine) -> list[tuple[int, int, int, int]]:
         speeds = range(packed.system.body(one.frame).nu)
         found += [(one.frame, k, int(first[one.frame]) + k, -1) for k in speeds]
         found += [(one.frame, direction, -1, row) for direction, row in one.rows.items()]
+    found += [(-1, 0, -1, one.row) for one in (() if loops is None else loops.couplings)]
     return found
 
 

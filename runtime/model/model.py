@@ -21,7 +21,6 @@ from ..engine.compiled import Compiled
 from ..engine.given import GivenInput
 from ..integrate.settings import Settings, checked, times_of
 from ..pack.layout import refuse_dense
-from ..pack.loops.refusal import refuse_couplings
 
 if TYPE_CHECKING:
     from ..engine.loops.closed import Loops
@@ -167,7 +166,6 @@ class Model(Compiled):
         loop, and actuators that are not as many as the motions; NumericalFailure where they do not
         decide them at the state.
         """
-        refuse_couplings(self.packed, "inverse dynamics")
         if self.freedom is not None:
             from .actuated import actuated
 
@@ -194,7 +192,6 @@ class Model(Compiled):
         speeds do not decide the others.
         """
         lead, (states,) = batch(("q", q, self.nq))
-        refuse_couplings(self.packed, "the mass matrix of independent speeds")
         if self.freedom is not None:
             from .actuated import reduced_mass
 
@@ -242,7 +239,6 @@ class Model(Compiled):
         """
         from .equilibrium import equilibrium
 
-        refuse_couplings(self.packed, "the equilibrium")
         instead = "call equilibrium for each of several"
         start = self.initial_state()[0] if q is None else one("q", q, self.nq, instead)
         return equilibrium(self, start, real("t", t, "a time in s"), real("tolerance", tolerance))

@@ -90,7 +90,7 @@ def system_of(
     laws = tuple(laws_of(nodes, tree, layout, values, remembered))
     loads = tuple(_load(frames, load, values) for load in nodes.load)
     held = _held(scene, laws[-1].next_twist if laws else remembered)
-    couplings, coupled = couplings_of(frames)
+    couplings, coupled = couplings_of(frames, runs)
     system = System(
         layout.nq, layout.nu, held.first + len(held.start), nodes.gravity, runs,
         laws, loads, forces_of(frames, nodes, ports),

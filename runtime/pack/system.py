@@ -246,14 +246,12 @@ class ClosureNumbers:
 
 @dataclass(frozen=True, slots=True)
 class CoupledHinge:
-    """A hinge that a coupling names: `place` of the body, or frame, whose inboard hinge it is,
-    places of the bodies on both sides (-1: the ground), and where the slopes of its coordinates'
-    rates begin among those of all curved hinges, -1 where these rates are its speeds."""
+    """A hinge that a coupling names: `place` of the body, or frame, whose inboard hinge it is, and
+    places of the bodies on both sides (-1: the ground)."""
 
     place: int
     inboard: int
     outboard: int
-    slopes: int
 
 
 @dataclass(frozen=True, slots=True)

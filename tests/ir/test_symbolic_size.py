@@ -14,13 +14,13 @@ from support.random_kernels import element
 from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.audit.evaluate_equations import evaluate_equations
 from mstmm.derive.audit.rounding import rounding_bounds
-from mstmm.derive.fuse.inline import unrolled
 from mstmm.derive.language.derivation import Derivation, Equation, Quantity, Solve
 from mstmm.derive.lower.kernel import lower
 from mstmm.derive.show.ir import listing
 from mstmm.errors import NumericalFailure
 from mstmm.ir import Element, KernelIR, Port, Store, Sum, from_json, to_json
 from mstmm.ir.graph import Graph
+from mstmm.ir.inline import unrolled
 from mstmm.ir.replay import GuardFailure, evaluate_floats
 from mstmm.ir.tangent import tangent
 from mstmm.runtime.kernels import vectorized

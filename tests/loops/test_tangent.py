@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reference.random_couplings import random_coupled
 
 import mstmm
 from mstmm.runtime.engine.tangent import Tangent
@@ -51,6 +52,9 @@ CASES: dict[str, tuple[dict[str, Any], float, float]] = {
     "distances": (governor("constraint"), 37.0, 1e-2),
     "a disc that rolls": (on_a_road(), 37.0, 1e-2),
     "a bead on a wire": (cycloid(0.4), 37.0, 1e-2),
+    # Balls and free bodies among those coupled, and hinges that close loops.
+    "couplings": (random_coupled(4)[0], 37.0, 1e-2),
+    "couplings on cuts": (random_coupled(6)[0], 37.0, 1e-2),
 }
 
 

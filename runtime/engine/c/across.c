@@ -23,6 +23,7 @@ static real *row_numbers(const mstmm_model *model, real *workspace, int row)
 
 static int64_t place_of_row(const mstmm_model *model, const mstmm_coupled_row *one)
 {
+    if (one->frame < 0) return model->loops + MSTMM_ROW * (int64_t)one->row + MSTMM_ROW_KNOWN;
     const mstmm_closure *closure = model->looped[one->frame].closure;
     return model->loops + closure->numbers + MSTMM_CLOSURE_L + one->direction;
 }
@@ -32,9 +33,9 @@ static int is_unknown(const mstmm_tangent *at, int k)
 {
     if (k < n_changes(at)) return 1;
     const mstmm_coupled_row *one = &at->couplings->rows[k - n_changes(at)];
-    const mstmm_body *body = &at->model->bodies[one->frame];
     if (one->speed < 0)
         return row_numbers(at->model, at->workspace, one->row)[MSTMM_ROW_INVERSE] > 0;
+    const mstmm_body *body = &at->model->bodies[one->frame];
     return !(mstmm_imposed(body, at->memory) && body->imposed_mask[one->direction]);
 }
 
@@ -45,7 +46,7 @@ static real *change_across(const mstmm_tangent *at, const mstmm_state *slope, in
     const mstmm_model *model = at->model;
     if (k < 6 * all->n_bodies)
         return mstmm_block(model, slope->workspace, all->bodies[k / 6]) + MSTMM_BLOCK_E + k % 6;
-    return mstmm_values(slope) + all->values[k - 6 * all->n_bodies];
+    return slope->workspace + all->efforts[k - 6 * all->n_bodies];
 }
 
 void mstmm_set_own_apart(const mstmm_tangent *at, real *a, real *own)

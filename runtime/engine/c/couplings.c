@@ -1,36 +1,10 @@
 /* Couplings: rows between coordinates of hinges, whose numbers one tape gives; see sweep.h. */
-#include "hinge.h"
 #include "loops.h"
+#include "sweep_steps.h"
 
 static real *loops_of(const mstmm_state *state)
 {
     return state->workspace + state->model->loops;
-}
-
-/* How the rates of a hinge's coordinates change with one of its speeds (d_u) or coordinates. */
-static int rates_along(mstmm_state *state, const mstmm_body *body, const real *d_q,
-                       const real *d_u, real *rates)
-{
-    real R[9], d[3], H[36], v[3], w[3], c[6];
-    return mstmm_hinge_slope_of(state, body, .p = body->hinge_p, .q = state->q + body->q,
-                                .u = state->u + body->u, .d_q = d_q, .d_u = d_u, .d_R = R,
-                                .d_d = d, .d_H = H, .d_v = v, .d_w = w, .d_c = c,
-                                .d_qdot = rates);
-}
-
-static int curved_rates(mstmm_state *state, const mstmm_curved *curved)
-{
-    const mstmm_body *body = &state->model->bodies[curved->body];
-    real along[8] = {0}, *rates = loops_of(state) + curved->rates;
-    for (int k = 0; k < body->nu + body->nq; k++, rates += body->nq) {
-        const int speed = k < body->nu, at = speed ? k : k - body->nu;
-        along[at] = 1;
-        const int code = rates_along(state, body, speed ? mstmm_zeros : along,
-                                     speed ? along : mstmm_zeros, rates);
-        if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, curved->body, code);
-        along[at] = 0;
-    }
-    return 0;
 }
 
 /* Which number of a coupling is the known part of its row. */
@@ -40,16 +14,11 @@ static int at_level(const mstmm_state *state)
     return state->level == MSTMM_SLIP ? MSTMM_COUPLING_SLIP : MSTMM_COUPLING_DRIFT;
 }
 
-int mstmm_couplings_begun(mstmm_state *state)
+int mstmm_hook_couplings_valued(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     real *loops = loops_of(state);
-    for (int k = 0; k < model->n_curved; k++) {
-        const int code = curved_rates(state, &model->curved[k]);
-        if (code) return code;
-    }
-    const real *inputs[] = {&state->t, state->q, state->u, state->qdot,
-                            loops + model->curved_rates};
+    const real *inputs[] = {&state->t, state->q, state->u};
     real *outputs[] = {loops + model->coupling_numbers};
     const int code = mstmm_tape_run(model->coupling_tape, inputs, mstmm_slots(state), outputs);
     if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, -1, code);
@@ -59,6 +28,24 @@ int mstmm_couplings_begun(mstmm_state *state)
         numbers[MSTMM_COUPLING_GAP] -= one->kept;
         if (one->row < 0) continue;
         loops[MSTMM_ROW * (int64_t)one->row + MSTMM_ROW_KNOWN] = numbers[at_level(state)];
+    }
+    return 0;
+}
+
+int mstmm_hook_coupling_slopes(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    mstmm_state *slope = state->slope;
+    real *loops = loops_of(slope);
+    const real *inputs[] = {&state->t, state->q, state->u, &slope->t, slope->q, slope->u};
+    real *outputs[] = {loops + model->coupling_numbers};
+    const int code = mstmm_tape_run(model->coupling_slopes, inputs, mstmm_slots(slope), outputs);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, -1, code);
+    for (int k = 0; k < model->n_couplings; k++) {
+        const mstmm_coupling *one = &model->couplings[k];
+        if (one->row >= 0)
+            loops[MSTMM_ROW * (int64_t)one->row + MSTMM_ROW_KNOWN] =
+                loops[one->numbers + MSTMM_COUPLING_DRIFT];
     }
     return 0;
 }

@@ -41,7 +41,7 @@ int mstmm_hook_rows_begun(mstmm_state *state)
         numbers[MSTMM_ROW_PIVOT] =
             let_go(state, row) ? (real)INFINITY : row->softness + state->give * row->mobility;
     }
-    return model->n_couplings ? mstmm_couplings_begun(state) : 0;
+    return model->n_couplings ? mstmm_hook_couplings_valued(state) : 0;
 }
 
 int mstmm_hook_rows_asked(mstmm_state *state)

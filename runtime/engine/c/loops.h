@@ -8,8 +8,6 @@
 int mstmm_refine(mstmm_state *state, const real *q, const real *u);
 /* How much the rows lack in the sweep that was made last, by row. */
 void mstmm_missing(const mstmm_state *state, real *missing);
-/* Numbers of couplings at the state, known parts of their rows among them. */
-int mstmm_couplings_begun(mstmm_state *state);
 /* What a coupling lacked in the sweep that was made last; 0 where nothing is asked of it. */
 real mstmm_coupling_lack(const mstmm_state *state, const mstmm_coupling *one);
 /* Efforts of the hinge of a body without those of couplings. */

@@ -189,13 +189,6 @@ typedef struct {
     int64_t numbers;
 } mstmm_coupling;
 
-/* A hinge in a coupling whose coordinates do not go by its speeds as they are: from `rates` on stand
- * the derivatives of its coordinates' rates, by every speed and by every coordinate. */
-typedef struct {
-    int body;
-    int64_t rates;
-} mstmm_curved;
-
 /* What a body has to do with closed loops. */
 typedef struct {
     int first_row, n_rows; /* that close on it */
@@ -260,10 +253,9 @@ typedef struct {
     int refines;          /* digits are lost behind heavy bodies: accelerations are refined once */
     int n_couplings;
     const mstmm_coupling *couplings;
-    int n_curved;
-    const mstmm_curved *curved;
-    const mstmm_tape *coupling_tape; /* t, q, u, qdot, rates of curved hinges -> their numbers */
-    int64_t coupling_numbers, curved_rates; /* first of either behind `loops` */
+    const mstmm_tape *coupling_tape; /* t, q, u -> their numbers */
+    const mstmm_tape *coupling_slopes; /* the same and derivatives of all -> those of the numbers */
+    int64_t coupling_numbers; /* the first behind `loops` */
     real loops_apart;     /* gap (m, rad) at which rows that repeat others do so no longer */
     int needs_pose; /* loads or forces that need poses and velocities */
     int64_t workspace; /* numbers of workspace */

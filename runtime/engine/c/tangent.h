@@ -7,18 +7,20 @@
 
 /* cdef begin */
 /* An unknown of a hinge that closes a loop: the acceleration of a speed of its own, or the multiplier
- * of a row. */
+ * of a row; or that of a coupling. */
 typedef struct {
-    int frame, direction; /* the hinge's frame, and which of its six directions */
+    int frame, direction; /* the hinge's frame (-1: a coupling), and which of its six directions */
     int speed, row;       /* -1: the other is meant */
 } mstmm_coupled_row;
 
 /* What the elimination does not see, as it reaches across the tree: loads on bodies that change with
- * what other bodies do, efforts that expressions of the state give, and hinges that close loops. */
+ * what other bodies do, efforts that expressions of the state and couplings give, hinges that close
+ * loops, and couplings. */
 typedef struct {
     int n_bodies, n_efforts, n_rows;
     const int *bodies; /* on which such loads act: 6 numbers each */
-    const int *values, *speeds; /* an expression's value, and the speed that it acts on */
+    const int64_t *efforts; /* where an effort changes, in the derivatives' workspace */
+    const int *speeds;      /* and the speed that it acts on */
     const mstmm_coupled_row *rows;
 } mstmm_couplings;
 

@@ -47,9 +47,8 @@ def refuse_constraints(packed: Packed, what: str) -> None:
 
 
 def refuse_bending(packed: Packed, what: str) -> None:
-    """SceneError where couplings, or loops with flexible bodies, are there, which `what` cannot
-    follow yet."""
-    refuse_couplings(packed, what)
+    """SceneError where loops are closed in a scene with flexible bodies, which `what` cannot follow
+    yet."""
     if packed.flexible:
         refuse(packed, f"{what} with flexible bodies", INSTEAD)
 
@@ -57,6 +56,7 @@ def refuse_bending(packed: Packed, what: str) -> None:
 def refuse_beyond_hinges(packed: Packed, what: str) -> None:
     """SceneError where more than hinges of rigid bodies closes loops, which `what` cannot follow
     yet."""
+    refuse_couplings(packed, what)
     refuse_bending(packed, what)
     refuse_constraints(packed, what)
 
@@ -67,11 +67,8 @@ _ALIEN = ("dttmm", "exprb32")
 
 
 def refuse_method(packed: Packed, method: str, tangent: str) -> None:
-    """SceneError where loops are closed, for an implicit method that cannot follow them, for the
-    tangent of laws alone, and for rows that are not those of a hinge."""
-    loops = packed.written.loops
-    if loops is not None and loops.count > sum(len(one.rows) for one in loops.closures):
-        refuse(packed, f'method "{method}"', "dop853, dopri5 and rk4 do")
+    """SceneError where loops are closed, for an implicit method that cannot follow them, and for
+    the tangent of laws alone."""
     if packed.flexible:
         refuse(packed, f'method "{method}" with flexible bodies', INSTEAD)
     if method in _ALIEN:

@@ -75,7 +75,7 @@ def undriven(system: System) -> System:
 
 def torn(system: System) -> System:
     """With the loops open: a tree in which a hinge that closes one carries a frame without mass."""
-    return replace(system, closures=())
+    return replace(system, closures=(), couplings=(), coupled=None)
 
 
 def stiff(system: System) -> System:

@@ -30,7 +30,6 @@ def placed(
     if system.coupled is None:
         return ()
     model.coupling_numbers = take(system.coupled.outputs[0].length())
-    model.curved_rates = take(system.coupled.inputs[-1].length())
     left, found = iter(rows), []
     own = int(prebuilt.module()[1].MSTMM_COUPLING)
     for one in system.couplings:
@@ -56,7 +55,6 @@ def attach_couplings(
     is the place of a row's column on a body."""
     records = memory.new("mstmm_coupling[]", max(1, len(couplings)))
     own: dict[int, list[tuple[int, int, int, int]]] = {}
-    curved: dict[int, int] = {}
     frames = {one.frame for one in system.closures}
     for record, one in zip(records, couplings, strict=False):
         kept = one.coupling.kept
@@ -66,14 +64,10 @@ def attach_couplings(
         if one.row >= 0:
             rows[one.row].of_speeds = record.of_speeds
         for hinge in one.coupling.hinges:
-            if hinge.slopes >= 0:
-                curved[hinge.place] = model.curved_rates + hinge.slopes
             if hinge.place in frames and one.row >= 0:
                 sides = side(hinge.inboard, one.row), side(hinge.outboard, one.row)
                 own.setdefault(hinge.place, []).append((one.row, *sides, one.columns[hinge.place]))
     for frame, found in own.items():
         looped[frame].n_own, looped[frame].own = len(found), memory.new("mstmm_own[]", found)
     model.couplings, model.n_couplings = records, len(couplings)
-    model.curved = memory.new("mstmm_curved[]", [*curved.items()] or 1)
-    model.n_curved = len(curved)
     model.coupling_tape = memory.expression(system.coupled)

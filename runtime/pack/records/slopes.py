@@ -27,7 +27,7 @@ class Slopes:
 
 
 def write_slopes(system: System, model: Any, ffi: Any) -> Slopes:
-    """Give `model` the tapes of drives, expression values and given efforts of springs."""
+    """Give `model` the tapes of drives, values, couplings and given efforts of springs."""
     made = Slopes()
 
     def tape(kernel: KernelIR | None) -> Any:
@@ -39,6 +39,7 @@ def write_slopes(system: System, model: Any, ffi: Any) -> Slopes:
         return c_tape(ffi, slope, made.kept)
 
     model.drive_slopes, model.value_slopes = tape(system.drives), tape(system.values)
+    model.coupling_slopes = tape(system.coupled)
     for k, force in enumerate(system.forces):
         model.forces[k].effort_slope = tape(force.effort)
     return made

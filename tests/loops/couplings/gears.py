@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 import mstmm
 
 Scene = dict[str, Any]
@@ -41,12 +43,13 @@ MASS = 0.2
 PLACES = [[ORBIT, 0, 0], [-ORBIT / 2, ORBIT * 3**0.5 / 2, 0], [-ORBIT / 2, -ORBIT * 3**0.5 / 2, 0]]
 
 
-def planetary(efforts: dict[str, float]) -> mstmm.Model:
-    """A planetary gear whose planets mesh with sun and ring, each of them a row twice."""
+def planetary(efforts: dict[str, float], **laws: Scene) -> mstmm.Model:
+    """A planetary gear whose planets mesh with sun and ring, each of them a row twice; `laws` are
+    more keys of the laws of its shafts."""
     bodies = [wheel(name, MOMENTS[name]) for name in ("sun", "ring", "carrier")]
     bodies[2]["ends"] = {f"e{k}": place for k, place in enumerate(PLACES)}
     hinges = [
-        pin(name, name, law={"effort": efforts.get(name, 0.0)})
+        pin(name, name, law={"effort": efforts.get(name, 0.0), **laws.get(name, {})})
         for name in ("sun", "ring", "carrier")
     ]
     rows: list[Scene] = []
@@ -59,3 +62,12 @@ def planetary(efforts: dict[str, float]) -> mstmm.Model:
             {"name": f"ring{k}", "expression": f"{RING}*(ring.q - carrier.q) - {PLANET}*p{k}.q"},
         ]
     return coupled(bodies, hinges, *rows)
+
+
+def inertia(ratios: np.ndarray) -> np.ndarray:
+    """Mass matrix (n, n) of that gear over n speeds, by which sun, ring and carrier turn as
+    `ratios` (3, n) say."""
+    moments = [MOMENTS["sun"], MOMENTS["ring"], MOMENTS["carrier"] + 3 * MASS * ORBIT**2]
+    planet = ratios[2] - SUN / PLANET * (ratios[0] - ratios[2])
+    turning = 3 * MOMENTS["planet"] * np.outer(planet, planet)
+    return np.asarray(ratios.T @ np.diag(moments) @ ratios + turning)

@@ -12,10 +12,11 @@ from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 
-from mstmm.ir import Constant, Guard, KernelIR, Port, Solve
-from mstmm.ir.graph import Graph, Node
-from mstmm.ir.replay import Counted
-from mstmm.ir.unrolled import solve_by_rows, solve_symmetric
+from .graph import Graph, Node
+from .kernel import KernelIR
+from .replay import Counted
+from .statements import Constant, Guard, Port, Solve
+from .unrolled import solve_by_rows, solve_symmetric
 
 Nodes = list[Node]
 Guarding = Callable[[Node, int], None]

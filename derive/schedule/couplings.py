@@ -1,0 +1,70 @@
+"""Couplings of coordinates: where their rows begin, and the efforts that their multipliers are.
+
+A row begins at each hinge that it names.  In the tree its column is zero there, and -C is the
+effort of a multiplier of one; a hinge that closes a loop has its speeds from the two bodies that it
+joins.
+See docs/theory/loops.md.
+"""
+
+from __future__ import annotations
+
+from .steps import Add, Each, EachSpeed, Pass, Step, call, only
+
+#: What the accelerations of a hinge in the tree tell the rows that name it.
+TOLD = call("generic{nu}.answered", when="coupled", y="body.s", z="pending.tau", l="pending.known")
+#: The same of a hinge that closes a loop: those along its rows, and those that are given.
+_TOLD_BY_OWN = (
+    call("generic{nu}.answered", y="closure.l", z="own.tau", l="own.known"),
+    call("generic{nu}.answered", y="body.s", z="own.tau", l="own.known"),
+)
+#: Rows that name a hinge's own speeds begin on both sides of it.
+OF_OWN = Each(
+    of="own",
+    when="!staged",
+    steps=(
+        EachSpeed(
+            steps=(
+                call("loops.act", J="closure.J_A[6 * k]", tau="own.tau[k]", e="own.inner"),
+                call("loops.act", J="closure.J_B[6 * k]", tau="own.tau[k]", e="own.outer"),
+            ),
+        ),
+        *_TOLD_BY_OWN,
+    ),
+)  # fmt: skip
+#: The same where multipliers are known.
+OWN_TOLD = Each(of="own", steps=_TOLD_BY_OWN)
+
+
+def efforts_of_own(x: str, when: str) -> Each:
+    """Efforts of couplings on own speeds, by their multipliers."""
+    pull = call("generic{nu}.pull", y="own.tau", x=x, y_0="body.tau")
+    return Each(of="own", when=when, steps=(pull,))
+
+
+def efforts_of(x: str, when: str, *more: Step) -> Each:
+    """Efforts of the couplings of a hinge in the tree, by their multipliers."""
+    pull = call("generic{nu}.pull", when="coupled", y="pending.tau", x=x, y_0="body.tau")
+    return Each(of="pending", when=when, steps=(pull, *more))
+
+
+#: Multipliers are known here, from an evaluation of accelerations in the same workspace.
+COUPLINGS_LOADED = Pass(
+    "couplings_loaded", "body",
+    "Rows of couplings at the accelerations that are given, and the efforts of their multipliers.",
+    (efforts_of("pending.x", "", TOLD),),
+    skip="aside",
+)  # fmt: skip
+
+COUPLINGS_ANSWERED = Pass(
+    "couplings_answered", "coupling",
+    "Multipliers of couplings, and the power that those feed in whose values go by time.",
+    (
+        Add(to="coupling.x", source="coupling.told", when="refined"),
+        *only(
+            "balance",
+            call("frames.speed_power", tau="coupling.x", u="coupling.still", P="local.P"),
+            Add(to="sums.power", source="local.P"),
+        ),
+    ),
+    skip="unmet",
+)  # fmt: skip
