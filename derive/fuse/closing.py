@@ -59,6 +59,9 @@ def _told(replay: Replay, closure: ClosureStructure) -> list[tuple[Node, Node]]:
     own = replay.body.nu
     for direction, known in enumerate(replay.get("closure.l", 6)):
         row = closure.rows[direction]
+        if row < -1:
+            found.append((zero, zero))
+            continue
         replay.enter(replace(subject, row=row))
         inverse = replay.get("row.inverse", 1)[0] if row >= 0 else zero
         if inverse.value is not None:

@@ -420,13 +420,14 @@ _TRAITS: dict[str, Callable[[Replay, BodyStructure], bool]] = {
     "cut": lambda replay, body: replay.closure() is not None,
     "aside": lambda replay, body: body.idle or replay.closure() is not None,
     "refined": lambda replay, body: False,
-    # Scenes with constraints are looped.
-    "hinged": lambda replay, body: True,
-    **dict.fromkeys(("distance", "plane", "rolling"), lambda replay, body: False),
+    "hinged": lambda replay, body: replay.closed_by("hinge"),
+    "distance": lambda replay, body: replay.closed_by("distance"),
+    "plane": lambda replay, body: replay.closed_by("plane"),
+    "rolling": lambda replay, body: replay.closed_by("rolling"),
     "kept": lambda replay, body: not replay.level,
     "corrected": lambda replay, body: bool(replay.level),
     "soft": lambda replay, body: bool(replay.row().soft),
-    "unmoved": lambda replay, body: replay.get("row.pivot", 1)[0].value == 0,
+    "unmoved": lambda replay, body: replay.rests(),
 }
 
 _DO: dict[type, Callable[..., None]] = {

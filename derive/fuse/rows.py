@@ -41,6 +41,17 @@ class RowSlots(Slots):
         """The row at hand."""
         return self.state.structure.rows[self.at.row]
 
+    def closed_by(self, kind: str) -> bool:
+        """Whether what closes here is of this kind."""
+        closure = self.closure()
+        return closure is not None and closure.kind == kind
+
+    def rests(self) -> bool:
+        """Whether nothing is asked of the row at hand, or nothing moves it."""
+        if self.level == "gaping" and self.row().of_speeds:
+            return True
+        return self.get("row.pivot", 1)[0].value == 0
+
     def met(self, of: str) -> Iterator[Subject]:
         """The subjects of `Each`."""
         at, rows = self.at, self.state.structure.rows
@@ -99,7 +110,7 @@ class RowSlots(Slots):
     def _closure(self, name: str) -> Nodes:
         closure = self.closure()
         assert closure is not None
-        return self.state.entries(closure.turn if name == "turn" else closure.end)
+        return self.state.entries({"turn": closure.turn, "end": closure.end, "p": closure.p}[name])
 
 
 def closure_at(structure: Structure, index: int) -> ClosureStructure | None:

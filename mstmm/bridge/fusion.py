@@ -77,7 +77,8 @@ class Fusion:
         bake: bool = False,
         most: int = MOST_BODIES,
     ) -> None:
-        self._definitions = definitions
+        made = {key: one.spec for key, one in known.items() if one.spec is not None}
+        self._definitions = {**definitions, **made}
         self.obstacle = obstacle or _obstacle(packed, most)
         self.library: FusedLibrary | None = None
         self.lanes: FusedLibrary | None = None
@@ -327,8 +328,6 @@ def _obstacle(packed: Packed, most: int) -> str:
         return "the product of classical matrices is looped"
     if packed.qr:
         return "the sweep as least squares is looped"
-    if any(cut.constraint is not None for cut in packed.expanded.cuts):
-        return "constraints are looped"
     if closed := _looped_closure(packed):
         return closed
     if packed.model.refines:
@@ -337,8 +336,8 @@ def _obstacle(packed: Packed, most: int) -> str:
         return "couplings of coordinates are looped"
     if packed.system.closures and packed.flexible:
         return "loops through flexible bodies are looped"
-    hinges = {body.hinge for body in packed.system.distinct}
-    if any(packed.elements[key].tape is not None for key in hinges):
+    hinges = (packed.elements[body.hinge] for body in packed.system.distinct)
+    if any(hinge.tape is not None and hinge.spec is None for hinge in hinges):
         return "a hinge is interpreted because it was generated without a compiler"
     return ""
 

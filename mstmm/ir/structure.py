@@ -137,25 +137,29 @@ class ForceStructure:
 class ClosureStructure:
     """A hinge that closes a loop: body `frame`, without mass, is to be where an end of `outboard`
     is, which lies in that body by `turn` (9, row by row) and `end` (3).  `rows` are those of its
-    six directions, own speeds first; -1 where a direction has none."""
+    six directions, own speeds first; -1 where a direction has none, -2 where nothing is asked of
+    it.  Constraints ask less: as `kind` says, by the numbers `p`."""
 
     frame: int
     outboard: int
     turn: Entries
     end: Entries
     rows: tuple[int, ...]
+    kind: str = "hinge"
+    p: Entries = ()
 
 
 @dataclass(frozen=True)
 class RowStructure:
     """A row that is closed on a body, coupled with `others` that are open yet; a pivot up to
     `floor` is rounding.  `soft` is the rotor inertia of the speed whose row it is; empty: the row
-    is met."""
+    is met.  One `of_speeds` asks nothing of positions."""
 
     body: int
     others: tuple[int, ...]
     floor: Entries
     soft: Entries
+    of_speeds: bool = False
 
 
 @dataclass(frozen=True)

@@ -46,9 +46,10 @@ class Compiled:
         product_accuracy: float | None = None,
         least_squares: bool = False,
     ) -> None:
-        self.scene, self.known = scene, known
+        self.scene = scene
         self._fusing, self._product_accuracy = fusing, product_accuracy
         self.looped = Engine(pack(scene, known, product_accuracy, least_squares=least_squares))
+        self.known = self.packed.elements.known
         self.closed: Closed | None = None
         if self.packed.system.closes:
             try:
@@ -59,7 +60,7 @@ class Compiled:
             if product_accuracy is not None:
                 product.attach(self.packed, product_accuracy)
                 resize(self.packed, self.packed.written.slots)
-        self.fusion: Fusing = fusing(self.packed, known or {}) if fusing else NotFused()
+        self.fusion: Fusing = fusing(self.packed, self.known) if fusing else NotFused()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled are the scene and what was asked; compiled code is looked for again."""

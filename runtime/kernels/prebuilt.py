@@ -11,7 +11,7 @@ from typing import Any
 
 from mstmm.border import elements as abi
 from mstmm.errors import ElementError, EnvironmentFailure
-from mstmm.ir.spec import Param
+from mstmm.ir.spec import ElementSpec, Param
 from mstmm.ir.tape import Tape
 
 from ..libraries.build_extension import BUILT_FROM, built_from
@@ -33,6 +33,7 @@ class Element:
     slope_tape: Tape | None = None  # and its derivative
     declared: tuple[Param, ...] = ()  # parameters of a user's element, with bounds and defaults
     hash: str = ""  # of its definition
+    spec: ElementSpec | None = None  # that, of one that a scene makes itself
     owner: Any = None  # keeps the library or the arrays of the descriptor alive
 
 

@@ -23,7 +23,7 @@ from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.live import LiveInputs
 from ..engine.tangents import Tangents
-from ..pack.loops.refusal import refuse_beyond_hinges
+from ..pack.loops.refusal import refuse_bending, refuse_couplings
 from ..pack.slopes import slopes
 from ..pack.structure import structure_of
 
@@ -74,7 +74,8 @@ class Differentiation:
         self._model = model
         self.names = tuple(names)
         known = model.known or {}
-        refuse_beyond_hinges(model.packed, "exact derivatives")
+        refuse_couplings(model.packed, "exact derivatives")
+        refuse_bending(model.packed, "exact derivatives")
         _refuse(model)
         if names:
             structure, self.p, self.slopes = slopes(model.scene, known, names, model.packed)

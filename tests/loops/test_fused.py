@@ -17,6 +17,7 @@ from mstmm.runtime.pack.pack import pack
 from mstmm.runtime.pack.structure import structure_of
 from mstmm.runtime.run.system import SceneCode, SceneSystem
 
+from .constraints.scenes import cycloid, governor, on_a_plane, on_a_road
 from .linkages import bricard, cranks, four_bar
 from .scenes import Scene, andrews, four_bars
 from .test_four_bar import linkage, rocker_driven
@@ -35,6 +36,10 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "windows": lambda: four_bars(2),
     "Bricard": lambda: bricard(2),
     "Andrews": andrews,
+    "distances": lambda: governor("constraint"),
+    "a point on a plane": on_a_plane,
+    "a disc that rolls": on_a_road,
+    "a bead on a wire": lambda: cycloid(0.4),
 }
 
 
@@ -84,10 +89,14 @@ def test_random_mechanisms(seed: int) -> None:
     assert worst(np.array(found["udot"]), wanted) < 1e-12
 
 
-@pytest.fixture(scope="module", params=["four-bar", "Bricard"])
+@pytest.fixture(scope="module", params=["four-bar", "Bricard", "disc", "wire"])
 def both(request: pytest.FixtureRequest) -> tuple[mstmm.Model, mstmm.Model]:
-    """A linkage by the looped engine and by code of its own."""
-    scene = linkage("closing_pin", laws=False) if request.param == "four-bar" else bricard()
+    """What closes by the looped engine and by code of its own."""
+    made: dict[str, Callable[[], Scene]] = {
+        "four-bar": lambda: linkage("closing_pin", laws=False), "Bricard": bricard,
+        "disc": on_a_road, "wire": lambda: cycloid(0.4),
+    }  # fmt: skip
+    scene = made[request.param]()
     return compiled(scene), compiled(scene, "fused")
 
 

@@ -69,13 +69,6 @@ def test_a_loop_that_a_constraint_closes() -> None:
     del scene["hinge"][3]
     rod = {"type": "distance", "from": "coupler.tip", "to": "rocker.tip", "length": 0.3}
     model = mstmm.compile(mstmm.Scene(**scene, constraint=[rod | {"name": "rod"}]))
-    asked: tuple[Callable[[], Any], ...] = (
-        lambda: model.derivatives(*model.initial_state()),
-        lambda: mstmm.compile(model.scene, engine="fused"),
-    )  # fmt: skip
-    for ask in asked:
-        with pytest.raises(mstmm.SceneError, match=r"constraint.* (closes|looped)"):
-            ask()
     for method in ("exprb32", "dttmm"):
         with pytest.raises(mstmm.SceneError, match='loop of constraint "rod" is closed'):
             model.simulate(0.1, method, step=1e-3)

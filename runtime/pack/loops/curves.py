@@ -14,6 +14,7 @@ from mstmm.ir import KernelIR, Port
 from mstmm.ir.facts import HingeFacts
 from mstmm.ir.graph import Graph
 from mstmm.ir.param import Param
+from mstmm.ir.spec import ElementSpec
 from mstmm.ir.tangent import tangent
 from mstmm.ir.tape import compile_tape
 from mstmm.scene import Constraint, Hinge
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from mstmm.ir.structure import Key
 
+_TITLE, _S, _RATE = "a way along a curve", Param("s"), Param("s_rate", "1/s")
 _OUTPUTS = (Port("R", (3, 3)), Port("d", (3,)), Port("H", (6,)), Port("v", (3,)), Port("w", (3,)),
             Port("c", (6,)), Port("qdot", (1,)))  # fmt: skip
 
@@ -37,7 +39,7 @@ def along(constraint: Constraint, held: Hinge) -> Hinge:
         "type": name, "initial": Initial(q=(constraint.start or 0.0,), u=(0.0,))
     })  # fmt: skip
     moving.__dict__["facts"] = HingeFacts(
-        name, "a way along a curve", (Param("s"),), (Param("s_rate", "1/s"),), (), "own", (),
+        name, _TITLE, (_S,), (_RATE,), (), "own", (),
         name, None, True, False, ("qqq000",), _kernel(constraint),
     )  # fmt: skip
     return moving
@@ -50,11 +52,12 @@ def elements_of(constraints: Iterable[Constraint]) -> dict[Key, Element]:
 
 
 def _element(constraint: Constraint) -> Element:
-    kernel = _kernel(constraint)
+    kernel, name = _kernel(constraint), _type(constraint)
     slope = tangent(kernel, ("q", "u"), None, values=False, guards=False)
+    made = ElementSpec("hinge", name, _TITLE, (_S,), (_RATE,), (), (kernel,))
     return Element(
-        "hinge", _type(constraint), 1, 1, (), {}, {}, None, compile_tape(kernel),
-        compile_tape(slope),
+        "hinge", name, 1, 1, (), {}, {}, None, compile_tape(kernel), compile_tape(slope),
+        hash=made.hash(), spec=made,
     )  # fmt: skip
 
 
@@ -78,4 +81,4 @@ def _kernel(constraint: Constraint) -> KernelIR:
         "c": [*(rate * rate * x for x in bend), *still], "qdot": [rate],
     }  # fmt: skip
     inputs = [Port("p", (0,)), Port("q", (1,)), Port("u", (1,))]
-    return graph.kernel("hinge", inputs, _OUTPUTS, values, purpose="a way along a curve")
+    return graph.kernel("hinge", inputs, _OUTPUTS, values, purpose=_TITLE)

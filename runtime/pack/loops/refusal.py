@@ -37,15 +37,6 @@ def refuse_couplings(packed: Packed, what: str) -> None:
         )
 
 
-def refuse_constraints(packed: Packed, what: str) -> None:
-    """SceneError where constraints close loops, which `what` cannot follow."""
-    for one in packed.described.constraint[:1]:
-        raise SceneError(
-            f'scene: constraint "{one.name}" closes a loop, and {what} cannot follow that yet; '
-            f"{INSTEAD}"
-        )
-
-
 def refuse_bending(packed: Packed, what: str) -> None:
     """SceneError where loops are closed in a scene with flexible bodies, which `what` cannot follow
     yet."""
@@ -58,7 +49,11 @@ def refuse_beyond_hinges(packed: Packed, what: str) -> None:
     yet."""
     refuse_couplings(packed, what)
     refuse_bending(packed, what)
-    refuse_constraints(packed, what)
+    for one in packed.described.constraint[:1]:
+        raise SceneError(
+            f'scene: constraint "{one.name}" closes a loop, and {what} cannot follow that yet; '
+            f"{INSTEAD}"
+        )
 
 
 #: Methods that take increments of loads or an exponential of the whole motion, which closed loops

@@ -36,10 +36,19 @@ def with_loops(
         _closure(one, plan.of[group], bodies[one.frame], sort, soft)
         for group, one in enumerate(system.closures)
     ]
+    of_speeds = {
+        row
+        for group, one in enumerate(system.closures)
+        for row, direction in zip(plan.of[group], one.directions, strict=True)
+        if direction in one.of_speeds
+    }
     rows = tuple(
-        RowStructure(row.body, row.others, sort(floors[number : number + 1]), soft.get(number, ()))
+        RowStructure(
+            row.body, row.others, sort(floors[number : number + 1]), soft.get(number, ()),
+            number in of_speeds,
+        )
         for number, row in enumerate(plan.rows)
-    )
+    )  # fmt: skip
     open_rows = _pending(bodies, plan)
     return open_rows, tuple(sorted(closures, key=lambda one: one.frame)), rows
 
@@ -55,11 +64,12 @@ def _closure(
     one: ClosureNumbers, own: range, frame: BodyStructure, sort: Sort, soft: dict[int, Entries]
 ) -> ClosureStructure:
     """A closure; rows of rotors get their inertia in `soft`."""
-    rows = [-1] * 6
+    rows = [-1 if direction < one.asked else -2 for direction in range(6)]
     for row, direction in zip(own, one.directions, strict=True):
         rows[direction] = row
         if direction < frame.nu and not frame.imposed[direction]:
             soft[row] = (frame.rotor[direction],)
     return ClosureStructure(
-        one.frame, one.outboard, sort(one.turn, axes=True), sort(one.end), tuple(rows)
-    )
+        one.frame, one.outboard, sort(one.turn, axes=True), sort(one.end), tuple(rows), one.kind,
+        (*sort(one.p[:2]), *sort(one.p[2:], axes=True)),
+    )  # fmt: skip

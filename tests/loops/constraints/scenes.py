@@ -71,6 +71,18 @@ def kane() -> Any:
     return sp.lambdify(plain, matrices, "numpy")
 
 
+def on_a_plane() -> Scene:
+    """A body on a ball hinge whose tip stays in an oblique plane."""
+    return {
+        "gravity": [0, 0, -GRAVITY],
+        "body": [{"name": "rod", "mass": 1.0, "inertia": [0.1, 0.2, 0.3],
+                  "center_of_mass": [0.2, 0, 0.1], "ends": {"tip": [0.5, 0, 0]}}],
+        "hinge": [{"name": "joint", "type": "ball", "inboard": "ground", "outboard": "rod"}],
+        "constraint": [{"name": "glass", "type": "point-on-plane", "from": "ground",
+                        "to": "rod.tip", "normal": [0.3, 0.1, 1], "offset": 0.1}],
+    }  # fmt: skip
+
+
 def bead(curve: tuple[str, str], start: float, place: tuple[float, float]) -> Scene:
     """A bead on a wire in the plane of x and z, about which it turns freely."""
     free = {"name": "at", "type": "free", "inboard": "ground", "outboard": "bead",
