@@ -735,6 +735,8 @@ int mstmm_sweep_generic1_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic1_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic1_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic1_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic1_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -827,6 +829,8 @@ int mstmm_sweep_generic2_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic2_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic2_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic2_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic2_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -919,6 +923,8 @@ int mstmm_sweep_generic3_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic3_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic3_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic3_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic3_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -1011,6 +1017,8 @@ int mstmm_sweep_generic4_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic4_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic4_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic4_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic4_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -1103,6 +1111,8 @@ int mstmm_sweep_generic5_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic5_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic5_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic5_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic5_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -1195,6 +1205,8 @@ int mstmm_sweep_generic6_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic6_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic6_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic6_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic6_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -1303,31 +1315,40 @@ int mstmm_sweep_link_screw_recover(const real *restrict link, const real *restri
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_loops;
-int mstmm_sweep_loops_gap(const real *restrict A_C, const real *restrict x_C,
-    const real *restrict A_B, const real *restrict x_B, const real *restrict R_e,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r, real *restrict R_C,
-    real *restrict r_A, real *restrict d, real *restrict gap);
+int mstmm_sweep_loops_meet(const real *restrict A_C, const real *restrict x_C,
+    const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
+    const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
+    real *restrict d);
+int mstmm_sweep_loops_gap(const real *restrict R_e, const real *restrict R_C,
+    const real *restrict d, real *restrict gap);
 int mstmm_sweep_loops_slip(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict v_C, const real *restrict w_C,
     const real *restrict v_B, const real *restrict w_B, real *restrict slip);
 int mstmm_sweep_loops_drift(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict slip, const real *restrict motion_C,
     const real *restrict motion_B, real *restrict drift);
-int mstmm_sweep_loops_rows(const real *restrict W, const real *restrict R_C,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
-    const real *restrict relative, real *restrict J_A, real *restrict J_B, real *restrict l);
+int mstmm_sweep_loops_row(const real *restrict w, const real *restrict R_C,
+    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
+    real *restrict J_B);
+int mstmm_sweep_loops_known(const real *restrict W, const real *restrict relative, real *restrict l);
 int mstmm_sweep_loops_told(const real *restrict J_A, const real *restrict J_B,
     const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
     real *restrict c);
 int mstmm_sweep_loops_act(const real *restrict J, const real *restrict tau, real *restrict e);
-int mstmm_sweep_loops_close(const real *restrict K, const real *restrict l, const real *restrict L,
-    const real *restrict floor_, real *restrict inverse, real *restrict S, real *restrict e);
+int mstmm_sweep_loops_settle(const real *restrict L, const real *restrict floor_,
+    real *restrict inverse);
+int mstmm_sweep_loops_close(const real *restrict inverse, const real *restrict K,
+    const real *restrict l, real *restrict S, real *restrict e);
 int mstmm_sweep_loops_shed(const real *restrict inverse, const real *restrict K,
-    const real *restrict l, const real *restrict L_p, real *restrict K_p, real *restrict l_p);
+    const real *restrict L_p, real *restrict K_p);
+int mstmm_sweep_loops_shed_known(const real *restrict inverse, const real *restrict l,
+    const real *restrict L_p, real *restrict l_p);
 int mstmm_sweep_loops_shed_pair(const real *restrict inverse, const real *restrict L_p,
     const real *restrict L_q, real *restrict L_pq);
-int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restrict K,
-    const real *restrict l, const real *restrict delta, real *restrict x);
+int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restrict l,
+    real *restrict x);
+int mstmm_sweep_loops_multiplier_more(const real *restrict inverse, const real *restrict K,
+    const real *restrict delta, real *restrict x);
 int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *restrict L_p,
     const real *restrict x_p, real *restrict x);
 int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
@@ -1343,12 +1364,12 @@ int mstmm_sweep_loops_rolling(const real *restrict p, const real *restrict R_C,
     const real *restrict d, real *restrict W, real *restrict gap);
 int mstmm_sweep_loops_rolling_drift(const real *restrict p, const real *restrict R_C,
     const real *restrict slip, real *restrict drift);
-int mstmm_sweep_loops_gap_slope(const real *restrict A_C, const real *restrict x_C,
-    const real *restrict A_B, const real *restrict x_B, const real *restrict R_e,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r,
-    const real *restrict d_A_C, const real *restrict d_x_C, const real *restrict d_A_B,
-    const real *restrict d_x_B, const real *restrict d_Rc, const real *restrict d_r,
-    real *restrict d_R_C, real *restrict d_r_A, real *restrict d_d);
+int mstmm_sweep_loops_meet_slope(const real *restrict A_C, const real *restrict x_C,
+    const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
+    const real *restrict Rc, const real *restrict r, const real *restrict d_A_C,
+    const real *restrict d_x_C, const real *restrict d_A_B, const real *restrict d_x_B,
+    const real *restrict d_Rc, const real *restrict d_r, real *restrict d_R_C, real *restrict d_r_A,
+    real *restrict d_d);
 int mstmm_sweep_loops_slip_slope(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict v_C, const real *restrict w_C,
     const real *restrict v_B, const real *restrict w_B, const real *restrict d_R_C,
@@ -1359,11 +1380,12 @@ int mstmm_sweep_loops_drift_slope(const real *restrict R_C, const real *restrict
     const real *restrict motion_B, const real *restrict d_R_C, const real *restrict d_d,
     const real *restrict d_slip, const real *restrict d_motion_C, const real *restrict d_motion_B,
     real *restrict d_drift);
-int mstmm_sweep_loops_rows_slope(const real *restrict W, const real *restrict R_C,
+int mstmm_sweep_loops_row_slope(const real *restrict w, const real *restrict R_C,
     const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
-    const real *restrict relative, const real *restrict d_W, const real *restrict d_R_C,
-    const real *restrict d_Rc, const real *restrict d_r_A, const real *restrict d_relative,
-    real *restrict d_J_A, real *restrict d_J_B, real *restrict d_l);
+    const real *restrict d_w, const real *restrict d_R_C, const real *restrict d_Rc,
+    const real *restrict d_r_A, real *restrict d_J_A, real *restrict d_J_B);
+int mstmm_sweep_loops_known_slope(const real *restrict W, const real *restrict relative,
+    const real *restrict d_W, const real *restrict d_relative, real *restrict d_l);
 int mstmm_sweep_loops_act_slope(const real *restrict J, const real *restrict tau,
     const real *restrict d_J, const real *restrict d_tau, real *restrict d_e);
 int mstmm_sweep_loops_loaded_slope(const real *restrict K, const real *restrict x,

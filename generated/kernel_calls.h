@@ -1600,24 +1600,35 @@ static inline int mstmm_qr_restored_by(struct mstmm_qr_restored to)
 }
 #define mstmm_qr_restored(...) mstmm_qr_restored_by((struct mstmm_qr_restored){__VA_ARGS__})
 
-struct mstmm_loops_gap {
+struct mstmm_loops_meet {
     const real *A_C;
     const real *x_C;
     const real *A_B;
     const real *x_B;
-    const real *R_e;
     const real *r_e;
     const real *Rc;
     const real *r;
     real *R_C;
     real *r_A;
     real *d;
+};
+static inline int mstmm_loops_meet_by(struct mstmm_loops_meet to)
+{
+    return mstmm_sweep_loops_meet(
+        to.A_C, to.x_C, to.A_B, to.x_B, to.r_e, to.Rc, to.r, to.R_C, to.r_A, to.d);
+}
+#define mstmm_loops_meet(...) mstmm_loops_meet_by((struct mstmm_loops_meet){__VA_ARGS__})
+
+struct mstmm_loops_gap {
+    const real *R_e;
+    const real *R_C;
+    const real *d;
     real *gap;
 };
 static inline int mstmm_loops_gap_by(struct mstmm_loops_gap to)
 {
     return mstmm_sweep_loops_gap(
-        to.A_C, to.x_C, to.A_B, to.x_B, to.R_e, to.r_e, to.Rc, to.r, to.R_C, to.r_A, to.d, to.gap);
+        to.R_e, to.R_C, to.d, to.gap);
 }
 #define mstmm_loops_gap(...) mstmm_loops_gap_by((struct mstmm_loops_gap){__VA_ARGS__})
 
@@ -1654,23 +1665,33 @@ static inline int mstmm_loops_drift_by(struct mstmm_loops_drift to)
 }
 #define mstmm_loops_drift(...) mstmm_loops_drift_by((struct mstmm_loops_drift){__VA_ARGS__})
 
-struct mstmm_loops_rows {
-    const real *W;
+struct mstmm_loops_row {
+    const real *w;
     const real *R_C;
     const real *r_e;
     const real *Rc;
     const real *r_A;
-    const real *relative;
     real *J_A;
     real *J_B;
+};
+static inline int mstmm_loops_row_by(struct mstmm_loops_row to)
+{
+    return mstmm_sweep_loops_row(
+        to.w, to.R_C, to.r_e, to.Rc, to.r_A, to.J_A, to.J_B);
+}
+#define mstmm_loops_row(...) mstmm_loops_row_by((struct mstmm_loops_row){__VA_ARGS__})
+
+struct mstmm_loops_known {
+    const real *W;
+    const real *relative;
     real *l;
 };
-static inline int mstmm_loops_rows_by(struct mstmm_loops_rows to)
+static inline int mstmm_loops_known_by(struct mstmm_loops_known to)
 {
-    return mstmm_sweep_loops_rows(
-        to.W, to.R_C, to.r_e, to.Rc, to.r_A, to.relative, to.J_A, to.J_B, to.l);
+    return mstmm_sweep_loops_known(
+        to.W, to.relative, to.l);
 }
-#define mstmm_loops_rows(...) mstmm_loops_rows_by((struct mstmm_loops_rows){__VA_ARGS__})
+#define mstmm_loops_known(...) mstmm_loops_known_by((struct mstmm_loops_known){__VA_ARGS__})
 
 struct mstmm_loops_told {
     const real *J_A;
@@ -1699,36 +1720,57 @@ static inline int mstmm_loops_act_by(struct mstmm_loops_act to)
 }
 #define mstmm_loops_act(...) mstmm_loops_act_by((struct mstmm_loops_act){__VA_ARGS__})
 
-struct mstmm_loops_close {
-    const real *K;
-    const real *l;
+struct mstmm_loops_settle {
     const real *L;
     const real *floor_;
     real *inverse;
+};
+static inline int mstmm_loops_settle_by(struct mstmm_loops_settle to)
+{
+    return mstmm_sweep_loops_settle(
+        to.L, to.floor_, to.inverse);
+}
+#define mstmm_loops_settle(...) mstmm_loops_settle_by((struct mstmm_loops_settle){__VA_ARGS__})
+
+struct mstmm_loops_close {
+    const real *inverse;
+    const real *K;
+    const real *l;
     real *S;
     real *e;
 };
 static inline int mstmm_loops_close_by(struct mstmm_loops_close to)
 {
     return mstmm_sweep_loops_close(
-        to.K, to.l, to.L, to.floor_, to.inverse, to.S, to.e);
+        to.inverse, to.K, to.l, to.S, to.e);
 }
 #define mstmm_loops_close(...) mstmm_loops_close_by((struct mstmm_loops_close){__VA_ARGS__})
 
 struct mstmm_loops_shed {
     const real *inverse;
     const real *K;
-    const real *l;
     const real *L_p;
     real *K_p;
-    real *l_p;
 };
 static inline int mstmm_loops_shed_by(struct mstmm_loops_shed to)
 {
     return mstmm_sweep_loops_shed(
-        to.inverse, to.K, to.l, to.L_p, to.K_p, to.l_p);
+        to.inverse, to.K, to.L_p, to.K_p);
 }
 #define mstmm_loops_shed(...) mstmm_loops_shed_by((struct mstmm_loops_shed){__VA_ARGS__})
+
+struct mstmm_loops_shed_known {
+    const real *inverse;
+    const real *l;
+    const real *L_p;
+    real *l_p;
+};
+static inline int mstmm_loops_shed_known_by(struct mstmm_loops_shed_known to)
+{
+    return mstmm_sweep_loops_shed_known(
+        to.inverse, to.l, to.L_p, to.l_p);
+}
+#define mstmm_loops_shed_known(...) mstmm_loops_shed_known_by((struct mstmm_loops_shed_known){__VA_ARGS__})
 
 struct mstmm_loops_shed_pair {
     const real *inverse;
@@ -1745,17 +1787,28 @@ static inline int mstmm_loops_shed_pair_by(struct mstmm_loops_shed_pair to)
 
 struct mstmm_loops_multiplier {
     const real *inverse;
-    const real *K;
     const real *l;
-    const real *delta;
     real *x;
 };
 static inline int mstmm_loops_multiplier_by(struct mstmm_loops_multiplier to)
 {
     return mstmm_sweep_loops_multiplier(
-        to.inverse, to.K, to.l, to.delta, to.x);
+        to.inverse, to.l, to.x);
 }
 #define mstmm_loops_multiplier(...) mstmm_loops_multiplier_by((struct mstmm_loops_multiplier){__VA_ARGS__})
+
+struct mstmm_loops_multiplier_more {
+    const real *inverse;
+    const real *K;
+    const real *delta;
+    real *x;
+};
+static inline int mstmm_loops_multiplier_more_by(struct mstmm_loops_multiplier_more to)
+{
+    return mstmm_sweep_loops_multiplier_more(
+        to.inverse, to.K, to.delta, to.x);
+}
+#define mstmm_loops_multiplier_more(...) mstmm_loops_multiplier_more_by((struct mstmm_loops_multiplier_more){__VA_ARGS__})
 
 struct mstmm_loops_multiplier_less {
     const real *inverse;
@@ -1860,12 +1913,11 @@ static inline int mstmm_loops_rolling_drift_by(struct mstmm_loops_rolling_drift 
 }
 #define mstmm_loops_rolling_drift(...) mstmm_loops_rolling_drift_by((struct mstmm_loops_rolling_drift){__VA_ARGS__})
 
-struct mstmm_loops_gap_slope {
+struct mstmm_loops_meet_slope {
     const real *A_C;
     const real *x_C;
     const real *A_B;
     const real *x_B;
-    const real *R_e;
     const real *r_e;
     const real *Rc;
     const real *r;
@@ -1879,13 +1931,13 @@ struct mstmm_loops_gap_slope {
     real *d_r_A;
     real *d_d;
 };
-static inline int mstmm_loops_gap_slope_by(struct mstmm_loops_gap_slope to)
+static inline int mstmm_loops_meet_slope_by(struct mstmm_loops_meet_slope to)
 {
-    return mstmm_sweep_loops_gap_slope(
-        to.A_C, to.x_C, to.A_B, to.x_B, to.R_e, to.r_e, to.Rc, to.r, to.d_A_C, to.d_x_C, to.d_A_B,
+    return mstmm_sweep_loops_meet_slope(
+        to.A_C, to.x_C, to.A_B, to.x_B, to.r_e, to.Rc, to.r, to.d_A_C, to.d_x_C, to.d_A_B,
         to.d_x_B, to.d_Rc, to.d_r, to.d_R_C, to.d_r_A, to.d_d);
 }
-#define mstmm_loops_gap_slope(...) mstmm_loops_gap_slope_by((struct mstmm_loops_gap_slope){__VA_ARGS__})
+#define mstmm_loops_meet_slope(...) mstmm_loops_meet_slope_by((struct mstmm_loops_meet_slope){__VA_ARGS__})
 
 struct mstmm_loops_slip_slope {
     const real *R_C;
@@ -1933,29 +1985,40 @@ static inline int mstmm_loops_drift_slope_by(struct mstmm_loops_drift_slope to)
 }
 #define mstmm_loops_drift_slope(...) mstmm_loops_drift_slope_by((struct mstmm_loops_drift_slope){__VA_ARGS__})
 
-struct mstmm_loops_rows_slope {
-    const real *W;
+struct mstmm_loops_row_slope {
+    const real *w;
     const real *R_C;
     const real *r_e;
     const real *Rc;
     const real *r_A;
-    const real *relative;
-    const real *d_W;
+    const real *d_w;
     const real *d_R_C;
     const real *d_Rc;
     const real *d_r_A;
-    const real *d_relative;
     real *d_J_A;
     real *d_J_B;
+};
+static inline int mstmm_loops_row_slope_by(struct mstmm_loops_row_slope to)
+{
+    return mstmm_sweep_loops_row_slope(
+        to.w, to.R_C, to.r_e, to.Rc, to.r_A, to.d_w, to.d_R_C, to.d_Rc, to.d_r_A, to.d_J_A,
+        to.d_J_B);
+}
+#define mstmm_loops_row_slope(...) mstmm_loops_row_slope_by((struct mstmm_loops_row_slope){__VA_ARGS__})
+
+struct mstmm_loops_known_slope {
+    const real *W;
+    const real *relative;
+    const real *d_W;
+    const real *d_relative;
     real *d_l;
 };
-static inline int mstmm_loops_rows_slope_by(struct mstmm_loops_rows_slope to)
+static inline int mstmm_loops_known_slope_by(struct mstmm_loops_known_slope to)
 {
-    return mstmm_sweep_loops_rows_slope(
-        to.W, to.R_C, to.r_e, to.Rc, to.r_A, to.relative, to.d_W, to.d_R_C, to.d_Rc, to.d_r_A,
-        to.d_relative, to.d_J_A, to.d_J_B, to.d_l);
+    return mstmm_sweep_loops_known_slope(
+        to.W, to.relative, to.d_W, to.d_relative, to.d_l);
 }
-#define mstmm_loops_rows_slope(...) mstmm_loops_rows_slope_by((struct mstmm_loops_rows_slope){__VA_ARGS__})
+#define mstmm_loops_known_slope(...) mstmm_loops_known_slope_by((struct mstmm_loops_known_slope){__VA_ARGS__})
 
 struct mstmm_loops_act_slope {
     const real *J;
@@ -2874,6 +2937,22 @@ static inline int mstmm_generic_push_by(int speeds, struct mstmm_generic_push to
         to.Rc, to.r, to.H, to.G, to.e, to.tau, to.y, to.e_I);
 }
 #define mstmm_generic_push(speeds, ...) mstmm_generic_push_by(speeds, (struct mstmm_generic_push){__VA_ARGS__})
+
+struct mstmm_generic_push_on_ground {
+    const real *H;
+    const real *e;
+    const real *tau;
+    real *y;
+};
+typedef int mstmm_generic_push_on_ground_kernel(
+    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+extern mstmm_generic_push_on_ground_kernel *const mstmm_generic_push_on_ground_table[];
+static inline int mstmm_generic_push_on_ground_by(int speeds, struct mstmm_generic_push_on_ground to)
+{
+    return mstmm_generic_push_on_ground_table[speeds](
+        to.H, to.e, to.tau, to.y);
+}
+#define mstmm_generic_push_on_ground(speeds, ...) mstmm_generic_push_on_ground_by(speeds, (struct mstmm_generic_push_on_ground){__VA_ARGS__})
 
 struct mstmm_generic_answer {
     const real *Rc;

@@ -86,6 +86,8 @@ int mstmm_sweep_generic1_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic1_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic1_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic1_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic1_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -4693,6 +4695,49 @@ static const mstmm_port mstmm_sweep_generic1_pull_outputs[] = {
     {"y_0", 1, "", 1, 0},
 };
 
+/* load of a column felt by a hinge on the ground with 1 free speed
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6] motion subspace of the free coordinates
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[1] (N, N*m) the column's efforts on the free coordinates
+ * out y[1] (N, N*m) tau - H^T e
+ */
+int mstmm_sweep_generic1_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[1] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[2] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[3] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[4] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[5] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = tau[0] - t10;
+    y[0] = t11;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_push_on_ground_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_push_on_ground(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_push_on_ground_inputs[] = {
+    {"H", 6, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 1, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_push_on_ground_outputs[] = {
+    {"y", 1, "N, N*m", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -5868,6 +5913,18 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "push_on_ground",
+        .function = (void (*)(void))mstmm_sweep_generic1_push_on_ground,
+        .call = mstmm_sweep_generic1_push_on_ground_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_push_on_ground_inputs,
+        .outputs = mstmm_sweep_generic1_push_on_ground_outputs,
+        .ir_hash = "b7a365f8ab5b86af2acd372bae1b210020b8a2291f305ca7a26d2eaa0b996adc",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic1_forward_slope,
         .call = mstmm_sweep_generic1_forward_slope_call,
@@ -5933,7 +5990,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "4a669535f17121ced88c56f2b4f81abcadccdbc46640e5ad4924478edc9d0069",
+    .hash = "5450f6653664393c3993755ae48481263ab0d080fe9075f4603e753586e2dd52",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -5943,6 +6000,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 30,
+    .n_kernels = 31,
     .kernels = mstmm_sweep_generic1_kernels,
 };

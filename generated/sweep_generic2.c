@@ -86,6 +86,8 @@ int mstmm_sweep_generic2_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic2_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic2_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic2_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic2_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -6147,6 +6149,62 @@ static const mstmm_port mstmm_sweep_generic2_pull_outputs[] = {
     {"y_0", 2, "", 1, 0},
 };
 
+/* load of a column felt by a hinge on the ground with 2 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6][2] motion subspace of the free coordinates
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[2] (N, N*m) the column's efforts on the free coordinates
+ * out y[2] (N, N*m) tau - H^T e
+ */
+int mstmm_sweep_generic2_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[2] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[4] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[6] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[8] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[10] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = tau[0] - t10;
+    y[0] = t11;
+    const real t12 = H[1] * e[0];
+    const real t13 = H[3] * e[1];
+    const real t14 = t12 + t13;
+    const real t15 = H[5] * e[2];
+    const real t16 = t14 + t15;
+    const real t17 = H[7] * e[3];
+    const real t18 = t16 + t17;
+    const real t19 = H[9] * e[4];
+    const real t20 = t18 + t19;
+    const real t21 = H[11] * e[5];
+    const real t22 = t20 + t21;
+    const real t23 = tau[1] - t22;
+    y[1] = t23;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_push_on_ground_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_push_on_ground(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_push_on_ground_inputs[] = {
+    {"H", 12, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 2, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_push_on_ground_outputs[] = {
+    {"y", 2, "N, N*m", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -7854,6 +7912,18 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "push_on_ground",
+        .function = (void (*)(void))mstmm_sweep_generic2_push_on_ground,
+        .call = mstmm_sweep_generic2_push_on_ground_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic2_push_on_ground_inputs,
+        .outputs = mstmm_sweep_generic2_push_on_ground_outputs,
+        .ir_hash = "2ba8fb7a8f92b76a70a041cfd7774570ac91a31dd804ad37f8b9a9a956084493",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic2_forward_slope,
         .call = mstmm_sweep_generic2_forward_slope_call,
@@ -7919,7 +7989,7 @@ const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "1ac0fee33f3b9cb84c9a9002d5200398191141eb72440b1cb3b9a727afc3cdc4",
+    .hash = "5fb74ec496cf926997e87d36e770f5188c1e97278fc107491a5bd5e844a3ad3b",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -7929,6 +7999,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 30,
+    .n_kernels = 31,
     .kernels = mstmm_sweep_generic2_kernels,
 };

@@ -86,6 +86,8 @@ int mstmm_sweep_generic3_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic3_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic3_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic3_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic3_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -7813,6 +7815,75 @@ static const mstmm_port mstmm_sweep_generic3_pull_outputs[] = {
     {"y_0", 3, "", 1, 0},
 };
 
+/* load of a column felt by a hinge on the ground with 3 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6][3] motion subspace of the free coordinates
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[3] (N, N*m) the column's efforts on the free coordinates
+ * out y[3] (N, N*m) tau - H^T e
+ */
+int mstmm_sweep_generic3_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[3] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[6] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[9] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[12] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[15] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = tau[0] - t10;
+    y[0] = t11;
+    const real t12 = H[1] * e[0];
+    const real t13 = H[4] * e[1];
+    const real t14 = t12 + t13;
+    const real t15 = H[7] * e[2];
+    const real t16 = t14 + t15;
+    const real t17 = H[10] * e[3];
+    const real t18 = t16 + t17;
+    const real t19 = H[13] * e[4];
+    const real t20 = t18 + t19;
+    const real t21 = H[16] * e[5];
+    const real t22 = t20 + t21;
+    const real t23 = tau[1] - t22;
+    y[1] = t23;
+    const real t24 = H[2] * e[0];
+    const real t25 = H[5] * e[1];
+    const real t26 = t24 + t25;
+    const real t27 = H[8] * e[2];
+    const real t28 = t26 + t27;
+    const real t29 = H[11] * e[3];
+    const real t30 = t28 + t29;
+    const real t31 = H[14] * e[4];
+    const real t32 = t30 + t31;
+    const real t33 = H[17] * e[5];
+    const real t34 = t32 + t33;
+    const real t35 = tau[2] - t34;
+    y[2] = t35;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_push_on_ground_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_push_on_ground(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_push_on_ground_inputs[] = {
+    {"H", 18, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 3, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_push_on_ground_outputs[] = {
+    {"y", 3, "N, N*m", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -10081,6 +10152,18 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "push_on_ground",
+        .function = (void (*)(void))mstmm_sweep_generic3_push_on_ground,
+        .call = mstmm_sweep_generic3_push_on_ground_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic3_push_on_ground_inputs,
+        .outputs = mstmm_sweep_generic3_push_on_ground_outputs,
+        .ir_hash = "c46643698853759fee5f8748093553742aa12ebce61e84a2eb9035a296d4b81c",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic3_forward_slope,
         .call = mstmm_sweep_generic3_forward_slope_call,
@@ -10146,7 +10229,7 @@ const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "836c8da074c59f3329528c0aaaabd8ed437edd76c58bbbdea1c3c26dc15fff0a",
+    .hash = "ca947713ed845faa6b438ca42e1a0e5bec4b8a206b23eedceb33e99ad03f40b0",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -10156,6 +10239,6 @@ const mstmm_element mstmm_sweep_generic3 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 30,
+    .n_kernels = 31,
     .kernels = mstmm_sweep_generic3_kernels,
 };

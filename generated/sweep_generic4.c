@@ -86,6 +86,8 @@ int mstmm_sweep_generic4_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic4_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic4_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic4_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic4_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -9690,6 +9692,88 @@ static const mstmm_port mstmm_sweep_generic4_pull_outputs[] = {
     {"y_0", 4, "", 1, 0},
 };
 
+/* load of a column felt by a hinge on the ground with 4 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6][4] motion subspace of the free coordinates
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[4] (N, N*m) the column's efforts on the free coordinates
+ * out y[4] (N, N*m) tau - H^T e
+ */
+int mstmm_sweep_generic4_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[4] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[8] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[12] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[16] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[20] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = tau[0] - t10;
+    y[0] = t11;
+    const real t12 = H[1] * e[0];
+    const real t13 = H[5] * e[1];
+    const real t14 = t12 + t13;
+    const real t15 = H[9] * e[2];
+    const real t16 = t14 + t15;
+    const real t17 = H[13] * e[3];
+    const real t18 = t16 + t17;
+    const real t19 = H[17] * e[4];
+    const real t20 = t18 + t19;
+    const real t21 = H[21] * e[5];
+    const real t22 = t20 + t21;
+    const real t23 = tau[1] - t22;
+    y[1] = t23;
+    const real t24 = H[2] * e[0];
+    const real t25 = H[6] * e[1];
+    const real t26 = t24 + t25;
+    const real t27 = H[10] * e[2];
+    const real t28 = t26 + t27;
+    const real t29 = H[14] * e[3];
+    const real t30 = t28 + t29;
+    const real t31 = H[18] * e[4];
+    const real t32 = t30 + t31;
+    const real t33 = H[22] * e[5];
+    const real t34 = t32 + t33;
+    const real t35 = tau[2] - t34;
+    y[2] = t35;
+    const real t36 = H[3] * e[0];
+    const real t37 = H[7] * e[1];
+    const real t38 = t36 + t37;
+    const real t39 = H[11] * e[2];
+    const real t40 = t38 + t39;
+    const real t41 = H[15] * e[3];
+    const real t42 = t40 + t41;
+    const real t43 = H[19] * e[4];
+    const real t44 = t42 + t43;
+    const real t45 = H[23] * e[5];
+    const real t46 = t44 + t45;
+    const real t47 = tau[3] - t46;
+    y[3] = t47;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_push_on_ground_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_push_on_ground(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_push_on_ground_inputs[] = {
+    {"H", 24, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 4, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_push_on_ground_outputs[] = {
+    {"y", 4, "N, N*m", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -12558,6 +12642,18 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "push_on_ground",
+        .function = (void (*)(void))mstmm_sweep_generic4_push_on_ground,
+        .call = mstmm_sweep_generic4_push_on_ground_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic4_push_on_ground_inputs,
+        .outputs = mstmm_sweep_generic4_push_on_ground_outputs,
+        .ir_hash = "9de308c3bd26cbbfb3da999a62fcf4be7a34f016fc127414e6466fbe5fd6f95b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic4_forward_slope,
         .call = mstmm_sweep_generic4_forward_slope_call,
@@ -12623,7 +12719,7 @@ const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "e8472057245a39d979ed37810f66620e261d53672e5d99b71fe68ed839e15386",
+    .hash = "e9cd7aee9eae6924b99532c068af195f52f9442744fb507d8cf6f2957994f804",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -12633,6 +12729,6 @@ const mstmm_element mstmm_sweep_generic4 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 30,
+    .n_kernels = 31,
     .kernels = mstmm_sweep_generic4_kernels,
 };

@@ -86,6 +86,8 @@ int mstmm_sweep_generic5_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic5_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic5_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic5_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic5_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
     const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
     const real *restrict w, const real *restrict c, const real *restrict s,
@@ -11822,6 +11824,101 @@ static const mstmm_port mstmm_sweep_generic5_pull_outputs[] = {
     {"y_0", 5, "", 1, 0},
 };
 
+/* load of a column felt by a hinge on the ground with 5 free speeds
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  H[6][5] motion subspace of the free coordinates
+ * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  tau[5] (N, N*m) the column's efforts on the free coordinates
+ * out y[5] (N, N*m) tau - H^T e
+ */
+int mstmm_sweep_generic5_push_on_ground(const real *restrict H, const real *restrict e,
+    const real *restrict tau, real *restrict y)
+{
+    const real t0 = H[0] * e[0];
+    const real t1 = H[5] * e[1];
+    const real t2 = t0 + t1;
+    const real t3 = H[10] * e[2];
+    const real t4 = t2 + t3;
+    const real t5 = H[15] * e[3];
+    const real t6 = t4 + t5;
+    const real t7 = H[20] * e[4];
+    const real t8 = t6 + t7;
+    const real t9 = H[25] * e[5];
+    const real t10 = t8 + t9;
+    const real t11 = tau[0] - t10;
+    y[0] = t11;
+    const real t12 = H[1] * e[0];
+    const real t13 = H[6] * e[1];
+    const real t14 = t12 + t13;
+    const real t15 = H[11] * e[2];
+    const real t16 = t14 + t15;
+    const real t17 = H[16] * e[3];
+    const real t18 = t16 + t17;
+    const real t19 = H[21] * e[4];
+    const real t20 = t18 + t19;
+    const real t21 = H[26] * e[5];
+    const real t22 = t20 + t21;
+    const real t23 = tau[1] - t22;
+    y[1] = t23;
+    const real t24 = H[2] * e[0];
+    const real t25 = H[7] * e[1];
+    const real t26 = t24 + t25;
+    const real t27 = H[12] * e[2];
+    const real t28 = t26 + t27;
+    const real t29 = H[17] * e[3];
+    const real t30 = t28 + t29;
+    const real t31 = H[22] * e[4];
+    const real t32 = t30 + t31;
+    const real t33 = H[27] * e[5];
+    const real t34 = t32 + t33;
+    const real t35 = tau[2] - t34;
+    y[2] = t35;
+    const real t36 = H[3] * e[0];
+    const real t37 = H[8] * e[1];
+    const real t38 = t36 + t37;
+    const real t39 = H[13] * e[2];
+    const real t40 = t38 + t39;
+    const real t41 = H[18] * e[3];
+    const real t42 = t40 + t41;
+    const real t43 = H[23] * e[4];
+    const real t44 = t42 + t43;
+    const real t45 = H[28] * e[5];
+    const real t46 = t44 + t45;
+    const real t47 = tau[3] - t46;
+    y[3] = t47;
+    const real t48 = H[4] * e[0];
+    const real t49 = H[9] * e[1];
+    const real t50 = t48 + t49;
+    const real t51 = H[14] * e[2];
+    const real t52 = t50 + t51;
+    const real t53 = H[19] * e[3];
+    const real t54 = t52 + t53;
+    const real t55 = H[24] * e[4];
+    const real t56 = t54 + t55;
+    const real t57 = H[29] * e[5];
+    const real t58 = t56 + t57;
+    const real t59 = tau[4] - t58;
+    y[4] = t59;
+    return 0;
+}
+
+static int mstmm_sweep_generic5_push_on_ground_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic5_push_on_ground(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic5_push_on_ground_inputs[] = {
+    {"H", 30, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0},
+    {"tau", 5, "N, N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic5_push_on_ground_outputs[] = {
+    {"y", 5, "N, N*m", 0, 0},
+};
+
 /* forward and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -15359,6 +15456,18 @@ static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "push_on_ground",
+        .function = (void (*)(void))mstmm_sweep_generic5_push_on_ground,
+        .call = mstmm_sweep_generic5_push_on_ground_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic5_push_on_ground_inputs,
+        .outputs = mstmm_sweep_generic5_push_on_ground_outputs,
+        .ir_hash = "99f75a3fa0f57b3b45032a0960ac1a428fd6453f40b6b4ae83a602b25019d289",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "forward_slope",
         .function = (void (*)(void))mstmm_sweep_generic5_forward_slope,
         .call = mstmm_sweep_generic5_forward_slope_call,
@@ -15424,7 +15533,7 @@ const mstmm_element mstmm_sweep_generic5 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic5",
-    .hash = "a5ed8b346ed0faefab116021107d95032adab6d74c3e5a7e8e683d8200f1e00e",
+    .hash = "f23d2cb3e46c26882df9528d67cd483645b8a595546e0d4ed0d00386ac3f9ae4",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -15434,6 +15543,6 @@ const mstmm_element mstmm_sweep_generic5 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 30,
+    .n_kernels = 31,
     .kernels = mstmm_sweep_generic5_kernels,
 };

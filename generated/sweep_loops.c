@@ -8,31 +8,40 @@
 #include "mstmm.h"
 
 extern const mstmm_element mstmm_sweep_loops;
-int mstmm_sweep_loops_gap(const real *restrict A_C, const real *restrict x_C,
-    const real *restrict A_B, const real *restrict x_B, const real *restrict R_e,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r, real *restrict R_C,
-    real *restrict r_A, real *restrict d, real *restrict gap);
+int mstmm_sweep_loops_meet(const real *restrict A_C, const real *restrict x_C,
+    const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
+    const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
+    real *restrict d);
+int mstmm_sweep_loops_gap(const real *restrict R_e, const real *restrict R_C,
+    const real *restrict d, real *restrict gap);
 int mstmm_sweep_loops_slip(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict v_C, const real *restrict w_C,
     const real *restrict v_B, const real *restrict w_B, real *restrict slip);
 int mstmm_sweep_loops_drift(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict slip, const real *restrict motion_C,
     const real *restrict motion_B, real *restrict drift);
-int mstmm_sweep_loops_rows(const real *restrict W, const real *restrict R_C,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
-    const real *restrict relative, real *restrict J_A, real *restrict J_B, real *restrict l);
+int mstmm_sweep_loops_row(const real *restrict w, const real *restrict R_C,
+    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
+    real *restrict J_B);
+int mstmm_sweep_loops_known(const real *restrict W, const real *restrict relative, real *restrict l);
 int mstmm_sweep_loops_told(const real *restrict J_A, const real *restrict J_B,
     const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
     real *restrict c);
 int mstmm_sweep_loops_act(const real *restrict J, const real *restrict tau, real *restrict e);
-int mstmm_sweep_loops_close(const real *restrict K, const real *restrict l, const real *restrict L,
-    const real *restrict floor_, real *restrict inverse, real *restrict S, real *restrict e);
+int mstmm_sweep_loops_settle(const real *restrict L, const real *restrict floor_,
+    real *restrict inverse);
+int mstmm_sweep_loops_close(const real *restrict inverse, const real *restrict K,
+    const real *restrict l, real *restrict S, real *restrict e);
 int mstmm_sweep_loops_shed(const real *restrict inverse, const real *restrict K,
-    const real *restrict l, const real *restrict L_p, real *restrict K_p, real *restrict l_p);
+    const real *restrict L_p, real *restrict K_p);
+int mstmm_sweep_loops_shed_known(const real *restrict inverse, const real *restrict l,
+    const real *restrict L_p, real *restrict l_p);
 int mstmm_sweep_loops_shed_pair(const real *restrict inverse, const real *restrict L_p,
     const real *restrict L_q, real *restrict L_pq);
-int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restrict K,
-    const real *restrict l, const real *restrict delta, real *restrict x);
+int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restrict l,
+    real *restrict x);
+int mstmm_sweep_loops_multiplier_more(const real *restrict inverse, const real *restrict K,
+    const real *restrict delta, real *restrict x);
 int mstmm_sweep_loops_multiplier_less(const real *restrict inverse, const real *restrict L_p,
     const real *restrict x_p, real *restrict x);
 int mstmm_sweep_loops_yielded(const real *restrict softness, const real *restrict s,
@@ -48,12 +57,12 @@ int mstmm_sweep_loops_rolling(const real *restrict p, const real *restrict R_C,
     const real *restrict d, real *restrict W, real *restrict gap);
 int mstmm_sweep_loops_rolling_drift(const real *restrict p, const real *restrict R_C,
     const real *restrict slip, real *restrict drift);
-int mstmm_sweep_loops_gap_slope(const real *restrict A_C, const real *restrict x_C,
-    const real *restrict A_B, const real *restrict x_B, const real *restrict R_e,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r,
-    const real *restrict d_A_C, const real *restrict d_x_C, const real *restrict d_A_B,
-    const real *restrict d_x_B, const real *restrict d_Rc, const real *restrict d_r,
-    real *restrict d_R_C, real *restrict d_r_A, real *restrict d_d);
+int mstmm_sweep_loops_meet_slope(const real *restrict A_C, const real *restrict x_C,
+    const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
+    const real *restrict Rc, const real *restrict r, const real *restrict d_A_C,
+    const real *restrict d_x_C, const real *restrict d_A_B, const real *restrict d_x_B,
+    const real *restrict d_Rc, const real *restrict d_r, real *restrict d_R_C, real *restrict d_r_A,
+    real *restrict d_d);
 int mstmm_sweep_loops_slip_slope(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict v_C, const real *restrict w_C,
     const real *restrict v_B, const real *restrict w_B, const real *restrict d_R_C,
@@ -64,11 +73,12 @@ int mstmm_sweep_loops_drift_slope(const real *restrict R_C, const real *restrict
     const real *restrict motion_B, const real *restrict d_R_C, const real *restrict d_d,
     const real *restrict d_slip, const real *restrict d_motion_C, const real *restrict d_motion_B,
     real *restrict d_drift);
-int mstmm_sweep_loops_rows_slope(const real *restrict W, const real *restrict R_C,
+int mstmm_sweep_loops_row_slope(const real *restrict w, const real *restrict R_C,
     const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
-    const real *restrict relative, const real *restrict d_W, const real *restrict d_R_C,
-    const real *restrict d_Rc, const real *restrict d_r_A, const real *restrict d_relative,
-    real *restrict d_J_A, real *restrict d_J_B, real *restrict d_l);
+    const real *restrict d_w, const real *restrict d_R_C, const real *restrict d_Rc,
+    const real *restrict d_r_A, real *restrict d_J_A, real *restrict d_J_B);
+int mstmm_sweep_loops_known_slope(const real *restrict W, const real *restrict relative,
+    const real *restrict d_W, const real *restrict d_relative, real *restrict d_l);
 int mstmm_sweep_loops_act_slope(const real *restrict J, const real *restrict tau,
     const real *restrict d_J, const real *restrict d_tau, real *restrict d_e);
 int mstmm_sweep_loops_loaded_slope(const real *restrict K, const real *restrict x,
@@ -86,26 +96,24 @@ int mstmm_sweep_loops_rolling_drift_slope(const real *restrict p, const real *re
     const real *restrict slip, const real *restrict d_R_C, const real *restrict d_slip,
     real *restrict d_drift);
 
-/* gap of a hinge that closes a loop
+/* the two sides of a hinge that closes a loop
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  A_C[3][3] rotation, axes of C to inertial axes
  * in  x_C[3] (m) origin of C, inertial axes
  * in  A_B[3][3] rotation, axes of B to inertial axes
  * in  x_B[3] (m) P of B, inertial axes
- * in  R_e[3][3] rotation, axes of C to axes of B where the loop is closed
  * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * out R_C[3][3] rotation, axes of C to axes of B
  * out r_A[3] (m) the end of B from P of A, axes of A
  * out d[3] (m) that end from the origin of C, axes of C
- * out gap[6] (m, rad) gap, axes of C
  */
-int mstmm_sweep_loops_gap(const real *restrict A_C, const real *restrict x_C,
-    const real *restrict A_B, const real *restrict x_B, const real *restrict R_e,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r, real *restrict R_C,
-    real *restrict r_A, real *restrict d, real *restrict gap)
+int mstmm_sweep_loops_meet(const real *restrict A_C, const real *restrict x_C,
+    const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
+    const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
+    real *restrict d)
 {
     const real t0 = A_C[0] * A_B[0];
     const real t1 = A_C[3] * A_B[3];
@@ -221,93 +229,121 @@ int mstmm_sweep_loops_gap(const real *restrict A_C, const real *restrict x_C,
     d[0] = t70;
     d[1] = t76;
     d[2] = t83;
-    gap[0] = t70;
-    gap[1] = t76;
-    gap[2] = t83;
-    const real t99 = R_e[1] * t14;
-    const real t100 = R_e[4] * t29;
-    const real t101 = t99 + t100;
-    const real t102 = R_e[7] * t44;
-    const real t103 = t101 + t102;
-    const real t104 = R_e[2] * t9;
-    const real t105 = R_e[5] * t24;
-    const real t106 = t104 + t105;
-    const real t107 = R_e[8] * t39;
-    const real t108 = t106 + t107;
-    const real t109 = t103 - t108;
-    const real t110 = R_e[2] * t14;
-    const real t111 = R_e[5] * t29;
-    const real t112 = t110 + t111;
-    const real t113 = R_e[8] * t44;
-    const real t114 = t112 + t113;
-    const real t115 = R_e[1] * t9;
-    const real t116 = R_e[4] * t24;
-    const real t117 = t115 + t116;
-    const real t118 = R_e[7] * t39;
-    const real t119 = t117 + t118;
-    const real t120 = R_e[0] * t4;
-    const real t121 = R_e[3] * t19;
-    const real t122 = t120 + t121;
-    const real t123 = R_e[6] * t34;
-    const real t124 = t122 + t123;
-    const real t125 = 1.0 + t124;
-    const real t126 = t119 + t125;
-    const real t127 = t114 + t126;
-    const real t128 = (((real)1 / (real)1000000000000) < t127 || isnan(t127)) ? t127 : ((real)1 / (real)1000000000000);
-    const real t129 = sqrt(t128);
-    const real t130 = 1.0 / t129;
-    const real t131 = t109 * t130;
-    gap[3] = t131;
-    const real t132 = R_e[2] * t4;
-    const real t133 = R_e[5] * t19;
-    const real t134 = t132 + t133;
-    const real t135 = R_e[8] * t34;
-    const real t136 = t134 + t135;
-    const real t137 = R_e[0] * t14;
-    const real t138 = R_e[3] * t29;
-    const real t139 = t137 + t138;
-    const real t140 = R_e[6] * t44;
-    const real t141 = t139 + t140;
-    const real t142 = t136 - t141;
-    const real t143 = t130 * t142;
-    gap[4] = t143;
-    const real t144 = R_e[0] * t9;
-    const real t145 = R_e[3] * t24;
-    const real t146 = t144 + t145;
-    const real t147 = R_e[6] * t39;
-    const real t148 = t146 + t147;
-    const real t149 = R_e[1] * t4;
-    const real t150 = R_e[4] * t19;
-    const real t151 = t149 + t150;
-    const real t152 = R_e[7] * t34;
-    const real t153 = t151 + t152;
-    const real t154 = t148 - t153;
-    const real t155 = t130 * t154;
-    gap[5] = t155;
+    return 0;
+}
+
+static int mstmm_sweep_loops_meet_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_meet(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
+}
+
+static const mstmm_port mstmm_sweep_loops_meet_inputs[] = {
+    {"A_C", 9, "", 0, 0},
+    {"x_C", 3, "m", 0, 0},
+    {"A_B", 9, "", 0, 0},
+    {"x_B", 3, "m", 0, 0},
+    {"r_e", 3, "m", 0, 0},
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_meet_outputs[] = {
+    {"R_C", 9, "", 0, 0},
+    {"r_A", 3, "m", 0, 0},
+    {"d", 3, "m", 0, 0},
+};
+
+/* gap of a hinge that closes a loop
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  R_e[3][3] rotation, axes of C to axes of B where the loop is closed
+ * in  R_C[3][3] rotation, axes of C to axes of B
+ * in  d[3] (m) that end from the origin of C, axes of C
+ * out gap[6] (m, rad) gap, axes of C
+ */
+int mstmm_sweep_loops_gap(const real *restrict R_e, const real *restrict R_C,
+    const real *restrict d, real *restrict gap)
+{
+    gap[0] = d[0];
+    gap[1] = d[1];
+    gap[2] = d[2];
+    const real t0 = R_e[1] * R_C[2];
+    const real t1 = R_e[4] * R_C[5];
+    const real t2 = t0 + t1;
+    const real t3 = R_e[7] * R_C[8];
+    const real t4 = t2 + t3;
+    const real t5 = R_e[2] * R_C[1];
+    const real t6 = R_e[5] * R_C[4];
+    const real t7 = t5 + t6;
+    const real t8 = R_e[8] * R_C[7];
+    const real t9 = t7 + t8;
+    const real t10 = t4 - t9;
+    const real t11 = R_e[2] * R_C[2];
+    const real t12 = R_e[5] * R_C[5];
+    const real t13 = t11 + t12;
+    const real t14 = R_e[8] * R_C[8];
+    const real t15 = t13 + t14;
+    const real t16 = R_e[1] * R_C[1];
+    const real t17 = R_e[4] * R_C[4];
+    const real t18 = t16 + t17;
+    const real t19 = R_e[7] * R_C[7];
+    const real t20 = t18 + t19;
+    const real t21 = R_e[0] * R_C[0];
+    const real t22 = R_e[3] * R_C[3];
+    const real t23 = t21 + t22;
+    const real t24 = R_e[6] * R_C[6];
+    const real t25 = t23 + t24;
+    const real t26 = t25 + 1.0;
+    const real t27 = t20 + t26;
+    const real t28 = t15 + t27;
+    const real t29 = (((real)1 / (real)1000000000000) < t28 || isnan(t28)) ? t28 : ((real)1 / (real)1000000000000);
+    const real t30 = sqrt(t29);
+    const real t31 = 1.0 / t30;
+    const real t32 = t10 * t31;
+    gap[3] = t32;
+    const real t33 = R_e[2] * R_C[0];
+    const real t34 = R_e[5] * R_C[3];
+    const real t35 = t33 + t34;
+    const real t36 = R_e[8] * R_C[6];
+    const real t37 = t35 + t36;
+    const real t38 = R_e[0] * R_C[2];
+    const real t39 = R_e[3] * R_C[5];
+    const real t40 = t38 + t39;
+    const real t41 = R_e[6] * R_C[8];
+    const real t42 = t40 + t41;
+    const real t43 = t37 - t42;
+    const real t44 = t31 * t43;
+    gap[4] = t44;
+    const real t45 = R_e[0] * R_C[1];
+    const real t46 = R_e[3] * R_C[4];
+    const real t47 = t45 + t46;
+    const real t48 = R_e[6] * R_C[7];
+    const real t49 = t47 + t48;
+    const real t50 = R_e[1] * R_C[0];
+    const real t51 = R_e[4] * R_C[3];
+    const real t52 = t50 + t51;
+    const real t53 = R_e[7] * R_C[6];
+    const real t54 = t52 + t53;
+    const real t55 = t49 - t54;
+    const real t56 = t31 * t55;
+    gap[5] = t56;
     return 0;
 }
 
 static int mstmm_sweep_loops_gap_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_gap(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
+    return mstmm_sweep_loops_gap(in[0], in[1], in[2], out[0]);
 }
 
 static const mstmm_port mstmm_sweep_loops_gap_inputs[] = {
-    {"A_C", 9, "", 0, 0},
-    {"x_C", 3, "m", 0, 0},
-    {"A_B", 9, "", 0, 0},
-    {"x_B", 3, "m", 0, 0},
     {"R_e", 9, "", 0, 0},
-    {"r_e", 3, "m", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
+    {"R_C", 9, "", 0, 0},
+    {"d", 3, "m", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_loops_gap_outputs[] = {
-    {"R_C", 9, "", 0, 0},
-    {"r_A", 3, "m", 0, 0},
-    {"d", 3, "m", 0, 0},
     {"gap", 6, "m, rad", 0, 0},
 };
 
@@ -603,40 +639,38 @@ static const mstmm_port mstmm_sweep_loops_drift_outputs[] = {
     {"drift", 6, "", 0, 0},
 };
 
-/* rows of a hinge that closes a loop
+/* row of a direction of a hinge that closes a loop
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  W[6][6] rows: H^+, then what the hinge holds
+ * in  w[6] the direction: a row of W
  * in  R_C[3][3] rotation, axes of C to axes of B
  * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r_A[3] (m) the end of B from P of A, axes of A
- * in  relative[6] motion of the end of B relative to C
- * out J_A[6][6] rows by the acceleration of A, at its P
- * out J_B[6][6] rows by the acceleration of B, at its P
- * out l[6] rows of what is known
+ * out J_A[6] row by the acceleration of A, at its P
+ * out J_B[6] row by the acceleration of B, at its P
  */
-int mstmm_sweep_loops_rows(const real *restrict W, const real *restrict R_C,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
-    const real *restrict relative, real *restrict J_A, real *restrict J_B, real *restrict l)
+int mstmm_sweep_loops_row(const real *restrict w, const real *restrict R_C,
+    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
+    real *restrict J_B)
 {
-    const real t0 = W[2] * Rc[2];
-    const real t1 = W[0] * Rc[0];
-    const real t2 = W[1] * Rc[1];
+    const real t0 = w[2] * Rc[2];
+    const real t1 = w[0] * Rc[0];
+    const real t2 = w[1] * Rc[1];
     const real t3 = t1 + t2;
     const real t4 = t0 + t3;
     const real t5 = -t4;
     J_A[0] = t5;
-    const real t6 = W[2] * Rc[5];
-    const real t7 = W[0] * Rc[3];
-    const real t8 = W[1] * Rc[4];
+    const real t6 = w[2] * Rc[5];
+    const real t7 = w[0] * Rc[3];
+    const real t8 = w[1] * Rc[4];
     const real t9 = t7 + t8;
     const real t10 = t6 + t9;
     const real t11 = -t10;
     J_A[1] = t11;
-    const real t12 = W[2] * Rc[8];
-    const real t13 = W[0] * Rc[6];
-    const real t14 = W[1] * Rc[7];
+    const real t12 = w[2] * Rc[8];
+    const real t13 = w[0] * Rc[6];
+    const real t14 = w[1] * Rc[7];
     const real t15 = t13 + t14;
     const real t16 = t12 + t15;
     const real t17 = -t16;
@@ -644,681 +678,211 @@ int mstmm_sweep_loops_rows(const real *restrict W, const real *restrict R_C,
     const real t18 = r_A[2] * t10;
     const real t19 = r_A[1] * t16;
     const real t20 = t18 - t19;
-    const real t21 = W[3] * Rc[0];
+    const real t21 = w[3] * Rc[0];
     const real t22 = t20 - t21;
-    const real t23 = W[4] * Rc[1];
+    const real t23 = w[4] * Rc[1];
     const real t24 = t22 - t23;
-    const real t25 = W[5] * Rc[2];
+    const real t25 = w[5] * Rc[2];
     const real t26 = t24 - t25;
     J_A[3] = t26;
     const real t27 = r_A[0] * t16;
     const real t28 = r_A[2] * t4;
     const real t29 = t27 - t28;
-    const real t30 = W[3] * Rc[3];
+    const real t30 = w[3] * Rc[3];
     const real t31 = t29 - t30;
-    const real t32 = W[4] * Rc[4];
+    const real t32 = w[4] * Rc[4];
     const real t33 = t31 - t32;
-    const real t34 = W[5] * Rc[5];
+    const real t34 = w[5] * Rc[5];
     const real t35 = t33 - t34;
     J_A[4] = t35;
     const real t36 = r_A[1] * t4;
     const real t37 = r_A[0] * t10;
     const real t38 = t36 - t37;
-    const real t39 = W[3] * Rc[6];
+    const real t39 = w[3] * Rc[6];
     const real t40 = t38 - t39;
-    const real t41 = W[4] * Rc[7];
+    const real t41 = w[4] * Rc[7];
     const real t42 = t40 - t41;
-    const real t43 = W[5] * Rc[8];
+    const real t43 = w[5] * Rc[8];
     const real t44 = t42 - t43;
     J_A[5] = t44;
-    const real t45 = W[8] * Rc[2];
-    const real t46 = W[6] * Rc[0];
-    const real t47 = W[7] * Rc[1];
+    const real t45 = w[2] * R_C[2];
+    const real t46 = w[0] * R_C[0];
+    const real t47 = w[1] * R_C[1];
     const real t48 = t46 + t47;
     const real t49 = t45 + t48;
-    const real t50 = -t49;
-    J_A[6] = t50;
-    const real t51 = W[8] * Rc[5];
-    const real t52 = W[6] * Rc[3];
-    const real t53 = W[7] * Rc[4];
-    const real t54 = t52 + t53;
-    const real t55 = t51 + t54;
-    const real t56 = -t55;
-    J_A[7] = t56;
-    const real t57 = W[8] * Rc[8];
-    const real t58 = W[6] * Rc[6];
-    const real t59 = W[7] * Rc[7];
-    const real t60 = t58 + t59;
-    const real t61 = t57 + t60;
-    const real t62 = -t61;
-    J_A[8] = t62;
-    const real t63 = r_A[2] * t55;
-    const real t64 = r_A[1] * t61;
+    J_B[0] = t49;
+    const real t50 = w[2] * R_C[5];
+    const real t51 = w[0] * R_C[3];
+    const real t52 = w[1] * R_C[4];
+    const real t53 = t51 + t52;
+    const real t54 = t50 + t53;
+    J_B[1] = t54;
+    const real t55 = w[2] * R_C[8];
+    const real t56 = w[0] * R_C[6];
+    const real t57 = w[1] * R_C[7];
+    const real t58 = t56 + t57;
+    const real t59 = t55 + t58;
+    J_B[2] = t59;
+    const real t60 = w[5] * R_C[2];
+    const real t61 = w[4] * R_C[1];
+    const real t62 = w[3] * R_C[0];
+    const real t63 = r_e[1] * t59;
+    const real t64 = r_e[2] * t54;
     const real t65 = t63 - t64;
-    const real t66 = W[9] * Rc[0];
-    const real t67 = t65 - t66;
-    const real t68 = W[10] * Rc[1];
-    const real t69 = t67 - t68;
-    const real t70 = W[11] * Rc[2];
-    const real t71 = t69 - t70;
-    J_A[9] = t71;
-    const real t72 = r_A[0] * t61;
-    const real t73 = r_A[2] * t49;
+    const real t66 = t62 + t65;
+    const real t67 = t61 + t66;
+    const real t68 = t60 + t67;
+    J_B[3] = t68;
+    const real t69 = w[5] * R_C[5];
+    const real t70 = w[4] * R_C[4];
+    const real t71 = w[3] * R_C[3];
+    const real t72 = r_e[2] * t49;
+    const real t73 = r_e[0] * t59;
     const real t74 = t72 - t73;
-    const real t75 = W[9] * Rc[3];
-    const real t76 = t74 - t75;
-    const real t77 = W[10] * Rc[4];
-    const real t78 = t76 - t77;
-    const real t79 = W[11] * Rc[5];
-    const real t80 = t78 - t79;
-    J_A[10] = t80;
-    const real t81 = r_A[1] * t49;
-    const real t82 = r_A[0] * t55;
+    const real t75 = t71 + t74;
+    const real t76 = t70 + t75;
+    const real t77 = t69 + t76;
+    J_B[4] = t77;
+    const real t78 = w[5] * R_C[8];
+    const real t79 = w[4] * R_C[7];
+    const real t80 = w[3] * R_C[6];
+    const real t81 = r_e[0] * t54;
+    const real t82 = r_e[1] * t49;
     const real t83 = t81 - t82;
-    const real t84 = W[9] * Rc[6];
-    const real t85 = t83 - t84;
-    const real t86 = W[10] * Rc[7];
-    const real t87 = t85 - t86;
-    const real t88 = W[11] * Rc[8];
-    const real t89 = t87 - t88;
-    J_A[11] = t89;
-    const real t90 = W[14] * Rc[2];
-    const real t91 = W[12] * Rc[0];
-    const real t92 = W[13] * Rc[1];
-    const real t93 = t91 + t92;
-    const real t94 = t90 + t93;
-    const real t95 = -t94;
-    J_A[12] = t95;
-    const real t96 = W[14] * Rc[5];
-    const real t97 = W[12] * Rc[3];
-    const real t98 = W[13] * Rc[4];
-    const real t99 = t97 + t98;
-    const real t100 = t96 + t99;
-    const real t101 = -t100;
-    J_A[13] = t101;
-    const real t102 = W[14] * Rc[8];
-    const real t103 = W[12] * Rc[6];
-    const real t104 = W[13] * Rc[7];
-    const real t105 = t103 + t104;
-    const real t106 = t102 + t105;
-    const real t107 = -t106;
-    J_A[14] = t107;
-    const real t108 = r_A[2] * t100;
-    const real t109 = r_A[1] * t106;
-    const real t110 = t108 - t109;
-    const real t111 = W[15] * Rc[0];
-    const real t112 = t110 - t111;
-    const real t113 = W[16] * Rc[1];
-    const real t114 = t112 - t113;
-    const real t115 = W[17] * Rc[2];
-    const real t116 = t114 - t115;
-    J_A[15] = t116;
-    const real t117 = r_A[0] * t106;
-    const real t118 = r_A[2] * t94;
-    const real t119 = t117 - t118;
-    const real t120 = W[15] * Rc[3];
-    const real t121 = t119 - t120;
-    const real t122 = W[16] * Rc[4];
-    const real t123 = t121 - t122;
-    const real t124 = W[17] * Rc[5];
-    const real t125 = t123 - t124;
-    J_A[16] = t125;
-    const real t126 = r_A[1] * t94;
-    const real t127 = r_A[0] * t100;
-    const real t128 = t126 - t127;
-    const real t129 = W[15] * Rc[6];
-    const real t130 = t128 - t129;
-    const real t131 = W[16] * Rc[7];
-    const real t132 = t130 - t131;
-    const real t133 = W[17] * Rc[8];
-    const real t134 = t132 - t133;
-    J_A[17] = t134;
-    const real t135 = W[20] * Rc[2];
-    const real t136 = W[18] * Rc[0];
-    const real t137 = W[19] * Rc[1];
-    const real t138 = t136 + t137;
-    const real t139 = t135 + t138;
-    const real t140 = -t139;
-    J_A[18] = t140;
-    const real t141 = W[20] * Rc[5];
-    const real t142 = W[18] * Rc[3];
-    const real t143 = W[19] * Rc[4];
-    const real t144 = t142 + t143;
-    const real t145 = t141 + t144;
-    const real t146 = -t145;
-    J_A[19] = t146;
-    const real t147 = W[20] * Rc[8];
-    const real t148 = W[18] * Rc[6];
-    const real t149 = W[19] * Rc[7];
-    const real t150 = t148 + t149;
-    const real t151 = t147 + t150;
-    const real t152 = -t151;
-    J_A[20] = t152;
-    const real t153 = r_A[2] * t145;
-    const real t154 = r_A[1] * t151;
-    const real t155 = t153 - t154;
-    const real t156 = W[21] * Rc[0];
-    const real t157 = t155 - t156;
-    const real t158 = W[22] * Rc[1];
-    const real t159 = t157 - t158;
-    const real t160 = W[23] * Rc[2];
-    const real t161 = t159 - t160;
-    J_A[21] = t161;
-    const real t162 = r_A[0] * t151;
-    const real t163 = r_A[2] * t139;
-    const real t164 = t162 - t163;
-    const real t165 = W[21] * Rc[3];
-    const real t166 = t164 - t165;
-    const real t167 = W[22] * Rc[4];
-    const real t168 = t166 - t167;
-    const real t169 = W[23] * Rc[5];
-    const real t170 = t168 - t169;
-    J_A[22] = t170;
-    const real t171 = r_A[1] * t139;
-    const real t172 = r_A[0] * t145;
-    const real t173 = t171 - t172;
-    const real t174 = W[21] * Rc[6];
-    const real t175 = t173 - t174;
-    const real t176 = W[22] * Rc[7];
-    const real t177 = t175 - t176;
-    const real t178 = W[23] * Rc[8];
-    const real t179 = t177 - t178;
-    J_A[23] = t179;
-    const real t180 = W[26] * Rc[2];
-    const real t181 = W[24] * Rc[0];
-    const real t182 = W[25] * Rc[1];
-    const real t183 = t181 + t182;
-    const real t184 = t180 + t183;
-    const real t185 = -t184;
-    J_A[24] = t185;
-    const real t186 = W[26] * Rc[5];
-    const real t187 = W[24] * Rc[3];
-    const real t188 = W[25] * Rc[4];
-    const real t189 = t187 + t188;
-    const real t190 = t186 + t189;
-    const real t191 = -t190;
-    J_A[25] = t191;
-    const real t192 = W[26] * Rc[8];
-    const real t193 = W[24] * Rc[6];
-    const real t194 = W[25] * Rc[7];
-    const real t195 = t193 + t194;
-    const real t196 = t192 + t195;
-    const real t197 = -t196;
-    J_A[26] = t197;
-    const real t198 = r_A[2] * t190;
-    const real t199 = r_A[1] * t196;
-    const real t200 = t198 - t199;
-    const real t201 = W[27] * Rc[0];
-    const real t202 = t200 - t201;
-    const real t203 = W[28] * Rc[1];
-    const real t204 = t202 - t203;
-    const real t205 = W[29] * Rc[2];
-    const real t206 = t204 - t205;
-    J_A[27] = t206;
-    const real t207 = r_A[0] * t196;
-    const real t208 = r_A[2] * t184;
-    const real t209 = t207 - t208;
-    const real t210 = W[27] * Rc[3];
-    const real t211 = t209 - t210;
-    const real t212 = W[28] * Rc[4];
-    const real t213 = t211 - t212;
-    const real t214 = W[29] * Rc[5];
-    const real t215 = t213 - t214;
-    J_A[28] = t215;
-    const real t216 = r_A[1] * t184;
-    const real t217 = r_A[0] * t190;
-    const real t218 = t216 - t217;
-    const real t219 = W[27] * Rc[6];
-    const real t220 = t218 - t219;
-    const real t221 = W[28] * Rc[7];
-    const real t222 = t220 - t221;
-    const real t223 = W[29] * Rc[8];
-    const real t224 = t222 - t223;
-    J_A[29] = t224;
-    const real t225 = W[32] * Rc[2];
-    const real t226 = W[30] * Rc[0];
-    const real t227 = W[31] * Rc[1];
-    const real t228 = t226 + t227;
-    const real t229 = t225 + t228;
-    const real t230 = -t229;
-    J_A[30] = t230;
-    const real t231 = W[32] * Rc[5];
-    const real t232 = W[30] * Rc[3];
-    const real t233 = W[31] * Rc[4];
-    const real t234 = t232 + t233;
-    const real t235 = t231 + t234;
-    const real t236 = -t235;
-    J_A[31] = t236;
-    const real t237 = W[32] * Rc[8];
-    const real t238 = W[30] * Rc[6];
-    const real t239 = W[31] * Rc[7];
-    const real t240 = t238 + t239;
-    const real t241 = t237 + t240;
-    const real t242 = -t241;
-    J_A[32] = t242;
-    const real t243 = r_A[2] * t235;
-    const real t244 = r_A[1] * t241;
-    const real t245 = t243 - t244;
-    const real t246 = W[33] * Rc[0];
-    const real t247 = t245 - t246;
-    const real t248 = W[34] * Rc[1];
-    const real t249 = t247 - t248;
-    const real t250 = W[35] * Rc[2];
-    const real t251 = t249 - t250;
-    J_A[33] = t251;
-    const real t252 = r_A[0] * t241;
-    const real t253 = r_A[2] * t229;
-    const real t254 = t252 - t253;
-    const real t255 = W[33] * Rc[3];
-    const real t256 = t254 - t255;
-    const real t257 = W[34] * Rc[4];
-    const real t258 = t256 - t257;
-    const real t259 = W[35] * Rc[5];
-    const real t260 = t258 - t259;
-    J_A[34] = t260;
-    const real t261 = r_A[1] * t229;
-    const real t262 = r_A[0] * t235;
-    const real t263 = t261 - t262;
-    const real t264 = W[33] * Rc[6];
-    const real t265 = t263 - t264;
-    const real t266 = W[34] * Rc[7];
-    const real t267 = t265 - t266;
-    const real t268 = W[35] * Rc[8];
-    const real t269 = t267 - t268;
-    J_A[35] = t269;
-    const real t270 = W[2] * R_C[2];
-    const real t271 = W[0] * R_C[0];
-    const real t272 = W[1] * R_C[1];
-    const real t273 = t271 + t272;
-    const real t274 = t270 + t273;
-    J_B[0] = t274;
-    const real t275 = W[2] * R_C[5];
-    const real t276 = W[0] * R_C[3];
-    const real t277 = W[1] * R_C[4];
-    const real t278 = t276 + t277;
-    const real t279 = t275 + t278;
-    J_B[1] = t279;
-    const real t280 = W[2] * R_C[8];
-    const real t281 = W[0] * R_C[6];
-    const real t282 = W[1] * R_C[7];
-    const real t283 = t281 + t282;
-    const real t284 = t280 + t283;
-    J_B[2] = t284;
-    const real t285 = W[5] * R_C[2];
-    const real t286 = W[4] * R_C[1];
-    const real t287 = W[3] * R_C[0];
-    const real t288 = r_e[1] * t284;
-    const real t289 = r_e[2] * t279;
-    const real t290 = t288 - t289;
-    const real t291 = t287 + t290;
-    const real t292 = t286 + t291;
-    const real t293 = t285 + t292;
-    J_B[3] = t293;
-    const real t294 = W[5] * R_C[5];
-    const real t295 = W[4] * R_C[4];
-    const real t296 = W[3] * R_C[3];
-    const real t297 = r_e[2] * t274;
-    const real t298 = r_e[0] * t284;
-    const real t299 = t297 - t298;
-    const real t300 = t296 + t299;
-    const real t301 = t295 + t300;
-    const real t302 = t294 + t301;
-    J_B[4] = t302;
-    const real t303 = W[5] * R_C[8];
-    const real t304 = W[4] * R_C[7];
-    const real t305 = W[3] * R_C[6];
-    const real t306 = r_e[0] * t279;
-    const real t307 = r_e[1] * t274;
-    const real t308 = t306 - t307;
-    const real t309 = t305 + t308;
-    const real t310 = t304 + t309;
-    const real t311 = t303 + t310;
-    J_B[5] = t311;
-    const real t312 = W[8] * R_C[2];
-    const real t313 = W[6] * R_C[0];
-    const real t314 = W[7] * R_C[1];
-    const real t315 = t313 + t314;
-    const real t316 = t312 + t315;
-    J_B[6] = t316;
-    const real t317 = W[8] * R_C[5];
-    const real t318 = W[6] * R_C[3];
-    const real t319 = W[7] * R_C[4];
-    const real t320 = t318 + t319;
-    const real t321 = t317 + t320;
-    J_B[7] = t321;
-    const real t322 = W[8] * R_C[8];
-    const real t323 = W[6] * R_C[6];
-    const real t324 = W[7] * R_C[7];
-    const real t325 = t323 + t324;
-    const real t326 = t322 + t325;
-    J_B[8] = t326;
-    const real t327 = W[11] * R_C[2];
-    const real t328 = W[10] * R_C[1];
-    const real t329 = W[9] * R_C[0];
-    const real t330 = r_e[1] * t326;
-    const real t331 = r_e[2] * t321;
-    const real t332 = t330 - t331;
-    const real t333 = t329 + t332;
-    const real t334 = t328 + t333;
-    const real t335 = t327 + t334;
-    J_B[9] = t335;
-    const real t336 = W[11] * R_C[5];
-    const real t337 = W[10] * R_C[4];
-    const real t338 = W[9] * R_C[3];
-    const real t339 = r_e[2] * t316;
-    const real t340 = r_e[0] * t326;
-    const real t341 = t339 - t340;
-    const real t342 = t338 + t341;
-    const real t343 = t337 + t342;
-    const real t344 = t336 + t343;
-    J_B[10] = t344;
-    const real t345 = W[11] * R_C[8];
-    const real t346 = W[10] * R_C[7];
-    const real t347 = W[9] * R_C[6];
-    const real t348 = r_e[0] * t321;
-    const real t349 = r_e[1] * t316;
-    const real t350 = t348 - t349;
-    const real t351 = t347 + t350;
-    const real t352 = t346 + t351;
-    const real t353 = t345 + t352;
-    J_B[11] = t353;
-    const real t354 = W[14] * R_C[2];
-    const real t355 = W[12] * R_C[0];
-    const real t356 = W[13] * R_C[1];
-    const real t357 = t355 + t356;
-    const real t358 = t354 + t357;
-    J_B[12] = t358;
-    const real t359 = W[14] * R_C[5];
-    const real t360 = W[12] * R_C[3];
-    const real t361 = W[13] * R_C[4];
-    const real t362 = t360 + t361;
-    const real t363 = t359 + t362;
-    J_B[13] = t363;
-    const real t364 = W[14] * R_C[8];
-    const real t365 = W[12] * R_C[6];
-    const real t366 = W[13] * R_C[7];
-    const real t367 = t365 + t366;
-    const real t368 = t364 + t367;
-    J_B[14] = t368;
-    const real t369 = W[17] * R_C[2];
-    const real t370 = W[16] * R_C[1];
-    const real t371 = W[15] * R_C[0];
-    const real t372 = r_e[1] * t368;
-    const real t373 = r_e[2] * t363;
-    const real t374 = t372 - t373;
-    const real t375 = t371 + t374;
-    const real t376 = t370 + t375;
-    const real t377 = t369 + t376;
-    J_B[15] = t377;
-    const real t378 = W[17] * R_C[5];
-    const real t379 = W[16] * R_C[4];
-    const real t380 = W[15] * R_C[3];
-    const real t381 = r_e[2] * t358;
-    const real t382 = r_e[0] * t368;
-    const real t383 = t381 - t382;
-    const real t384 = t380 + t383;
-    const real t385 = t379 + t384;
-    const real t386 = t378 + t385;
-    J_B[16] = t386;
-    const real t387 = W[17] * R_C[8];
-    const real t388 = W[16] * R_C[7];
-    const real t389 = W[15] * R_C[6];
-    const real t390 = r_e[0] * t363;
-    const real t391 = r_e[1] * t358;
-    const real t392 = t390 - t391;
-    const real t393 = t389 + t392;
-    const real t394 = t388 + t393;
-    const real t395 = t387 + t394;
-    J_B[17] = t395;
-    const real t396 = W[20] * R_C[2];
-    const real t397 = W[18] * R_C[0];
-    const real t398 = W[19] * R_C[1];
-    const real t399 = t397 + t398;
-    const real t400 = t396 + t399;
-    J_B[18] = t400;
-    const real t401 = W[20] * R_C[5];
-    const real t402 = W[18] * R_C[3];
-    const real t403 = W[19] * R_C[4];
-    const real t404 = t402 + t403;
-    const real t405 = t401 + t404;
-    J_B[19] = t405;
-    const real t406 = W[20] * R_C[8];
-    const real t407 = W[18] * R_C[6];
-    const real t408 = W[19] * R_C[7];
-    const real t409 = t407 + t408;
-    const real t410 = t406 + t409;
-    J_B[20] = t410;
-    const real t411 = W[23] * R_C[2];
-    const real t412 = W[22] * R_C[1];
-    const real t413 = W[21] * R_C[0];
-    const real t414 = r_e[1] * t410;
-    const real t415 = r_e[2] * t405;
-    const real t416 = t414 - t415;
-    const real t417 = t413 + t416;
-    const real t418 = t412 + t417;
-    const real t419 = t411 + t418;
-    J_B[21] = t419;
-    const real t420 = W[23] * R_C[5];
-    const real t421 = W[22] * R_C[4];
-    const real t422 = W[21] * R_C[3];
-    const real t423 = r_e[2] * t400;
-    const real t424 = r_e[0] * t410;
-    const real t425 = t423 - t424;
-    const real t426 = t422 + t425;
-    const real t427 = t421 + t426;
-    const real t428 = t420 + t427;
-    J_B[22] = t428;
-    const real t429 = W[23] * R_C[8];
-    const real t430 = W[22] * R_C[7];
-    const real t431 = W[21] * R_C[6];
-    const real t432 = r_e[0] * t405;
-    const real t433 = r_e[1] * t400;
-    const real t434 = t432 - t433;
-    const real t435 = t431 + t434;
-    const real t436 = t430 + t435;
-    const real t437 = t429 + t436;
-    J_B[23] = t437;
-    const real t438 = W[26] * R_C[2];
-    const real t439 = W[24] * R_C[0];
-    const real t440 = W[25] * R_C[1];
-    const real t441 = t439 + t440;
-    const real t442 = t438 + t441;
-    J_B[24] = t442;
-    const real t443 = W[26] * R_C[5];
-    const real t444 = W[24] * R_C[3];
-    const real t445 = W[25] * R_C[4];
-    const real t446 = t444 + t445;
-    const real t447 = t443 + t446;
-    J_B[25] = t447;
-    const real t448 = W[26] * R_C[8];
-    const real t449 = W[24] * R_C[6];
-    const real t450 = W[25] * R_C[7];
-    const real t451 = t449 + t450;
-    const real t452 = t448 + t451;
-    J_B[26] = t452;
-    const real t453 = W[29] * R_C[2];
-    const real t454 = W[28] * R_C[1];
-    const real t455 = W[27] * R_C[0];
-    const real t456 = r_e[1] * t452;
-    const real t457 = r_e[2] * t447;
-    const real t458 = t456 - t457;
-    const real t459 = t455 + t458;
-    const real t460 = t454 + t459;
-    const real t461 = t453 + t460;
-    J_B[27] = t461;
-    const real t462 = W[29] * R_C[5];
-    const real t463 = W[28] * R_C[4];
-    const real t464 = W[27] * R_C[3];
-    const real t465 = r_e[2] * t442;
-    const real t466 = r_e[0] * t452;
-    const real t467 = t465 - t466;
-    const real t468 = t464 + t467;
-    const real t469 = t463 + t468;
-    const real t470 = t462 + t469;
-    J_B[28] = t470;
-    const real t471 = W[29] * R_C[8];
-    const real t472 = W[28] * R_C[7];
-    const real t473 = W[27] * R_C[6];
-    const real t474 = r_e[0] * t447;
-    const real t475 = r_e[1] * t442;
-    const real t476 = t474 - t475;
-    const real t477 = t473 + t476;
-    const real t478 = t472 + t477;
-    const real t479 = t471 + t478;
-    J_B[29] = t479;
-    const real t480 = W[32] * R_C[2];
-    const real t481 = W[30] * R_C[0];
-    const real t482 = W[31] * R_C[1];
-    const real t483 = t481 + t482;
-    const real t484 = t480 + t483;
-    J_B[30] = t484;
-    const real t485 = W[32] * R_C[5];
-    const real t486 = W[30] * R_C[3];
-    const real t487 = W[31] * R_C[4];
-    const real t488 = t486 + t487;
-    const real t489 = t485 + t488;
-    J_B[31] = t489;
-    const real t490 = W[32] * R_C[8];
-    const real t491 = W[30] * R_C[6];
-    const real t492 = W[31] * R_C[7];
-    const real t493 = t491 + t492;
-    const real t494 = t490 + t493;
-    J_B[32] = t494;
-    const real t495 = W[35] * R_C[2];
-    const real t496 = W[34] * R_C[1];
-    const real t497 = W[33] * R_C[0];
-    const real t498 = r_e[1] * t494;
-    const real t499 = r_e[2] * t489;
-    const real t500 = t498 - t499;
-    const real t501 = t497 + t500;
-    const real t502 = t496 + t501;
-    const real t503 = t495 + t502;
-    J_B[33] = t503;
-    const real t504 = W[35] * R_C[5];
-    const real t505 = W[34] * R_C[4];
-    const real t506 = W[33] * R_C[3];
-    const real t507 = r_e[2] * t484;
-    const real t508 = r_e[0] * t494;
-    const real t509 = t507 - t508;
-    const real t510 = t506 + t509;
-    const real t511 = t505 + t510;
-    const real t512 = t504 + t511;
-    J_B[34] = t512;
-    const real t513 = W[35] * R_C[8];
-    const real t514 = W[34] * R_C[7];
-    const real t515 = W[33] * R_C[6];
-    const real t516 = r_e[0] * t489;
-    const real t517 = r_e[1] * t484;
-    const real t518 = t516 - t517;
-    const real t519 = t515 + t518;
-    const real t520 = t514 + t519;
-    const real t521 = t513 + t520;
-    J_B[35] = t521;
-    const real t522 = W[0] * relative[0];
-    const real t523 = W[1] * relative[1];
-    const real t524 = t522 + t523;
-    const real t525 = W[2] * relative[2];
-    const real t526 = t524 + t525;
-    const real t527 = W[3] * relative[3];
-    const real t528 = t526 + t527;
-    const real t529 = W[4] * relative[4];
-    const real t530 = t528 + t529;
-    const real t531 = W[5] * relative[5];
-    const real t532 = t530 + t531;
-    l[0] = t532;
-    const real t533 = W[6] * relative[0];
-    const real t534 = W[7] * relative[1];
-    const real t535 = t533 + t534;
-    const real t536 = W[8] * relative[2];
-    const real t537 = t535 + t536;
-    const real t538 = W[9] * relative[3];
-    const real t539 = t537 + t538;
-    const real t540 = W[10] * relative[4];
-    const real t541 = t539 + t540;
-    const real t542 = W[11] * relative[5];
-    const real t543 = t541 + t542;
-    l[1] = t543;
-    const real t544 = W[12] * relative[0];
-    const real t545 = W[13] * relative[1];
-    const real t546 = t544 + t545;
-    const real t547 = W[14] * relative[2];
-    const real t548 = t546 + t547;
-    const real t549 = W[15] * relative[3];
-    const real t550 = t548 + t549;
-    const real t551 = W[16] * relative[4];
-    const real t552 = t550 + t551;
-    const real t553 = W[17] * relative[5];
-    const real t554 = t552 + t553;
-    l[2] = t554;
-    const real t555 = W[18] * relative[0];
-    const real t556 = W[19] * relative[1];
-    const real t557 = t555 + t556;
-    const real t558 = W[20] * relative[2];
-    const real t559 = t557 + t558;
-    const real t560 = W[21] * relative[3];
-    const real t561 = t559 + t560;
-    const real t562 = W[22] * relative[4];
-    const real t563 = t561 + t562;
-    const real t564 = W[23] * relative[5];
-    const real t565 = t563 + t564;
-    l[3] = t565;
-    const real t566 = W[24] * relative[0];
-    const real t567 = W[25] * relative[1];
-    const real t568 = t566 + t567;
-    const real t569 = W[26] * relative[2];
-    const real t570 = t568 + t569;
-    const real t571 = W[27] * relative[3];
-    const real t572 = t570 + t571;
-    const real t573 = W[28] * relative[4];
-    const real t574 = t572 + t573;
-    const real t575 = W[29] * relative[5];
-    const real t576 = t574 + t575;
-    l[4] = t576;
-    const real t577 = W[30] * relative[0];
-    const real t578 = W[31] * relative[1];
-    const real t579 = t577 + t578;
-    const real t580 = W[32] * relative[2];
-    const real t581 = t579 + t580;
-    const real t582 = W[33] * relative[3];
-    const real t583 = t581 + t582;
-    const real t584 = W[34] * relative[4];
-    const real t585 = t583 + t584;
-    const real t586 = W[35] * relative[5];
-    const real t587 = t585 + t586;
-    l[5] = t587;
+    const real t84 = t80 + t83;
+    const real t85 = t79 + t84;
+    const real t86 = t78 + t85;
+    J_B[5] = t86;
     return 0;
 }
 
-static int mstmm_sweep_loops_rows_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_row_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_rows(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2]);
+    return mstmm_sweep_loops_row(in[0], in[1], in[2], in[3], in[4], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_loops_rows_inputs[] = {
-    {"W", 36, "", 0, 0},
+static const mstmm_port mstmm_sweep_loops_row_inputs[] = {
+    {"w", 6, "", 0, 0},
     {"R_C", 9, "", 0, 0},
     {"r_e", 3, "m", 0, 0},
     {"Rc", 9, "", 0, 0},
     {"r_A", 3, "m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_row_outputs[] = {
+    {"J_A", 6, "", 0, 0},
+    {"J_B", 6, "", 0, 0},
+};
+
+/* known parts of the rows of a hinge that closes a loop
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  W[6][6] rows: H^+, then what the hinge holds
+ * in  relative[6] motion of the end of B relative to C
+ * out l[6] rows of what is known
+ */
+int mstmm_sweep_loops_known(const real *restrict W, const real *restrict relative, real *restrict l)
+{
+    const real t0 = W[0] * relative[0];
+    const real t1 = W[1] * relative[1];
+    const real t2 = t0 + t1;
+    const real t3 = W[2] * relative[2];
+    const real t4 = t2 + t3;
+    const real t5 = W[3] * relative[3];
+    const real t6 = t4 + t5;
+    const real t7 = W[4] * relative[4];
+    const real t8 = t6 + t7;
+    const real t9 = W[5] * relative[5];
+    const real t10 = t8 + t9;
+    l[0] = t10;
+    const real t11 = W[6] * relative[0];
+    const real t12 = W[7] * relative[1];
+    const real t13 = t11 + t12;
+    const real t14 = W[8] * relative[2];
+    const real t15 = t13 + t14;
+    const real t16 = W[9] * relative[3];
+    const real t17 = t15 + t16;
+    const real t18 = W[10] * relative[4];
+    const real t19 = t17 + t18;
+    const real t20 = W[11] * relative[5];
+    const real t21 = t19 + t20;
+    l[1] = t21;
+    const real t22 = W[12] * relative[0];
+    const real t23 = W[13] * relative[1];
+    const real t24 = t22 + t23;
+    const real t25 = W[14] * relative[2];
+    const real t26 = t24 + t25;
+    const real t27 = W[15] * relative[3];
+    const real t28 = t26 + t27;
+    const real t29 = W[16] * relative[4];
+    const real t30 = t28 + t29;
+    const real t31 = W[17] * relative[5];
+    const real t32 = t30 + t31;
+    l[2] = t32;
+    const real t33 = W[18] * relative[0];
+    const real t34 = W[19] * relative[1];
+    const real t35 = t33 + t34;
+    const real t36 = W[20] * relative[2];
+    const real t37 = t35 + t36;
+    const real t38 = W[21] * relative[3];
+    const real t39 = t37 + t38;
+    const real t40 = W[22] * relative[4];
+    const real t41 = t39 + t40;
+    const real t42 = W[23] * relative[5];
+    const real t43 = t41 + t42;
+    l[3] = t43;
+    const real t44 = W[24] * relative[0];
+    const real t45 = W[25] * relative[1];
+    const real t46 = t44 + t45;
+    const real t47 = W[26] * relative[2];
+    const real t48 = t46 + t47;
+    const real t49 = W[27] * relative[3];
+    const real t50 = t48 + t49;
+    const real t51 = W[28] * relative[4];
+    const real t52 = t50 + t51;
+    const real t53 = W[29] * relative[5];
+    const real t54 = t52 + t53;
+    l[4] = t54;
+    const real t55 = W[30] * relative[0];
+    const real t56 = W[31] * relative[1];
+    const real t57 = t55 + t56;
+    const real t58 = W[32] * relative[2];
+    const real t59 = t57 + t58;
+    const real t60 = W[33] * relative[3];
+    const real t61 = t59 + t60;
+    const real t62 = W[34] * relative[4];
+    const real t63 = t61 + t62;
+    const real t64 = W[35] * relative[5];
+    const real t65 = t63 + t64;
+    l[5] = t65;
+    return 0;
+}
+
+static int mstmm_sweep_loops_known_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_known(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_known_inputs[] = {
+    {"W", 36, "", 0, 0},
     {"relative", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_rows_outputs[] = {
-    {"J_A", 36, "", 0, 0},
-    {"J_B", 36, "", 0, 0},
+static const mstmm_port mstmm_sweep_loops_known_outputs[] = {
     {"l", 6, "", 0, 0},
 };
 
-/* accelerations along the directions of a hinge that closes a loop
+/* acceleration along a direction of a hinge that closes a loop
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  J_A[6][6] rows by the acceleration of A, at its P
- * in  J_B[6][6] rows by the acceleration of B, at its P
- * in  l[6] rows of what is known
+ * in  J_A[6] row by the acceleration of A, at its P
+ * in  J_B[6] row by the acceleration of B, at its P
+ * in  l[1] row of what is known
  * in  delta_A[6] deviation of the acceleration of A
  * in  delta_B[6] deviation of the acceleration of B
- * out c[6] accelerations along the six directions
+ * out c[1] acceleration along the direction
  */
 int mstmm_sweep_loops_told(const real *restrict J_A, const real *restrict J_B,
     const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
@@ -1349,131 +913,6 @@ int mstmm_sweep_loops_told(const real *restrict J_A, const real *restrict J_B,
     const real t22 = t10 + t21;
     const real t23 = l[0] + t22;
     c[0] = t23;
-    const real t24 = J_A[6] * delta_A[0];
-    const real t25 = J_A[7] * delta_A[1];
-    const real t26 = t24 + t25;
-    const real t27 = J_A[8] * delta_A[2];
-    const real t28 = t26 + t27;
-    const real t29 = J_A[9] * delta_A[3];
-    const real t30 = t28 + t29;
-    const real t31 = J_A[10] * delta_A[4];
-    const real t32 = t30 + t31;
-    const real t33 = J_A[11] * delta_A[5];
-    const real t34 = t32 + t33;
-    const real t35 = J_B[6] * delta_B[0];
-    const real t36 = J_B[7] * delta_B[1];
-    const real t37 = t35 + t36;
-    const real t38 = J_B[8] * delta_B[2];
-    const real t39 = t37 + t38;
-    const real t40 = J_B[9] * delta_B[3];
-    const real t41 = t39 + t40;
-    const real t42 = J_B[10] * delta_B[4];
-    const real t43 = t41 + t42;
-    const real t44 = J_B[11] * delta_B[5];
-    const real t45 = t43 + t44;
-    const real t46 = t34 + t45;
-    const real t47 = l[1] + t46;
-    c[1] = t47;
-    const real t48 = J_A[12] * delta_A[0];
-    const real t49 = J_A[13] * delta_A[1];
-    const real t50 = t48 + t49;
-    const real t51 = J_A[14] * delta_A[2];
-    const real t52 = t50 + t51;
-    const real t53 = J_A[15] * delta_A[3];
-    const real t54 = t52 + t53;
-    const real t55 = J_A[16] * delta_A[4];
-    const real t56 = t54 + t55;
-    const real t57 = J_A[17] * delta_A[5];
-    const real t58 = t56 + t57;
-    const real t59 = J_B[12] * delta_B[0];
-    const real t60 = J_B[13] * delta_B[1];
-    const real t61 = t59 + t60;
-    const real t62 = J_B[14] * delta_B[2];
-    const real t63 = t61 + t62;
-    const real t64 = J_B[15] * delta_B[3];
-    const real t65 = t63 + t64;
-    const real t66 = J_B[16] * delta_B[4];
-    const real t67 = t65 + t66;
-    const real t68 = J_B[17] * delta_B[5];
-    const real t69 = t67 + t68;
-    const real t70 = t58 + t69;
-    const real t71 = l[2] + t70;
-    c[2] = t71;
-    const real t72 = J_A[18] * delta_A[0];
-    const real t73 = J_A[19] * delta_A[1];
-    const real t74 = t72 + t73;
-    const real t75 = J_A[20] * delta_A[2];
-    const real t76 = t74 + t75;
-    const real t77 = J_A[21] * delta_A[3];
-    const real t78 = t76 + t77;
-    const real t79 = J_A[22] * delta_A[4];
-    const real t80 = t78 + t79;
-    const real t81 = J_A[23] * delta_A[5];
-    const real t82 = t80 + t81;
-    const real t83 = J_B[18] * delta_B[0];
-    const real t84 = J_B[19] * delta_B[1];
-    const real t85 = t83 + t84;
-    const real t86 = J_B[20] * delta_B[2];
-    const real t87 = t85 + t86;
-    const real t88 = J_B[21] * delta_B[3];
-    const real t89 = t87 + t88;
-    const real t90 = J_B[22] * delta_B[4];
-    const real t91 = t89 + t90;
-    const real t92 = J_B[23] * delta_B[5];
-    const real t93 = t91 + t92;
-    const real t94 = t82 + t93;
-    const real t95 = l[3] + t94;
-    c[3] = t95;
-    const real t96 = J_A[24] * delta_A[0];
-    const real t97 = J_A[25] * delta_A[1];
-    const real t98 = t96 + t97;
-    const real t99 = J_A[26] * delta_A[2];
-    const real t100 = t98 + t99;
-    const real t101 = J_A[27] * delta_A[3];
-    const real t102 = t100 + t101;
-    const real t103 = J_A[28] * delta_A[4];
-    const real t104 = t102 + t103;
-    const real t105 = J_A[29] * delta_A[5];
-    const real t106 = t104 + t105;
-    const real t107 = J_B[24] * delta_B[0];
-    const real t108 = J_B[25] * delta_B[1];
-    const real t109 = t107 + t108;
-    const real t110 = J_B[26] * delta_B[2];
-    const real t111 = t109 + t110;
-    const real t112 = J_B[27] * delta_B[3];
-    const real t113 = t111 + t112;
-    const real t114 = J_B[28] * delta_B[4];
-    const real t115 = t113 + t114;
-    const real t116 = J_B[29] * delta_B[5];
-    const real t117 = t115 + t116;
-    const real t118 = t106 + t117;
-    const real t119 = l[4] + t118;
-    c[4] = t119;
-    const real t120 = J_A[30] * delta_A[0];
-    const real t121 = J_A[31] * delta_A[1];
-    const real t122 = t120 + t121;
-    const real t123 = J_A[32] * delta_A[2];
-    const real t124 = t122 + t123;
-    const real t125 = J_A[33] * delta_A[3];
-    const real t126 = t124 + t125;
-    const real t127 = J_A[34] * delta_A[4];
-    const real t128 = t126 + t127;
-    const real t129 = J_A[35] * delta_A[5];
-    const real t130 = t128 + t129;
-    const real t131 = J_B[30] * delta_B[0];
-    const real t132 = J_B[31] * delta_B[1];
-    const real t133 = t131 + t132;
-    const real t134 = J_B[32] * delta_B[2];
-    const real t135 = t133 + t134;
-    const real t136 = J_B[33] * delta_B[3];
-    const real t137 = t135 + t136;
-    const real t138 = J_B[34] * delta_B[4];
-    const real t139 = t137 + t138;
-    const real t140 = J_B[35] * delta_B[5];
-    const real t141 = t139 + t140;
-    const real t142 = t130 + t141;
-    const real t143 = l[5] + t142;
-    c[5] = t143;
     return 0;
 }
 
@@ -1484,15 +923,15 @@ static int mstmm_sweep_loops_told_call(int n, const real *const *in, real *const
 }
 
 static const mstmm_port mstmm_sweep_loops_told_inputs[] = {
-    {"J_A", 36, "", 0, 0},
-    {"J_B", 36, "", 0, 0},
-    {"l", 6, "", 0, 0},
+    {"J_A", 6, "", 0, 0},
+    {"J_B", 6, "", 0, 0},
+    {"l", 1, "", 0, 0},
     {"delta_A", 6, "", 0, 0},
     {"delta_B", 6, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_loops_told_outputs[] = {
-    {"c", 6, "", 0, 0},
+    {"c", 1, "", 0, 0},
 };
 
 /* load of an effort
@@ -1540,159 +979,215 @@ static const mstmm_port mstmm_sweep_loops_act_outputs[] = {
     {"e", 6, "N, N*m", 1, 0},
 };
 
-/* a row closed where its ends meet
+/* pivot of a row that closes
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  K[6] column of the row, at P of the body that it is seen from
- * in  l[1] what of the row does not go by multipliers or motion
  * in  L[1] the row's own entry of L
  * in  floor[1] largest pivot that is rounding
  * out inverse[1] 1 / L_rr, zero where nothing moves the row
- * out S[21] S of the body, added to what is there
- * out e[6] e of the body, added to what is there
  */
-int mstmm_sweep_loops_close(const real *restrict K, const real *restrict l, const real *restrict L,
-    const real *restrict floor_, real *restrict inverse, real *restrict S, real *restrict e)
+int mstmm_sweep_loops_settle(const real *restrict L, const real *restrict floor_,
+    real *restrict inverse)
 {
     const real t0 = floor_[0] < L[0];
     const real t1 = 1.0 / L[0];
     const real t2 = t0 != 0 ? t1 : 0.0;
     inverse[0] = t2;
-    const real t3 = K[0] * t2;
-    const real t4 = K[0] * t3;
-    S[0] += t4;
-    const real t5 = K[1] * t3;
-    S[1] += t5;
-    const real t6 = K[2] * t3;
-    S[2] += t6;
-    const real t7 = K[3] * t3;
-    S[3] += t7;
-    const real t8 = K[4] * t3;
-    S[4] += t8;
-    const real t9 = K[5] * t3;
-    S[5] += t9;
-    const real t10 = K[1] * t2;
-    const real t11 = K[1] * t10;
-    S[6] += t11;
-    const real t12 = K[2] * t10;
-    S[7] += t12;
-    const real t13 = K[3] * t10;
-    S[8] += t13;
-    const real t14 = K[4] * t10;
-    S[9] += t14;
-    const real t15 = K[5] * t10;
-    S[10] += t15;
-    const real t16 = K[2] * t2;
-    const real t17 = K[2] * t16;
-    S[11] += t17;
-    const real t18 = K[3] * t16;
-    S[12] += t18;
-    const real t19 = K[4] * t16;
-    S[13] += t19;
-    const real t20 = K[5] * t16;
-    S[14] += t20;
-    const real t21 = K[3] * t2;
-    const real t22 = K[3] * t21;
-    S[15] += t22;
-    const real t23 = K[4] * t21;
-    S[16] += t23;
-    const real t24 = K[5] * t21;
-    S[17] += t24;
-    const real t25 = K[4] * t2;
-    const real t26 = K[4] * t25;
-    S[18] += t26;
-    const real t27 = K[5] * t25;
-    S[19] += t27;
-    const real t28 = K[5] * t2;
-    const real t29 = K[5] * t28;
-    S[20] += t29;
-    const real t30 = l[0] * t3;
-    e[0] += t30;
-    const real t31 = l[0] * t10;
-    e[1] += t31;
-    const real t32 = l[0] * t16;
-    e[2] += t32;
-    const real t33 = l[0] * t21;
-    e[3] += t33;
-    const real t34 = l[0] * t25;
-    e[4] += t34;
-    const real t35 = l[0] * t28;
-    e[5] += t35;
+    return 0;
+}
+
+static int mstmm_sweep_loops_settle_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_settle(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_settle_inputs[] = {
+    {"L", 1, "", 0, 0},
+    {"floor", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_settle_outputs[] = {
+    {"inverse", 1, "", 0, 0},
+};
+
+/* a row closed where its ends meet
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  inverse[1] 1 / L_rr, zero where nothing moves the row
+ * in  K[6] column of the row, at P of the body that it is seen from
+ * in  l[1] what of the row does not go by multipliers or motion
+ * out S[21] S of the body, added to what is there
+ * out e[6] e of the body, added to what is there
+ */
+int mstmm_sweep_loops_close(const real *restrict inverse, const real *restrict K,
+    const real *restrict l, real *restrict S, real *restrict e)
+{
+    const real t0 = inverse[0] * K[0];
+    const real t1 = K[0] * t0;
+    S[0] += t1;
+    const real t2 = K[1] * t0;
+    S[1] += t2;
+    const real t3 = K[2] * t0;
+    S[2] += t3;
+    const real t4 = K[3] * t0;
+    S[3] += t4;
+    const real t5 = K[4] * t0;
+    S[4] += t5;
+    const real t6 = K[5] * t0;
+    S[5] += t6;
+    const real t7 = inverse[0] * K[1];
+    const real t8 = K[1] * t7;
+    S[6] += t8;
+    const real t9 = K[2] * t7;
+    S[7] += t9;
+    const real t10 = K[3] * t7;
+    S[8] += t10;
+    const real t11 = K[4] * t7;
+    S[9] += t11;
+    const real t12 = K[5] * t7;
+    S[10] += t12;
+    const real t13 = inverse[0] * K[2];
+    const real t14 = K[2] * t13;
+    S[11] += t14;
+    const real t15 = K[3] * t13;
+    S[12] += t15;
+    const real t16 = K[4] * t13;
+    S[13] += t16;
+    const real t17 = K[5] * t13;
+    S[14] += t17;
+    const real t18 = inverse[0] * K[3];
+    const real t19 = K[3] * t18;
+    S[15] += t19;
+    const real t20 = K[4] * t18;
+    S[16] += t20;
+    const real t21 = K[5] * t18;
+    S[17] += t21;
+    const real t22 = inverse[0] * K[4];
+    const real t23 = K[4] * t22;
+    S[18] += t23;
+    const real t24 = K[5] * t22;
+    S[19] += t24;
+    const real t25 = inverse[0] * K[5];
+    const real t26 = K[5] * t25;
+    S[20] += t26;
+    const real t27 = l[0] * t0;
+    e[0] += t27;
+    const real t28 = l[0] * t7;
+    e[1] += t28;
+    const real t29 = l[0] * t13;
+    e[2] += t29;
+    const real t30 = l[0] * t18;
+    e[3] += t30;
+    const real t31 = l[0] * t22;
+    e[4] += t31;
+    const real t32 = l[0] * t25;
+    e[5] += t32;
     return 0;
 }
 
 static int mstmm_sweep_loops_close_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_close(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
+    return mstmm_sweep_loops_close(in[0], in[1], in[2], out[0], out[1]);
 }
 
 static const mstmm_port mstmm_sweep_loops_close_inputs[] = {
+    {"inverse", 1, "", 0, 0},
     {"K", 6, "", 0, 0},
     {"l", 1, "", 0, 0},
-    {"L", 1, "", 0, 0},
-    {"floor", 1, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_loops_close_outputs[] = {
-    {"inverse", 1, "", 0, 0},
     {"S", 21, "", 1, 0},
     {"e", 6, "", 1, 0},
 };
 
-/* a row that stays while another is closed
+/* column of a row that stays while another is closed
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  inverse[1] 1 / L_rr, zero where nothing moves the row
  * in  K[6] column of the row, at P of the body that it is seen from
- * in  l[1] what of the row does not go by multipliers or motion
  * in  L_p[1] entry of L of the row that closes and another
  * out K_p[6] column of row p, added to what is there
- * out l_p[1] known part of row p, added to what is there
  */
 int mstmm_sweep_loops_shed(const real *restrict inverse, const real *restrict K,
-    const real *restrict l, const real *restrict L_p, real *restrict K_p, real *restrict l_p)
+    const real *restrict L_p, real *restrict K_p)
 {
-    const real t0 = inverse[0] * L_p[0];
-    const real t1 = K[0] * t0;
+    const real t0 = K[0] * L_p[0];
+    const real t1 = inverse[0] * t0;
     const real t2 = -t1;
     K_p[0] += t2;
-    const real t3 = K[1] * t0;
-    const real t4 = -t3;
-    K_p[1] += t4;
-    const real t5 = K[2] * t0;
-    const real t6 = -t5;
-    K_p[2] += t6;
-    const real t7 = K[3] * t0;
+    const real t3 = K[1] * L_p[0];
+    const real t4 = inverse[0] * t3;
+    const real t5 = -t4;
+    K_p[1] += t5;
+    const real t6 = K[2] * L_p[0];
+    const real t7 = inverse[0] * t6;
     const real t8 = -t7;
-    K_p[3] += t8;
-    const real t9 = K[4] * t0;
-    const real t10 = -t9;
-    K_p[4] += t10;
-    const real t11 = K[5] * t0;
-    const real t12 = -t11;
-    K_p[5] += t12;
-    const real t13 = l[0] * t0;
+    K_p[2] += t8;
+    const real t9 = K[3] * L_p[0];
+    const real t10 = inverse[0] * t9;
+    const real t11 = -t10;
+    K_p[3] += t11;
+    const real t12 = K[4] * L_p[0];
+    const real t13 = inverse[0] * t12;
     const real t14 = -t13;
-    l_p[0] += t14;
+    K_p[4] += t14;
+    const real t15 = K[5] * L_p[0];
+    const real t16 = inverse[0] * t15;
+    const real t17 = -t16;
+    K_p[5] += t17;
     return 0;
 }
 
 static int mstmm_sweep_loops_shed_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_shed(in[0], in[1], in[2], in[3], out[0], out[1]);
+    return mstmm_sweep_loops_shed(in[0], in[1], in[2], out[0]);
 }
 
 static const mstmm_port mstmm_sweep_loops_shed_inputs[] = {
     {"inverse", 1, "", 0, 0},
     {"K", 6, "", 0, 0},
-    {"l", 1, "", 0, 0},
     {"L_p", 1, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_loops_shed_outputs[] = {
     {"K_p", 6, "", 1, 0},
+};
+
+/* known part of a row that stays while another is closed
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  inverse[1] 1 / L_rr, zero where nothing moves the row
+ * in  l[1] what of the row does not go by multipliers or motion
+ * in  L_p[1] entry of L of the row that closes and another
+ * out l_p[1] known part of row p, added to what is there
+ */
+int mstmm_sweep_loops_shed_known(const real *restrict inverse, const real *restrict l,
+    const real *restrict L_p, real *restrict l_p)
+{
+    const real t0 = inverse[0] * L_p[0];
+    const real t1 = l[0] * t0;
+    const real t2 = -t1;
+    l_p[0] += t2;
+    return 0;
+}
+
+static int mstmm_sweep_loops_shed_known_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_shed_known(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_shed_known_inputs[] = {
+    {"inverse", 1, "", 0, 0},
+    {"l", 1, "", 0, 0},
+    {"L_p", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_shed_known_outputs[] = {
     {"l_p", 1, "", 1, 0},
 };
 
@@ -1734,46 +1229,78 @@ static const mstmm_port mstmm_sweep_loops_shed_pair_outputs[] = {
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  K[6] column of the row, at P of the body that it is seen from
  * in  l[1] what of the row does not go by multipliers or motion
- * in  delta[6] deviation of the acceleration of the body
  * out x[1] (N, N*m) multiplier
  */
-int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restrict K,
-    const real *restrict l, const real *restrict delta, real *restrict x)
+int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restrict l,
+    real *restrict x)
 {
-    const real t0 = K[0] * delta[0];
-    const real t1 = K[1] * delta[1];
-    const real t2 = t0 + t1;
-    const real t3 = K[2] * delta[2];
-    const real t4 = t2 + t3;
-    const real t5 = K[3] * delta[3];
-    const real t6 = t4 + t5;
-    const real t7 = K[4] * delta[4];
-    const real t8 = t6 + t7;
-    const real t9 = K[5] * delta[5];
-    const real t10 = t8 + t9;
-    const real t11 = l[0] + t10;
-    const real t12 = inverse[0] * t11;
-    x[0] = t12;
+    const real t0 = inverse[0] * l[0];
+    x[0] = t0;
     return 0;
 }
 
 static int mstmm_sweep_loops_multiplier_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_multiplier(in[0], in[1], in[2], in[3], out[0]);
+    return mstmm_sweep_loops_multiplier(in[0], in[1], out[0]);
 }
 
 static const mstmm_port mstmm_sweep_loops_multiplier_inputs[] = {
     {"inverse", 1, "", 0, 0},
-    {"K", 6, "", 0, 0},
     {"l", 1, "", 0, 0},
-    {"delta", 6, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_loops_multiplier_outputs[] = {
     {"x", 1, "N, N*m", 0, 0},
+};
+
+/* share of a motion in a multiplier
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  inverse[1] 1 / L_rr, zero where nothing moves the row
+ * in  K[6] column of the row, at P of the body that it is seen from
+ * in  delta[6] deviation of the acceleration of the body
+ * out x[1] multiplier of row r, added to what is there
+ */
+int mstmm_sweep_loops_multiplier_more(const real *restrict inverse, const real *restrict K,
+    const real *restrict delta, real *restrict x)
+{
+    const real t0 = inverse[0] * K[0];
+    const real t1 = delta[0] * t0;
+    const real t2 = inverse[0] * K[1];
+    const real t3 = delta[1] * t2;
+    const real t4 = t1 + t3;
+    const real t5 = inverse[0] * K[2];
+    const real t6 = delta[2] * t5;
+    const real t7 = t4 + t6;
+    const real t8 = inverse[0] * K[3];
+    const real t9 = delta[3] * t8;
+    const real t10 = t7 + t9;
+    const real t11 = inverse[0] * K[4];
+    const real t12 = delta[4] * t11;
+    const real t13 = t10 + t12;
+    const real t14 = inverse[0] * K[5];
+    const real t15 = delta[5] * t14;
+    const real t16 = t13 + t15;
+    x[0] += t16;
+    return 0;
+}
+
+static int mstmm_sweep_loops_multiplier_more_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_multiplier_more(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_multiplier_more_inputs[] = {
+    {"inverse", 1, "", 0, 0},
+    {"K", 6, "", 0, 0},
+    {"delta", 6, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_multiplier_more_outputs[] = {
+    {"x", 1, "", 1, 0},
 };
 
 /* share of another row in a multiplier
@@ -2332,14 +1859,13 @@ static const mstmm_port mstmm_sweep_loops_rolling_drift_outputs[] = {
     {"drift", 6, "", 1, 0},
 };
 
-/* gap and its derivative along a direction
+/* meet and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  A_C[3][3] rotation, axes of C to inertial axes
  * in  x_C[3] (m) origin of C, inertial axes
  * in  A_B[3][3] rotation, axes of B to inertial axes
  * in  x_B[3] (m) P of B, inertial axes
- * in  R_e[3][3] rotation, axes of C to axes of B where the loop is closed
  * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
@@ -2353,14 +1879,13 @@ static const mstmm_port mstmm_sweep_loops_rolling_drift_outputs[] = {
  * out d_r_A[3] (m) derivative of r_A
  * out d_d[3] (m) derivative of d
  */
-int mstmm_sweep_loops_gap_slope(const real *restrict A_C, const real *restrict x_C,
-    const real *restrict A_B, const real *restrict x_B, const real *restrict R_e,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r,
-    const real *restrict d_A_C, const real *restrict d_x_C, const real *restrict d_A_B,
-    const real *restrict d_x_B, const real *restrict d_Rc, const real *restrict d_r,
-    real *restrict d_R_C, real *restrict d_r_A, real *restrict d_d)
+int mstmm_sweep_loops_meet_slope(const real *restrict A_C, const real *restrict x_C,
+    const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
+    const real *restrict Rc, const real *restrict r, const real *restrict d_A_C,
+    const real *restrict d_x_C, const real *restrict d_A_B, const real *restrict d_x_B,
+    const real *restrict d_Rc, const real *restrict d_r, real *restrict d_R_C, real *restrict d_r_A,
+    real *restrict d_d)
 {
-    (void)R_e;
     (void)r;
     const real t0 = A_B[6] * d_A_C[6];
     const real t1 = A_C[6] * d_A_B[6];
@@ -2605,18 +2130,17 @@ int mstmm_sweep_loops_gap_slope(const real *restrict A_C, const real *restrict x
     return 0;
 }
 
-static int mstmm_sweep_loops_gap_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_meet_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_gap_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], out[0], out[1], out[2]);
+    return mstmm_sweep_loops_meet_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2]);
 }
 
-static const mstmm_port mstmm_sweep_loops_gap_slope_inputs[] = {
+static const mstmm_port mstmm_sweep_loops_meet_slope_inputs[] = {
     {"A_C", 9, "", 0, 0},
     {"x_C", 3, "m", 0, 0},
     {"A_B", 9, "", 0, 0},
     {"x_B", 3, "m", 0, 0},
-    {"R_e", 9, "", 0, 0},
     {"r_e", 3, "m", 0, 0},
     {"Rc", 9, "", 0, 0},
     {"r", 3, "m", 0, 0},
@@ -2628,7 +2152,7 @@ static const mstmm_port mstmm_sweep_loops_gap_slope_inputs[] = {
     {"d_r", 3, "m", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_gap_slope_outputs[] = {
+static const mstmm_port mstmm_sweep_loops_meet_slope_outputs[] = {
     {"d_R_C", 9, "", 0, 0},
     {"d_r_A", 3, "m", 0, 0},
     {"d_d", 3, "m", 0, 0},
@@ -3169,96 +2693,92 @@ static const mstmm_port mstmm_sweep_loops_drift_slope_outputs[] = {
     {"d_drift", 6, "", 0, 0},
 };
 
-/* rows and its derivative along a direction
+/* row and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  W[6][6] rows: H^+, then what the hinge holds
+ * in  w[6] the direction: a row of W
  * in  R_C[3][3] rotation, axes of C to axes of B
  * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r_A[3] (m) the end of B from P of A, axes of A
- * in  relative[6] motion of the end of B relative to C
- * in  d_W[6][6] derivative of W
+ * in  d_w[6] derivative of w
  * in  d_R_C[3][3] derivative of R_C
  * in  d_Rc[3][3] derivative of Rc
  * in  d_r_A[3] (m) derivative of r_A
- * in  d_relative[6] derivative of relative
- * out d_J_A[6][6] derivative of J_A
- * out d_J_B[6][6] derivative of J_B
- * out d_l[6] derivative of l
+ * out d_J_A[6] derivative of J_A
+ * out d_J_B[6] derivative of J_B
  */
-int mstmm_sweep_loops_rows_slope(const real *restrict W, const real *restrict R_C,
+int mstmm_sweep_loops_row_slope(const real *restrict w, const real *restrict R_C,
     const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
-    const real *restrict relative, const real *restrict d_W, const real *restrict d_R_C,
-    const real *restrict d_Rc, const real *restrict d_r_A, const real *restrict d_relative,
-    real *restrict d_J_A, real *restrict d_J_B, real *restrict d_l)
+    const real *restrict d_w, const real *restrict d_R_C, const real *restrict d_Rc,
+    const real *restrict d_r_A, real *restrict d_J_A, real *restrict d_J_B)
 {
-    const real t0 = Rc[1] * d_W[1];
-    const real t1 = W[1] * d_Rc[1];
+    const real t0 = Rc[1] * d_w[1];
+    const real t1 = w[1] * d_Rc[1];
     const real t2 = t0 + t1;
-    const real t3 = Rc[0] * d_W[0];
-    const real t4 = W[0] * d_Rc[0];
+    const real t3 = Rc[0] * d_w[0];
+    const real t4 = w[0] * d_Rc[0];
     const real t5 = t3 + t4;
     const real t6 = t2 + t5;
-    const real t7 = Rc[2] * d_W[2];
-    const real t8 = W[2] * d_Rc[2];
+    const real t7 = Rc[2] * d_w[2];
+    const real t8 = w[2] * d_Rc[2];
     const real t9 = t7 + t8;
     const real t10 = t6 + t9;
     const real t11 = -t10;
     d_J_A[0] = t11;
-    const real t12 = Rc[4] * d_W[1];
-    const real t13 = W[1] * d_Rc[4];
+    const real t12 = Rc[4] * d_w[1];
+    const real t13 = w[1] * d_Rc[4];
     const real t14 = t12 + t13;
-    const real t15 = Rc[3] * d_W[0];
-    const real t16 = W[0] * d_Rc[3];
+    const real t15 = Rc[3] * d_w[0];
+    const real t16 = w[0] * d_Rc[3];
     const real t17 = t15 + t16;
     const real t18 = t14 + t17;
-    const real t19 = Rc[5] * d_W[2];
-    const real t20 = W[2] * d_Rc[5];
+    const real t19 = Rc[5] * d_w[2];
+    const real t20 = w[2] * d_Rc[5];
     const real t21 = t19 + t20;
     const real t22 = t18 + t21;
     const real t23 = -t22;
     d_J_A[1] = t23;
-    const real t24 = Rc[7] * d_W[1];
-    const real t25 = W[1] * d_Rc[7];
+    const real t24 = Rc[7] * d_w[1];
+    const real t25 = w[1] * d_Rc[7];
     const real t26 = t24 + t25;
-    const real t27 = Rc[6] * d_W[0];
-    const real t28 = W[0] * d_Rc[6];
+    const real t27 = Rc[6] * d_w[0];
+    const real t28 = w[0] * d_Rc[6];
     const real t29 = t27 + t28;
     const real t30 = t26 + t29;
-    const real t31 = Rc[8] * d_W[2];
-    const real t32 = W[2] * d_Rc[8];
+    const real t31 = Rc[8] * d_w[2];
+    const real t32 = w[2] * d_Rc[8];
     const real t33 = t31 + t32;
     const real t34 = t30 + t33;
     const real t35 = -t34;
     d_J_A[2] = t35;
     const real t36 = r_A[2] * t22;
-    const real t37 = W[2] * Rc[5];
-    const real t38 = W[0] * Rc[3];
-    const real t39 = W[1] * Rc[4];
+    const real t37 = w[2] * Rc[5];
+    const real t38 = w[0] * Rc[3];
+    const real t39 = w[1] * Rc[4];
     const real t40 = t38 + t39;
     const real t41 = t37 + t40;
     const real t42 = t41 * d_r_A[2];
     const real t43 = t36 + t42;
     const real t44 = r_A[1] * t34;
-    const real t45 = W[2] * Rc[8];
-    const real t46 = W[0] * Rc[6];
-    const real t47 = W[1] * Rc[7];
+    const real t45 = w[2] * Rc[8];
+    const real t46 = w[0] * Rc[6];
+    const real t47 = w[1] * Rc[7];
     const real t48 = t46 + t47;
     const real t49 = t45 + t48;
     const real t50 = t49 * d_r_A[1];
     const real t51 = t44 + t50;
     const real t52 = t43 - t51;
-    const real t53 = W[3] * d_Rc[0];
-    const real t54 = Rc[0] * d_W[3];
+    const real t53 = w[3] * d_Rc[0];
+    const real t54 = Rc[0] * d_w[3];
     const real t55 = t53 + t54;
     const real t56 = t52 - t55;
-    const real t57 = W[4] * d_Rc[1];
-    const real t58 = Rc[1] * d_W[4];
+    const real t57 = w[4] * d_Rc[1];
+    const real t58 = Rc[1] * d_w[4];
     const real t59 = t57 + t58;
     const real t60 = t56 - t59;
-    const real t61 = W[5] * d_Rc[2];
-    const real t62 = Rc[2] * d_W[5];
+    const real t61 = w[5] * d_Rc[2];
+    const real t62 = Rc[2] * d_w[5];
     const real t63 = t61 + t62;
     const real t64 = t60 - t63;
     d_J_A[3] = t64;
@@ -3266,24 +2786,24 @@ int mstmm_sweep_loops_rows_slope(const real *restrict W, const real *restrict R_
     const real t66 = t49 * d_r_A[0];
     const real t67 = t65 + t66;
     const real t68 = r_A[2] * t10;
-    const real t69 = W[2] * Rc[2];
-    const real t70 = W[0] * Rc[0];
-    const real t71 = W[1] * Rc[1];
+    const real t69 = w[2] * Rc[2];
+    const real t70 = w[0] * Rc[0];
+    const real t71 = w[1] * Rc[1];
     const real t72 = t70 + t71;
     const real t73 = t69 + t72;
     const real t74 = t73 * d_r_A[2];
     const real t75 = t68 + t74;
     const real t76 = t67 - t75;
-    const real t77 = W[3] * d_Rc[3];
-    const real t78 = Rc[3] * d_W[3];
+    const real t77 = w[3] * d_Rc[3];
+    const real t78 = Rc[3] * d_w[3];
     const real t79 = t77 + t78;
     const real t80 = t76 - t79;
-    const real t81 = W[4] * d_Rc[4];
-    const real t82 = Rc[4] * d_W[4];
+    const real t81 = w[4] * d_Rc[4];
+    const real t82 = Rc[4] * d_w[4];
     const real t83 = t81 + t82;
     const real t84 = t80 - t83;
-    const real t85 = W[5] * d_Rc[5];
-    const real t86 = Rc[5] * d_W[5];
+    const real t85 = w[5] * d_Rc[5];
+    const real t86 = Rc[5] * d_w[5];
     const real t87 = t85 + t86;
     const real t88 = t84 - t87;
     d_J_A[4] = t88;
@@ -3294,1263 +2814,302 @@ int mstmm_sweep_loops_rows_slope(const real *restrict W, const real *restrict R_
     const real t93 = t41 * d_r_A[0];
     const real t94 = t92 + t93;
     const real t95 = t91 - t94;
-    const real t96 = W[3] * d_Rc[6];
-    const real t97 = Rc[6] * d_W[3];
+    const real t96 = w[3] * d_Rc[6];
+    const real t97 = Rc[6] * d_w[3];
     const real t98 = t96 + t97;
     const real t99 = t95 - t98;
-    const real t100 = W[4] * d_Rc[7];
-    const real t101 = Rc[7] * d_W[4];
+    const real t100 = w[4] * d_Rc[7];
+    const real t101 = Rc[7] * d_w[4];
     const real t102 = t100 + t101;
     const real t103 = t99 - t102;
-    const real t104 = W[5] * d_Rc[8];
-    const real t105 = Rc[8] * d_W[5];
+    const real t104 = w[5] * d_Rc[8];
+    const real t105 = Rc[8] * d_w[5];
     const real t106 = t104 + t105;
     const real t107 = t103 - t106;
     d_J_A[5] = t107;
-    const real t108 = W[7] * d_Rc[1];
-    const real t109 = Rc[1] * d_W[7];
+    const real t108 = R_C[1] * d_w[1];
+    const real t109 = w[1] * d_R_C[1];
     const real t110 = t108 + t109;
-    const real t111 = W[6] * d_Rc[0];
-    const real t112 = Rc[0] * d_W[6];
+    const real t111 = R_C[0] * d_w[0];
+    const real t112 = w[0] * d_R_C[0];
     const real t113 = t111 + t112;
     const real t114 = t110 + t113;
-    const real t115 = W[8] * d_Rc[2];
-    const real t116 = Rc[2] * d_W[8];
+    const real t115 = R_C[2] * d_w[2];
+    const real t116 = w[2] * d_R_C[2];
     const real t117 = t115 + t116;
     const real t118 = t114 + t117;
-    const real t119 = -t118;
-    d_J_A[6] = t119;
-    const real t120 = W[7] * d_Rc[4];
-    const real t121 = Rc[4] * d_W[7];
-    const real t122 = t120 + t121;
-    const real t123 = W[6] * d_Rc[3];
-    const real t124 = Rc[3] * d_W[6];
-    const real t125 = t123 + t124;
-    const real t126 = t122 + t125;
-    const real t127 = W[8] * d_Rc[5];
-    const real t128 = Rc[5] * d_W[8];
-    const real t129 = t127 + t128;
-    const real t130 = t126 + t129;
-    const real t131 = -t130;
-    d_J_A[7] = t131;
-    const real t132 = W[7] * d_Rc[7];
-    const real t133 = Rc[7] * d_W[7];
-    const real t134 = t132 + t133;
-    const real t135 = W[6] * d_Rc[6];
-    const real t136 = Rc[6] * d_W[6];
-    const real t137 = t135 + t136;
-    const real t138 = t134 + t137;
-    const real t139 = W[8] * d_Rc[8];
-    const real t140 = Rc[8] * d_W[8];
-    const real t141 = t139 + t140;
-    const real t142 = t138 + t141;
-    const real t143 = -t142;
-    d_J_A[8] = t143;
-    const real t144 = Rc[5] * W[8];
-    const real t145 = Rc[3] * W[6];
-    const real t146 = Rc[4] * W[7];
-    const real t147 = t145 + t146;
-    const real t148 = t144 + t147;
-    const real t149 = t148 * d_r_A[2];
-    const real t150 = r_A[2] * t130;
-    const real t151 = t149 + t150;
-    const real t152 = Rc[8] * W[8];
-    const real t153 = Rc[6] * W[6];
-    const real t154 = Rc[7] * W[7];
-    const real t155 = t153 + t154;
-    const real t156 = t152 + t155;
-    const real t157 = t156 * d_r_A[1];
-    const real t158 = r_A[1] * t142;
-    const real t159 = t157 + t158;
-    const real t160 = t151 - t159;
-    const real t161 = W[9] * d_Rc[0];
-    const real t162 = Rc[0] * d_W[9];
-    const real t163 = t161 + t162;
-    const real t164 = t160 - t163;
-    const real t165 = W[10] * d_Rc[1];
-    const real t166 = Rc[1] * d_W[10];
-    const real t167 = t165 + t166;
-    const real t168 = t164 - t167;
-    const real t169 = W[11] * d_Rc[2];
-    const real t170 = Rc[2] * d_W[11];
-    const real t171 = t169 + t170;
-    const real t172 = t168 - t171;
-    d_J_A[9] = t172;
-    const real t173 = t156 * d_r_A[0];
-    const real t174 = r_A[0] * t142;
-    const real t175 = t173 + t174;
-    const real t176 = Rc[2] * W[8];
-    const real t177 = Rc[0] * W[6];
-    const real t178 = Rc[1] * W[7];
-    const real t179 = t177 + t178;
-    const real t180 = t176 + t179;
-    const real t181 = t180 * d_r_A[2];
-    const real t182 = r_A[2] * t118;
-    const real t183 = t181 + t182;
-    const real t184 = t175 - t183;
-    const real t185 = W[9] * d_Rc[3];
-    const real t186 = Rc[3] * d_W[9];
-    const real t187 = t185 + t186;
-    const real t188 = t184 - t187;
-    const real t189 = W[10] * d_Rc[4];
-    const real t190 = Rc[4] * d_W[10];
-    const real t191 = t189 + t190;
-    const real t192 = t188 - t191;
-    const real t193 = W[11] * d_Rc[5];
-    const real t194 = Rc[5] * d_W[11];
-    const real t195 = t193 + t194;
-    const real t196 = t192 - t195;
-    d_J_A[10] = t196;
-    const real t197 = t180 * d_r_A[1];
-    const real t198 = r_A[1] * t118;
-    const real t199 = t197 + t198;
-    const real t200 = t148 * d_r_A[0];
-    const real t201 = r_A[0] * t130;
-    const real t202 = t200 + t201;
-    const real t203 = t199 - t202;
-    const real t204 = W[9] * d_Rc[6];
-    const real t205 = Rc[6] * d_W[9];
-    const real t206 = t204 + t205;
-    const real t207 = t203 - t206;
-    const real t208 = W[10] * d_Rc[7];
-    const real t209 = Rc[7] * d_W[10];
-    const real t210 = t208 + t209;
-    const real t211 = t207 - t210;
-    const real t212 = W[11] * d_Rc[8];
-    const real t213 = Rc[8] * d_W[11];
-    const real t214 = t212 + t213;
-    const real t215 = t211 - t214;
-    d_J_A[11] = t215;
-    const real t216 = W[13] * d_Rc[1];
-    const real t217 = Rc[1] * d_W[13];
-    const real t218 = t216 + t217;
-    const real t219 = W[12] * d_Rc[0];
-    const real t220 = Rc[0] * d_W[12];
-    const real t221 = t219 + t220;
-    const real t222 = t218 + t221;
-    const real t223 = W[14] * d_Rc[2];
-    const real t224 = Rc[2] * d_W[14];
-    const real t225 = t223 + t224;
-    const real t226 = t222 + t225;
-    const real t227 = -t226;
-    d_J_A[12] = t227;
-    const real t228 = W[13] * d_Rc[4];
-    const real t229 = Rc[4] * d_W[13];
-    const real t230 = t228 + t229;
-    const real t231 = W[12] * d_Rc[3];
-    const real t232 = Rc[3] * d_W[12];
-    const real t233 = t231 + t232;
-    const real t234 = t230 + t233;
-    const real t235 = W[14] * d_Rc[5];
-    const real t236 = Rc[5] * d_W[14];
-    const real t237 = t235 + t236;
-    const real t238 = t234 + t237;
-    const real t239 = -t238;
-    d_J_A[13] = t239;
-    const real t240 = W[13] * d_Rc[7];
-    const real t241 = Rc[7] * d_W[13];
-    const real t242 = t240 + t241;
-    const real t243 = W[12] * d_Rc[6];
-    const real t244 = Rc[6] * d_W[12];
-    const real t245 = t243 + t244;
-    const real t246 = t242 + t245;
-    const real t247 = W[14] * d_Rc[8];
-    const real t248 = Rc[8] * d_W[14];
-    const real t249 = t247 + t248;
-    const real t250 = t246 + t249;
-    const real t251 = -t250;
-    d_J_A[14] = t251;
-    const real t252 = Rc[5] * W[14];
-    const real t253 = Rc[3] * W[12];
-    const real t254 = Rc[4] * W[13];
-    const real t255 = t253 + t254;
-    const real t256 = t252 + t255;
-    const real t257 = t256 * d_r_A[2];
-    const real t258 = r_A[2] * t238;
-    const real t259 = t257 + t258;
-    const real t260 = Rc[8] * W[14];
-    const real t261 = Rc[6] * W[12];
-    const real t262 = Rc[7] * W[13];
-    const real t263 = t261 + t262;
-    const real t264 = t260 + t263;
-    const real t265 = t264 * d_r_A[1];
-    const real t266 = r_A[1] * t250;
-    const real t267 = t265 + t266;
-    const real t268 = t259 - t267;
-    const real t269 = W[15] * d_Rc[0];
-    const real t270 = Rc[0] * d_W[15];
-    const real t271 = t269 + t270;
-    const real t272 = t268 - t271;
-    const real t273 = W[16] * d_Rc[1];
-    const real t274 = Rc[1] * d_W[16];
-    const real t275 = t273 + t274;
-    const real t276 = t272 - t275;
-    const real t277 = W[17] * d_Rc[2];
-    const real t278 = Rc[2] * d_W[17];
-    const real t279 = t277 + t278;
-    const real t280 = t276 - t279;
-    d_J_A[15] = t280;
-    const real t281 = t264 * d_r_A[0];
-    const real t282 = r_A[0] * t250;
-    const real t283 = t281 + t282;
-    const real t284 = Rc[2] * W[14];
-    const real t285 = Rc[0] * W[12];
-    const real t286 = Rc[1] * W[13];
-    const real t287 = t285 + t286;
-    const real t288 = t284 + t287;
-    const real t289 = t288 * d_r_A[2];
-    const real t290 = r_A[2] * t226;
-    const real t291 = t289 + t290;
-    const real t292 = t283 - t291;
-    const real t293 = W[15] * d_Rc[3];
-    const real t294 = Rc[3] * d_W[15];
-    const real t295 = t293 + t294;
-    const real t296 = t292 - t295;
-    const real t297 = W[16] * d_Rc[4];
-    const real t298 = Rc[4] * d_W[16];
-    const real t299 = t297 + t298;
-    const real t300 = t296 - t299;
-    const real t301 = W[17] * d_Rc[5];
-    const real t302 = Rc[5] * d_W[17];
-    const real t303 = t301 + t302;
-    const real t304 = t300 - t303;
-    d_J_A[16] = t304;
-    const real t305 = t288 * d_r_A[1];
-    const real t306 = r_A[1] * t226;
-    const real t307 = t305 + t306;
-    const real t308 = t256 * d_r_A[0];
-    const real t309 = r_A[0] * t238;
-    const real t310 = t308 + t309;
-    const real t311 = t307 - t310;
-    const real t312 = W[15] * d_Rc[6];
-    const real t313 = Rc[6] * d_W[15];
-    const real t314 = t312 + t313;
-    const real t315 = t311 - t314;
-    const real t316 = W[16] * d_Rc[7];
-    const real t317 = Rc[7] * d_W[16];
-    const real t318 = t316 + t317;
-    const real t319 = t315 - t318;
-    const real t320 = W[17] * d_Rc[8];
-    const real t321 = Rc[8] * d_W[17];
-    const real t322 = t320 + t321;
-    const real t323 = t319 - t322;
-    d_J_A[17] = t323;
-    const real t324 = W[19] * d_Rc[1];
-    const real t325 = Rc[1] * d_W[19];
-    const real t326 = t324 + t325;
-    const real t327 = W[18] * d_Rc[0];
-    const real t328 = Rc[0] * d_W[18];
-    const real t329 = t327 + t328;
-    const real t330 = t326 + t329;
-    const real t331 = W[20] * d_Rc[2];
-    const real t332 = Rc[2] * d_W[20];
-    const real t333 = t331 + t332;
-    const real t334 = t330 + t333;
-    const real t335 = -t334;
-    d_J_A[18] = t335;
-    const real t336 = W[19] * d_Rc[4];
-    const real t337 = Rc[4] * d_W[19];
-    const real t338 = t336 + t337;
-    const real t339 = W[18] * d_Rc[3];
-    const real t340 = Rc[3] * d_W[18];
-    const real t341 = t339 + t340;
-    const real t342 = t338 + t341;
-    const real t343 = W[20] * d_Rc[5];
-    const real t344 = Rc[5] * d_W[20];
-    const real t345 = t343 + t344;
-    const real t346 = t342 + t345;
-    const real t347 = -t346;
-    d_J_A[19] = t347;
-    const real t348 = W[19] * d_Rc[7];
-    const real t349 = Rc[7] * d_W[19];
-    const real t350 = t348 + t349;
-    const real t351 = W[18] * d_Rc[6];
-    const real t352 = Rc[6] * d_W[18];
-    const real t353 = t351 + t352;
-    const real t354 = t350 + t353;
-    const real t355 = W[20] * d_Rc[8];
-    const real t356 = Rc[8] * d_W[20];
-    const real t357 = t355 + t356;
-    const real t358 = t354 + t357;
-    const real t359 = -t358;
-    d_J_A[20] = t359;
-    const real t360 = Rc[5] * W[20];
-    const real t361 = Rc[3] * W[18];
-    const real t362 = Rc[4] * W[19];
-    const real t363 = t361 + t362;
-    const real t364 = t360 + t363;
-    const real t365 = t364 * d_r_A[2];
-    const real t366 = r_A[2] * t346;
-    const real t367 = t365 + t366;
-    const real t368 = Rc[8] * W[20];
-    const real t369 = Rc[6] * W[18];
-    const real t370 = Rc[7] * W[19];
-    const real t371 = t369 + t370;
-    const real t372 = t368 + t371;
-    const real t373 = t372 * d_r_A[1];
-    const real t374 = r_A[1] * t358;
-    const real t375 = t373 + t374;
-    const real t376 = t367 - t375;
-    const real t377 = W[21] * d_Rc[0];
-    const real t378 = Rc[0] * d_W[21];
-    const real t379 = t377 + t378;
-    const real t380 = t376 - t379;
-    const real t381 = W[22] * d_Rc[1];
-    const real t382 = Rc[1] * d_W[22];
-    const real t383 = t381 + t382;
-    const real t384 = t380 - t383;
-    const real t385 = W[23] * d_Rc[2];
-    const real t386 = Rc[2] * d_W[23];
-    const real t387 = t385 + t386;
-    const real t388 = t384 - t387;
-    d_J_A[21] = t388;
-    const real t389 = t372 * d_r_A[0];
-    const real t390 = r_A[0] * t358;
-    const real t391 = t389 + t390;
-    const real t392 = Rc[2] * W[20];
-    const real t393 = Rc[0] * W[18];
-    const real t394 = Rc[1] * W[19];
-    const real t395 = t393 + t394;
-    const real t396 = t392 + t395;
-    const real t397 = t396 * d_r_A[2];
-    const real t398 = r_A[2] * t334;
-    const real t399 = t397 + t398;
-    const real t400 = t391 - t399;
-    const real t401 = W[21] * d_Rc[3];
-    const real t402 = Rc[3] * d_W[21];
-    const real t403 = t401 + t402;
-    const real t404 = t400 - t403;
-    const real t405 = W[22] * d_Rc[4];
-    const real t406 = Rc[4] * d_W[22];
-    const real t407 = t405 + t406;
-    const real t408 = t404 - t407;
-    const real t409 = W[23] * d_Rc[5];
-    const real t410 = Rc[5] * d_W[23];
-    const real t411 = t409 + t410;
-    const real t412 = t408 - t411;
-    d_J_A[22] = t412;
-    const real t413 = t396 * d_r_A[1];
-    const real t414 = r_A[1] * t334;
-    const real t415 = t413 + t414;
-    const real t416 = t364 * d_r_A[0];
-    const real t417 = r_A[0] * t346;
-    const real t418 = t416 + t417;
-    const real t419 = t415 - t418;
-    const real t420 = W[21] * d_Rc[6];
-    const real t421 = Rc[6] * d_W[21];
-    const real t422 = t420 + t421;
-    const real t423 = t419 - t422;
-    const real t424 = W[22] * d_Rc[7];
-    const real t425 = Rc[7] * d_W[22];
-    const real t426 = t424 + t425;
-    const real t427 = t423 - t426;
-    const real t428 = W[23] * d_Rc[8];
-    const real t429 = Rc[8] * d_W[23];
-    const real t430 = t428 + t429;
-    const real t431 = t427 - t430;
-    d_J_A[23] = t431;
-    const real t432 = W[25] * d_Rc[1];
-    const real t433 = Rc[1] * d_W[25];
-    const real t434 = t432 + t433;
-    const real t435 = W[24] * d_Rc[0];
-    const real t436 = Rc[0] * d_W[24];
-    const real t437 = t435 + t436;
-    const real t438 = t434 + t437;
-    const real t439 = W[26] * d_Rc[2];
-    const real t440 = Rc[2] * d_W[26];
-    const real t441 = t439 + t440;
-    const real t442 = t438 + t441;
-    const real t443 = -t442;
-    d_J_A[24] = t443;
-    const real t444 = W[25] * d_Rc[4];
-    const real t445 = Rc[4] * d_W[25];
-    const real t446 = t444 + t445;
-    const real t447 = W[24] * d_Rc[3];
-    const real t448 = Rc[3] * d_W[24];
-    const real t449 = t447 + t448;
-    const real t450 = t446 + t449;
-    const real t451 = W[26] * d_Rc[5];
-    const real t452 = Rc[5] * d_W[26];
-    const real t453 = t451 + t452;
-    const real t454 = t450 + t453;
-    const real t455 = -t454;
-    d_J_A[25] = t455;
-    const real t456 = W[25] * d_Rc[7];
-    const real t457 = Rc[7] * d_W[25];
-    const real t458 = t456 + t457;
-    const real t459 = W[24] * d_Rc[6];
-    const real t460 = Rc[6] * d_W[24];
-    const real t461 = t459 + t460;
-    const real t462 = t458 + t461;
-    const real t463 = W[26] * d_Rc[8];
-    const real t464 = Rc[8] * d_W[26];
-    const real t465 = t463 + t464;
-    const real t466 = t462 + t465;
-    const real t467 = -t466;
-    d_J_A[26] = t467;
-    const real t468 = Rc[5] * W[26];
-    const real t469 = Rc[3] * W[24];
-    const real t470 = Rc[4] * W[25];
-    const real t471 = t469 + t470;
-    const real t472 = t468 + t471;
-    const real t473 = t472 * d_r_A[2];
-    const real t474 = r_A[2] * t454;
-    const real t475 = t473 + t474;
-    const real t476 = Rc[8] * W[26];
-    const real t477 = Rc[6] * W[24];
-    const real t478 = Rc[7] * W[25];
-    const real t479 = t477 + t478;
-    const real t480 = t476 + t479;
-    const real t481 = t480 * d_r_A[1];
-    const real t482 = r_A[1] * t466;
-    const real t483 = t481 + t482;
-    const real t484 = t475 - t483;
-    const real t485 = W[27] * d_Rc[0];
-    const real t486 = Rc[0] * d_W[27];
-    const real t487 = t485 + t486;
-    const real t488 = t484 - t487;
-    const real t489 = W[28] * d_Rc[1];
-    const real t490 = Rc[1] * d_W[28];
-    const real t491 = t489 + t490;
-    const real t492 = t488 - t491;
-    const real t493 = W[29] * d_Rc[2];
-    const real t494 = Rc[2] * d_W[29];
-    const real t495 = t493 + t494;
-    const real t496 = t492 - t495;
-    d_J_A[27] = t496;
-    const real t497 = t480 * d_r_A[0];
-    const real t498 = r_A[0] * t466;
-    const real t499 = t497 + t498;
-    const real t500 = Rc[2] * W[26];
-    const real t501 = Rc[0] * W[24];
-    const real t502 = Rc[1] * W[25];
-    const real t503 = t501 + t502;
-    const real t504 = t500 + t503;
-    const real t505 = t504 * d_r_A[2];
-    const real t506 = r_A[2] * t442;
-    const real t507 = t505 + t506;
-    const real t508 = t499 - t507;
-    const real t509 = W[27] * d_Rc[3];
-    const real t510 = Rc[3] * d_W[27];
-    const real t511 = t509 + t510;
-    const real t512 = t508 - t511;
-    const real t513 = W[28] * d_Rc[4];
-    const real t514 = Rc[4] * d_W[28];
-    const real t515 = t513 + t514;
-    const real t516 = t512 - t515;
-    const real t517 = W[29] * d_Rc[5];
-    const real t518 = Rc[5] * d_W[29];
-    const real t519 = t517 + t518;
-    const real t520 = t516 - t519;
-    d_J_A[28] = t520;
-    const real t521 = t504 * d_r_A[1];
-    const real t522 = r_A[1] * t442;
-    const real t523 = t521 + t522;
-    const real t524 = t472 * d_r_A[0];
-    const real t525 = r_A[0] * t454;
-    const real t526 = t524 + t525;
-    const real t527 = t523 - t526;
-    const real t528 = W[27] * d_Rc[6];
-    const real t529 = Rc[6] * d_W[27];
-    const real t530 = t528 + t529;
-    const real t531 = t527 - t530;
-    const real t532 = W[28] * d_Rc[7];
-    const real t533 = Rc[7] * d_W[28];
-    const real t534 = t532 + t533;
-    const real t535 = t531 - t534;
-    const real t536 = W[29] * d_Rc[8];
-    const real t537 = Rc[8] * d_W[29];
-    const real t538 = t536 + t537;
-    const real t539 = t535 - t538;
-    d_J_A[29] = t539;
-    const real t540 = W[31] * d_Rc[1];
-    const real t541 = Rc[1] * d_W[31];
-    const real t542 = t540 + t541;
-    const real t543 = W[30] * d_Rc[0];
-    const real t544 = Rc[0] * d_W[30];
-    const real t545 = t543 + t544;
-    const real t546 = t542 + t545;
-    const real t547 = W[32] * d_Rc[2];
-    const real t548 = Rc[2] * d_W[32];
-    const real t549 = t547 + t548;
-    const real t550 = t546 + t549;
-    const real t551 = -t550;
-    d_J_A[30] = t551;
-    const real t552 = W[31] * d_Rc[4];
-    const real t553 = Rc[4] * d_W[31];
-    const real t554 = t552 + t553;
-    const real t555 = W[30] * d_Rc[3];
-    const real t556 = Rc[3] * d_W[30];
-    const real t557 = t555 + t556;
-    const real t558 = t554 + t557;
-    const real t559 = W[32] * d_Rc[5];
-    const real t560 = Rc[5] * d_W[32];
-    const real t561 = t559 + t560;
-    const real t562 = t558 + t561;
-    const real t563 = -t562;
-    d_J_A[31] = t563;
-    const real t564 = W[31] * d_Rc[7];
-    const real t565 = Rc[7] * d_W[31];
-    const real t566 = t564 + t565;
-    const real t567 = W[30] * d_Rc[6];
-    const real t568 = Rc[6] * d_W[30];
-    const real t569 = t567 + t568;
-    const real t570 = t566 + t569;
-    const real t571 = W[32] * d_Rc[8];
-    const real t572 = Rc[8] * d_W[32];
-    const real t573 = t571 + t572;
-    const real t574 = t570 + t573;
-    const real t575 = -t574;
-    d_J_A[32] = t575;
-    const real t576 = Rc[5] * W[32];
-    const real t577 = Rc[3] * W[30];
-    const real t578 = Rc[4] * W[31];
-    const real t579 = t577 + t578;
-    const real t580 = t576 + t579;
-    const real t581 = t580 * d_r_A[2];
-    const real t582 = r_A[2] * t562;
-    const real t583 = t581 + t582;
-    const real t584 = Rc[8] * W[32];
-    const real t585 = Rc[6] * W[30];
-    const real t586 = Rc[7] * W[31];
-    const real t587 = t585 + t586;
-    const real t588 = t584 + t587;
-    const real t589 = t588 * d_r_A[1];
-    const real t590 = r_A[1] * t574;
-    const real t591 = t589 + t590;
-    const real t592 = t583 - t591;
-    const real t593 = W[33] * d_Rc[0];
-    const real t594 = Rc[0] * d_W[33];
-    const real t595 = t593 + t594;
-    const real t596 = t592 - t595;
-    const real t597 = W[34] * d_Rc[1];
-    const real t598 = Rc[1] * d_W[34];
-    const real t599 = t597 + t598;
-    const real t600 = t596 - t599;
-    const real t601 = W[35] * d_Rc[2];
-    const real t602 = Rc[2] * d_W[35];
-    const real t603 = t601 + t602;
-    const real t604 = t600 - t603;
-    d_J_A[33] = t604;
-    const real t605 = t588 * d_r_A[0];
-    const real t606 = r_A[0] * t574;
-    const real t607 = t605 + t606;
-    const real t608 = Rc[2] * W[32];
-    const real t609 = Rc[0] * W[30];
-    const real t610 = Rc[1] * W[31];
-    const real t611 = t609 + t610;
-    const real t612 = t608 + t611;
-    const real t613 = t612 * d_r_A[2];
-    const real t614 = r_A[2] * t550;
-    const real t615 = t613 + t614;
-    const real t616 = t607 - t615;
-    const real t617 = W[33] * d_Rc[3];
-    const real t618 = Rc[3] * d_W[33];
-    const real t619 = t617 + t618;
-    const real t620 = t616 - t619;
-    const real t621 = W[34] * d_Rc[4];
-    const real t622 = Rc[4] * d_W[34];
-    const real t623 = t621 + t622;
-    const real t624 = t620 - t623;
-    const real t625 = W[35] * d_Rc[5];
-    const real t626 = Rc[5] * d_W[35];
-    const real t627 = t625 + t626;
-    const real t628 = t624 - t627;
-    d_J_A[34] = t628;
-    const real t629 = t612 * d_r_A[1];
-    const real t630 = r_A[1] * t550;
-    const real t631 = t629 + t630;
-    const real t632 = t580 * d_r_A[0];
-    const real t633 = r_A[0] * t562;
-    const real t634 = t632 + t633;
-    const real t635 = t631 - t634;
-    const real t636 = W[33] * d_Rc[6];
-    const real t637 = Rc[6] * d_W[33];
-    const real t638 = t636 + t637;
-    const real t639 = t635 - t638;
-    const real t640 = W[34] * d_Rc[7];
-    const real t641 = Rc[7] * d_W[34];
-    const real t642 = t640 + t641;
-    const real t643 = t639 - t642;
-    const real t644 = W[35] * d_Rc[8];
-    const real t645 = Rc[8] * d_W[35];
-    const real t646 = t644 + t645;
-    const real t647 = t643 - t646;
-    d_J_A[35] = t647;
-    const real t648 = R_C[1] * d_W[1];
-    const real t649 = W[1] * d_R_C[1];
-    const real t650 = t648 + t649;
-    const real t651 = R_C[0] * d_W[0];
-    const real t652 = W[0] * d_R_C[0];
-    const real t653 = t651 + t652;
-    const real t654 = t650 + t653;
-    const real t655 = R_C[2] * d_W[2];
-    const real t656 = W[2] * d_R_C[2];
-    const real t657 = t655 + t656;
-    const real t658 = t654 + t657;
-    d_J_B[0] = t658;
-    const real t659 = R_C[4] * d_W[1];
-    const real t660 = W[1] * d_R_C[4];
-    const real t661 = t659 + t660;
-    const real t662 = R_C[3] * d_W[0];
-    const real t663 = W[0] * d_R_C[3];
-    const real t664 = t662 + t663;
-    const real t665 = t661 + t664;
-    const real t666 = R_C[5] * d_W[2];
-    const real t667 = W[2] * d_R_C[5];
-    const real t668 = t666 + t667;
-    const real t669 = t665 + t668;
-    d_J_B[1] = t669;
-    const real t670 = R_C[7] * d_W[1];
-    const real t671 = W[1] * d_R_C[7];
-    const real t672 = t670 + t671;
-    const real t673 = R_C[6] * d_W[0];
-    const real t674 = W[0] * d_R_C[6];
-    const real t675 = t673 + t674;
-    const real t676 = t672 + t675;
-    const real t677 = R_C[8] * d_W[2];
-    const real t678 = W[2] * d_R_C[8];
-    const real t679 = t677 + t678;
-    const real t680 = t676 + t679;
-    d_J_B[2] = t680;
-    const real t681 = r_e[1] * t680;
-    const real t682 = r_e[2] * t669;
-    const real t683 = t681 - t682;
-    const real t684 = R_C[0] * d_W[3];
-    const real t685 = W[3] * d_R_C[0];
-    const real t686 = t684 + t685;
-    const real t687 = t683 + t686;
-    const real t688 = R_C[1] * d_W[4];
-    const real t689 = W[4] * d_R_C[1];
-    const real t690 = t688 + t689;
-    const real t691 = t687 + t690;
-    const real t692 = R_C[2] * d_W[5];
-    const real t693 = W[5] * d_R_C[2];
-    const real t694 = t692 + t693;
-    const real t695 = t691 + t694;
-    d_J_B[3] = t695;
-    const real t696 = r_e[2] * t658;
-    const real t697 = r_e[0] * t680;
-    const real t698 = t696 - t697;
-    const real t699 = R_C[3] * d_W[3];
-    const real t700 = W[3] * d_R_C[3];
-    const real t701 = t699 + t700;
-    const real t702 = t698 + t701;
-    const real t703 = R_C[4] * d_W[4];
-    const real t704 = W[4] * d_R_C[4];
-    const real t705 = t703 + t704;
-    const real t706 = t702 + t705;
-    const real t707 = R_C[5] * d_W[5];
-    const real t708 = W[5] * d_R_C[5];
-    const real t709 = t707 + t708;
-    const real t710 = t706 + t709;
-    d_J_B[4] = t710;
-    const real t711 = r_e[0] * t669;
-    const real t712 = r_e[1] * t658;
-    const real t713 = t711 - t712;
-    const real t714 = R_C[6] * d_W[3];
-    const real t715 = W[3] * d_R_C[6];
-    const real t716 = t714 + t715;
-    const real t717 = t713 + t716;
-    const real t718 = R_C[7] * d_W[4];
-    const real t719 = W[4] * d_R_C[7];
-    const real t720 = t718 + t719;
-    const real t721 = t717 + t720;
-    const real t722 = R_C[8] * d_W[5];
-    const real t723 = W[5] * d_R_C[8];
-    const real t724 = t722 + t723;
-    const real t725 = t721 + t724;
-    d_J_B[5] = t725;
-    const real t726 = R_C[1] * d_W[7];
-    const real t727 = W[7] * d_R_C[1];
-    const real t728 = t726 + t727;
-    const real t729 = R_C[0] * d_W[6];
-    const real t730 = W[6] * d_R_C[0];
-    const real t731 = t729 + t730;
-    const real t732 = t728 + t731;
-    const real t733 = R_C[2] * d_W[8];
-    const real t734 = W[8] * d_R_C[2];
-    const real t735 = t733 + t734;
-    const real t736 = t732 + t735;
-    d_J_B[6] = t736;
-    const real t737 = R_C[4] * d_W[7];
-    const real t738 = W[7] * d_R_C[4];
-    const real t739 = t737 + t738;
-    const real t740 = R_C[3] * d_W[6];
-    const real t741 = W[6] * d_R_C[3];
-    const real t742 = t740 + t741;
-    const real t743 = t739 + t742;
-    const real t744 = R_C[5] * d_W[8];
-    const real t745 = W[8] * d_R_C[5];
-    const real t746 = t744 + t745;
-    const real t747 = t743 + t746;
-    d_J_B[7] = t747;
-    const real t748 = R_C[7] * d_W[7];
-    const real t749 = W[7] * d_R_C[7];
-    const real t750 = t748 + t749;
-    const real t751 = R_C[6] * d_W[6];
-    const real t752 = W[6] * d_R_C[6];
-    const real t753 = t751 + t752;
-    const real t754 = t750 + t753;
-    const real t755 = R_C[8] * d_W[8];
-    const real t756 = W[8] * d_R_C[8];
-    const real t757 = t755 + t756;
-    const real t758 = t754 + t757;
-    d_J_B[8] = t758;
-    const real t759 = r_e[1] * t758;
-    const real t760 = r_e[2] * t747;
-    const real t761 = t759 - t760;
-    const real t762 = R_C[0] * d_W[9];
-    const real t763 = W[9] * d_R_C[0];
-    const real t764 = t762 + t763;
-    const real t765 = t761 + t764;
-    const real t766 = R_C[1] * d_W[10];
-    const real t767 = W[10] * d_R_C[1];
-    const real t768 = t766 + t767;
-    const real t769 = t765 + t768;
-    const real t770 = R_C[2] * d_W[11];
-    const real t771 = W[11] * d_R_C[2];
-    const real t772 = t770 + t771;
-    const real t773 = t769 + t772;
-    d_J_B[9] = t773;
-    const real t774 = r_e[2] * t736;
-    const real t775 = r_e[0] * t758;
-    const real t776 = t774 - t775;
-    const real t777 = R_C[3] * d_W[9];
-    const real t778 = W[9] * d_R_C[3];
-    const real t779 = t777 + t778;
-    const real t780 = t776 + t779;
-    const real t781 = R_C[4] * d_W[10];
-    const real t782 = W[10] * d_R_C[4];
-    const real t783 = t781 + t782;
-    const real t784 = t780 + t783;
-    const real t785 = R_C[5] * d_W[11];
-    const real t786 = W[11] * d_R_C[5];
-    const real t787 = t785 + t786;
-    const real t788 = t784 + t787;
-    d_J_B[10] = t788;
-    const real t789 = r_e[0] * t747;
-    const real t790 = r_e[1] * t736;
-    const real t791 = t789 - t790;
-    const real t792 = R_C[6] * d_W[9];
-    const real t793 = W[9] * d_R_C[6];
-    const real t794 = t792 + t793;
-    const real t795 = t791 + t794;
-    const real t796 = R_C[7] * d_W[10];
-    const real t797 = W[10] * d_R_C[7];
-    const real t798 = t796 + t797;
-    const real t799 = t795 + t798;
-    const real t800 = R_C[8] * d_W[11];
-    const real t801 = W[11] * d_R_C[8];
-    const real t802 = t800 + t801;
-    const real t803 = t799 + t802;
-    d_J_B[11] = t803;
-    const real t804 = R_C[1] * d_W[13];
-    const real t805 = W[13] * d_R_C[1];
-    const real t806 = t804 + t805;
-    const real t807 = R_C[0] * d_W[12];
-    const real t808 = W[12] * d_R_C[0];
-    const real t809 = t807 + t808;
-    const real t810 = t806 + t809;
-    const real t811 = R_C[2] * d_W[14];
-    const real t812 = W[14] * d_R_C[2];
-    const real t813 = t811 + t812;
-    const real t814 = t810 + t813;
-    d_J_B[12] = t814;
-    const real t815 = R_C[4] * d_W[13];
-    const real t816 = W[13] * d_R_C[4];
-    const real t817 = t815 + t816;
-    const real t818 = R_C[3] * d_W[12];
-    const real t819 = W[12] * d_R_C[3];
-    const real t820 = t818 + t819;
-    const real t821 = t817 + t820;
-    const real t822 = R_C[5] * d_W[14];
-    const real t823 = W[14] * d_R_C[5];
-    const real t824 = t822 + t823;
-    const real t825 = t821 + t824;
-    d_J_B[13] = t825;
-    const real t826 = R_C[7] * d_W[13];
-    const real t827 = W[13] * d_R_C[7];
-    const real t828 = t826 + t827;
-    const real t829 = R_C[6] * d_W[12];
-    const real t830 = W[12] * d_R_C[6];
-    const real t831 = t829 + t830;
-    const real t832 = t828 + t831;
-    const real t833 = R_C[8] * d_W[14];
-    const real t834 = W[14] * d_R_C[8];
-    const real t835 = t833 + t834;
-    const real t836 = t832 + t835;
-    d_J_B[14] = t836;
-    const real t837 = r_e[1] * t836;
-    const real t838 = r_e[2] * t825;
-    const real t839 = t837 - t838;
-    const real t840 = R_C[0] * d_W[15];
-    const real t841 = W[15] * d_R_C[0];
-    const real t842 = t840 + t841;
-    const real t843 = t839 + t842;
-    const real t844 = R_C[1] * d_W[16];
-    const real t845 = W[16] * d_R_C[1];
-    const real t846 = t844 + t845;
-    const real t847 = t843 + t846;
-    const real t848 = R_C[2] * d_W[17];
-    const real t849 = W[17] * d_R_C[2];
-    const real t850 = t848 + t849;
-    const real t851 = t847 + t850;
-    d_J_B[15] = t851;
-    const real t852 = r_e[2] * t814;
-    const real t853 = r_e[0] * t836;
-    const real t854 = t852 - t853;
-    const real t855 = R_C[3] * d_W[15];
-    const real t856 = W[15] * d_R_C[3];
-    const real t857 = t855 + t856;
-    const real t858 = t854 + t857;
-    const real t859 = R_C[4] * d_W[16];
-    const real t860 = W[16] * d_R_C[4];
-    const real t861 = t859 + t860;
-    const real t862 = t858 + t861;
-    const real t863 = R_C[5] * d_W[17];
-    const real t864 = W[17] * d_R_C[5];
-    const real t865 = t863 + t864;
-    const real t866 = t862 + t865;
-    d_J_B[16] = t866;
-    const real t867 = r_e[0] * t825;
-    const real t868 = r_e[1] * t814;
-    const real t869 = t867 - t868;
-    const real t870 = R_C[6] * d_W[15];
-    const real t871 = W[15] * d_R_C[6];
-    const real t872 = t870 + t871;
-    const real t873 = t869 + t872;
-    const real t874 = R_C[7] * d_W[16];
-    const real t875 = W[16] * d_R_C[7];
-    const real t876 = t874 + t875;
-    const real t877 = t873 + t876;
-    const real t878 = R_C[8] * d_W[17];
-    const real t879 = W[17] * d_R_C[8];
-    const real t880 = t878 + t879;
-    const real t881 = t877 + t880;
-    d_J_B[17] = t881;
-    const real t882 = R_C[1] * d_W[19];
-    const real t883 = W[19] * d_R_C[1];
-    const real t884 = t882 + t883;
-    const real t885 = R_C[0] * d_W[18];
-    const real t886 = W[18] * d_R_C[0];
-    const real t887 = t885 + t886;
-    const real t888 = t884 + t887;
-    const real t889 = R_C[2] * d_W[20];
-    const real t890 = W[20] * d_R_C[2];
-    const real t891 = t889 + t890;
-    const real t892 = t888 + t891;
-    d_J_B[18] = t892;
-    const real t893 = R_C[4] * d_W[19];
-    const real t894 = W[19] * d_R_C[4];
-    const real t895 = t893 + t894;
-    const real t896 = R_C[3] * d_W[18];
-    const real t897 = W[18] * d_R_C[3];
-    const real t898 = t896 + t897;
-    const real t899 = t895 + t898;
-    const real t900 = R_C[5] * d_W[20];
-    const real t901 = W[20] * d_R_C[5];
-    const real t902 = t900 + t901;
-    const real t903 = t899 + t902;
-    d_J_B[19] = t903;
-    const real t904 = R_C[7] * d_W[19];
-    const real t905 = W[19] * d_R_C[7];
-    const real t906 = t904 + t905;
-    const real t907 = R_C[6] * d_W[18];
-    const real t908 = W[18] * d_R_C[6];
-    const real t909 = t907 + t908;
-    const real t910 = t906 + t909;
-    const real t911 = R_C[8] * d_W[20];
-    const real t912 = W[20] * d_R_C[8];
-    const real t913 = t911 + t912;
-    const real t914 = t910 + t913;
-    d_J_B[20] = t914;
-    const real t915 = r_e[1] * t914;
-    const real t916 = r_e[2] * t903;
-    const real t917 = t915 - t916;
-    const real t918 = R_C[0] * d_W[21];
-    const real t919 = W[21] * d_R_C[0];
-    const real t920 = t918 + t919;
-    const real t921 = t917 + t920;
-    const real t922 = R_C[1] * d_W[22];
-    const real t923 = W[22] * d_R_C[1];
-    const real t924 = t922 + t923;
-    const real t925 = t921 + t924;
-    const real t926 = R_C[2] * d_W[23];
-    const real t927 = W[23] * d_R_C[2];
-    const real t928 = t926 + t927;
-    const real t929 = t925 + t928;
-    d_J_B[21] = t929;
-    const real t930 = r_e[2] * t892;
-    const real t931 = r_e[0] * t914;
-    const real t932 = t930 - t931;
-    const real t933 = R_C[3] * d_W[21];
-    const real t934 = W[21] * d_R_C[3];
-    const real t935 = t933 + t934;
-    const real t936 = t932 + t935;
-    const real t937 = R_C[4] * d_W[22];
-    const real t938 = W[22] * d_R_C[4];
-    const real t939 = t937 + t938;
-    const real t940 = t936 + t939;
-    const real t941 = R_C[5] * d_W[23];
-    const real t942 = W[23] * d_R_C[5];
-    const real t943 = t941 + t942;
-    const real t944 = t940 + t943;
-    d_J_B[22] = t944;
-    const real t945 = r_e[0] * t903;
-    const real t946 = r_e[1] * t892;
-    const real t947 = t945 - t946;
-    const real t948 = R_C[6] * d_W[21];
-    const real t949 = W[21] * d_R_C[6];
-    const real t950 = t948 + t949;
-    const real t951 = t947 + t950;
-    const real t952 = R_C[7] * d_W[22];
-    const real t953 = W[22] * d_R_C[7];
-    const real t954 = t952 + t953;
-    const real t955 = t951 + t954;
-    const real t956 = R_C[8] * d_W[23];
-    const real t957 = W[23] * d_R_C[8];
-    const real t958 = t956 + t957;
-    const real t959 = t955 + t958;
-    d_J_B[23] = t959;
-    const real t960 = R_C[1] * d_W[25];
-    const real t961 = W[25] * d_R_C[1];
-    const real t962 = t960 + t961;
-    const real t963 = R_C[0] * d_W[24];
-    const real t964 = W[24] * d_R_C[0];
-    const real t965 = t963 + t964;
-    const real t966 = t962 + t965;
-    const real t967 = R_C[2] * d_W[26];
-    const real t968 = W[26] * d_R_C[2];
-    const real t969 = t967 + t968;
-    const real t970 = t966 + t969;
-    d_J_B[24] = t970;
-    const real t971 = R_C[4] * d_W[25];
-    const real t972 = W[25] * d_R_C[4];
-    const real t973 = t971 + t972;
-    const real t974 = R_C[3] * d_W[24];
-    const real t975 = W[24] * d_R_C[3];
-    const real t976 = t974 + t975;
-    const real t977 = t973 + t976;
-    const real t978 = R_C[5] * d_W[26];
-    const real t979 = W[26] * d_R_C[5];
-    const real t980 = t978 + t979;
-    const real t981 = t977 + t980;
-    d_J_B[25] = t981;
-    const real t982 = R_C[7] * d_W[25];
-    const real t983 = W[25] * d_R_C[7];
-    const real t984 = t982 + t983;
-    const real t985 = R_C[6] * d_W[24];
-    const real t986 = W[24] * d_R_C[6];
-    const real t987 = t985 + t986;
-    const real t988 = t984 + t987;
-    const real t989 = R_C[8] * d_W[26];
-    const real t990 = W[26] * d_R_C[8];
-    const real t991 = t989 + t990;
-    const real t992 = t988 + t991;
-    d_J_B[26] = t992;
-    const real t993 = r_e[1] * t992;
-    const real t994 = r_e[2] * t981;
-    const real t995 = t993 - t994;
-    const real t996 = R_C[0] * d_W[27];
-    const real t997 = W[27] * d_R_C[0];
-    const real t998 = t996 + t997;
-    const real t999 = t995 + t998;
-    const real t1000 = R_C[1] * d_W[28];
-    const real t1001 = W[28] * d_R_C[1];
-    const real t1002 = t1000 + t1001;
-    const real t1003 = t999 + t1002;
-    const real t1004 = R_C[2] * d_W[29];
-    const real t1005 = W[29] * d_R_C[2];
-    const real t1006 = t1004 + t1005;
-    const real t1007 = t1003 + t1006;
-    d_J_B[27] = t1007;
-    const real t1008 = r_e[2] * t970;
-    const real t1009 = r_e[0] * t992;
-    const real t1010 = t1008 - t1009;
-    const real t1011 = R_C[3] * d_W[27];
-    const real t1012 = W[27] * d_R_C[3];
-    const real t1013 = t1011 + t1012;
-    const real t1014 = t1010 + t1013;
-    const real t1015 = R_C[4] * d_W[28];
-    const real t1016 = W[28] * d_R_C[4];
-    const real t1017 = t1015 + t1016;
-    const real t1018 = t1014 + t1017;
-    const real t1019 = R_C[5] * d_W[29];
-    const real t1020 = W[29] * d_R_C[5];
-    const real t1021 = t1019 + t1020;
-    const real t1022 = t1018 + t1021;
-    d_J_B[28] = t1022;
-    const real t1023 = r_e[0] * t981;
-    const real t1024 = r_e[1] * t970;
-    const real t1025 = t1023 - t1024;
-    const real t1026 = R_C[6] * d_W[27];
-    const real t1027 = W[27] * d_R_C[6];
-    const real t1028 = t1026 + t1027;
-    const real t1029 = t1025 + t1028;
-    const real t1030 = R_C[7] * d_W[28];
-    const real t1031 = W[28] * d_R_C[7];
-    const real t1032 = t1030 + t1031;
-    const real t1033 = t1029 + t1032;
-    const real t1034 = R_C[8] * d_W[29];
-    const real t1035 = W[29] * d_R_C[8];
-    const real t1036 = t1034 + t1035;
-    const real t1037 = t1033 + t1036;
-    d_J_B[29] = t1037;
-    const real t1038 = R_C[1] * d_W[31];
-    const real t1039 = W[31] * d_R_C[1];
-    const real t1040 = t1038 + t1039;
-    const real t1041 = R_C[0] * d_W[30];
-    const real t1042 = W[30] * d_R_C[0];
-    const real t1043 = t1041 + t1042;
-    const real t1044 = t1040 + t1043;
-    const real t1045 = R_C[2] * d_W[32];
-    const real t1046 = W[32] * d_R_C[2];
-    const real t1047 = t1045 + t1046;
-    const real t1048 = t1044 + t1047;
-    d_J_B[30] = t1048;
-    const real t1049 = R_C[4] * d_W[31];
-    const real t1050 = W[31] * d_R_C[4];
-    const real t1051 = t1049 + t1050;
-    const real t1052 = R_C[3] * d_W[30];
-    const real t1053 = W[30] * d_R_C[3];
-    const real t1054 = t1052 + t1053;
-    const real t1055 = t1051 + t1054;
-    const real t1056 = R_C[5] * d_W[32];
-    const real t1057 = W[32] * d_R_C[5];
-    const real t1058 = t1056 + t1057;
-    const real t1059 = t1055 + t1058;
-    d_J_B[31] = t1059;
-    const real t1060 = R_C[7] * d_W[31];
-    const real t1061 = W[31] * d_R_C[7];
-    const real t1062 = t1060 + t1061;
-    const real t1063 = R_C[6] * d_W[30];
-    const real t1064 = W[30] * d_R_C[6];
-    const real t1065 = t1063 + t1064;
-    const real t1066 = t1062 + t1065;
-    const real t1067 = R_C[8] * d_W[32];
-    const real t1068 = W[32] * d_R_C[8];
-    const real t1069 = t1067 + t1068;
-    const real t1070 = t1066 + t1069;
-    d_J_B[32] = t1070;
-    const real t1071 = r_e[1] * t1070;
-    const real t1072 = r_e[2] * t1059;
-    const real t1073 = t1071 - t1072;
-    const real t1074 = R_C[0] * d_W[33];
-    const real t1075 = W[33] * d_R_C[0];
-    const real t1076 = t1074 + t1075;
-    const real t1077 = t1073 + t1076;
-    const real t1078 = R_C[1] * d_W[34];
-    const real t1079 = W[34] * d_R_C[1];
-    const real t1080 = t1078 + t1079;
-    const real t1081 = t1077 + t1080;
-    const real t1082 = R_C[2] * d_W[35];
-    const real t1083 = W[35] * d_R_C[2];
-    const real t1084 = t1082 + t1083;
-    const real t1085 = t1081 + t1084;
-    d_J_B[33] = t1085;
-    const real t1086 = r_e[2] * t1048;
-    const real t1087 = r_e[0] * t1070;
-    const real t1088 = t1086 - t1087;
-    const real t1089 = R_C[3] * d_W[33];
-    const real t1090 = W[33] * d_R_C[3];
-    const real t1091 = t1089 + t1090;
-    const real t1092 = t1088 + t1091;
-    const real t1093 = R_C[4] * d_W[34];
-    const real t1094 = W[34] * d_R_C[4];
-    const real t1095 = t1093 + t1094;
-    const real t1096 = t1092 + t1095;
-    const real t1097 = R_C[5] * d_W[35];
-    const real t1098 = W[35] * d_R_C[5];
-    const real t1099 = t1097 + t1098;
-    const real t1100 = t1096 + t1099;
-    d_J_B[34] = t1100;
-    const real t1101 = r_e[0] * t1059;
-    const real t1102 = r_e[1] * t1048;
-    const real t1103 = t1101 - t1102;
-    const real t1104 = R_C[6] * d_W[33];
-    const real t1105 = W[33] * d_R_C[6];
-    const real t1106 = t1104 + t1105;
-    const real t1107 = t1103 + t1106;
-    const real t1108 = R_C[7] * d_W[34];
-    const real t1109 = W[34] * d_R_C[7];
-    const real t1110 = t1108 + t1109;
-    const real t1111 = t1107 + t1110;
-    const real t1112 = R_C[8] * d_W[35];
-    const real t1113 = W[35] * d_R_C[8];
-    const real t1114 = t1112 + t1113;
-    const real t1115 = t1111 + t1114;
-    d_J_B[35] = t1115;
-    const real t1116 = relative[5] * d_W[5];
-    const real t1117 = W[5] * d_relative[5];
-    const real t1118 = t1116 + t1117;
-    const real t1119 = relative[4] * d_W[4];
-    const real t1120 = W[4] * d_relative[4];
-    const real t1121 = t1119 + t1120;
-    const real t1122 = relative[3] * d_W[3];
-    const real t1123 = W[3] * d_relative[3];
-    const real t1124 = t1122 + t1123;
-    const real t1125 = relative[2] * d_W[2];
-    const real t1126 = W[2] * d_relative[2];
-    const real t1127 = t1125 + t1126;
-    const real t1128 = relative[1] * d_W[1];
-    const real t1129 = W[1] * d_relative[1];
-    const real t1130 = t1128 + t1129;
-    const real t1131 = relative[0] * d_W[0];
-    const real t1132 = W[0] * d_relative[0];
-    const real t1133 = t1131 + t1132;
-    const real t1134 = t1130 + t1133;
-    const real t1135 = t1127 + t1134;
-    const real t1136 = t1124 + t1135;
-    const real t1137 = t1121 + t1136;
-    const real t1138 = t1118 + t1137;
-    d_l[0] = t1138;
-    const real t1139 = relative[5] * d_W[11];
-    const real t1140 = W[11] * d_relative[5];
-    const real t1141 = t1139 + t1140;
-    const real t1142 = relative[4] * d_W[10];
-    const real t1143 = W[10] * d_relative[4];
-    const real t1144 = t1142 + t1143;
-    const real t1145 = relative[3] * d_W[9];
-    const real t1146 = W[9] * d_relative[3];
-    const real t1147 = t1145 + t1146;
-    const real t1148 = relative[2] * d_W[8];
-    const real t1149 = W[8] * d_relative[2];
-    const real t1150 = t1148 + t1149;
-    const real t1151 = relative[1] * d_W[7];
-    const real t1152 = W[7] * d_relative[1];
-    const real t1153 = t1151 + t1152;
-    const real t1154 = relative[0] * d_W[6];
-    const real t1155 = W[6] * d_relative[0];
-    const real t1156 = t1154 + t1155;
-    const real t1157 = t1153 + t1156;
-    const real t1158 = t1150 + t1157;
-    const real t1159 = t1147 + t1158;
-    const real t1160 = t1144 + t1159;
-    const real t1161 = t1141 + t1160;
-    d_l[1] = t1161;
-    const real t1162 = relative[5] * d_W[17];
-    const real t1163 = W[17] * d_relative[5];
-    const real t1164 = t1162 + t1163;
-    const real t1165 = relative[4] * d_W[16];
-    const real t1166 = W[16] * d_relative[4];
-    const real t1167 = t1165 + t1166;
-    const real t1168 = relative[3] * d_W[15];
-    const real t1169 = W[15] * d_relative[3];
-    const real t1170 = t1168 + t1169;
-    const real t1171 = relative[2] * d_W[14];
-    const real t1172 = W[14] * d_relative[2];
-    const real t1173 = t1171 + t1172;
-    const real t1174 = relative[1] * d_W[13];
-    const real t1175 = W[13] * d_relative[1];
-    const real t1176 = t1174 + t1175;
-    const real t1177 = relative[0] * d_W[12];
-    const real t1178 = W[12] * d_relative[0];
-    const real t1179 = t1177 + t1178;
-    const real t1180 = t1176 + t1179;
-    const real t1181 = t1173 + t1180;
-    const real t1182 = t1170 + t1181;
-    const real t1183 = t1167 + t1182;
-    const real t1184 = t1164 + t1183;
-    d_l[2] = t1184;
-    const real t1185 = relative[5] * d_W[23];
-    const real t1186 = W[23] * d_relative[5];
-    const real t1187 = t1185 + t1186;
-    const real t1188 = relative[4] * d_W[22];
-    const real t1189 = W[22] * d_relative[4];
-    const real t1190 = t1188 + t1189;
-    const real t1191 = relative[3] * d_W[21];
-    const real t1192 = W[21] * d_relative[3];
-    const real t1193 = t1191 + t1192;
-    const real t1194 = relative[2] * d_W[20];
-    const real t1195 = W[20] * d_relative[2];
-    const real t1196 = t1194 + t1195;
-    const real t1197 = relative[1] * d_W[19];
-    const real t1198 = W[19] * d_relative[1];
-    const real t1199 = t1197 + t1198;
-    const real t1200 = relative[0] * d_W[18];
-    const real t1201 = W[18] * d_relative[0];
-    const real t1202 = t1200 + t1201;
-    const real t1203 = t1199 + t1202;
-    const real t1204 = t1196 + t1203;
-    const real t1205 = t1193 + t1204;
-    const real t1206 = t1190 + t1205;
-    const real t1207 = t1187 + t1206;
-    d_l[3] = t1207;
-    const real t1208 = relative[5] * d_W[29];
-    const real t1209 = W[29] * d_relative[5];
-    const real t1210 = t1208 + t1209;
-    const real t1211 = relative[4] * d_W[28];
-    const real t1212 = W[28] * d_relative[4];
-    const real t1213 = t1211 + t1212;
-    const real t1214 = relative[3] * d_W[27];
-    const real t1215 = W[27] * d_relative[3];
-    const real t1216 = t1214 + t1215;
-    const real t1217 = relative[2] * d_W[26];
-    const real t1218 = W[26] * d_relative[2];
-    const real t1219 = t1217 + t1218;
-    const real t1220 = relative[1] * d_W[25];
-    const real t1221 = W[25] * d_relative[1];
-    const real t1222 = t1220 + t1221;
-    const real t1223 = relative[0] * d_W[24];
-    const real t1224 = W[24] * d_relative[0];
-    const real t1225 = t1223 + t1224;
-    const real t1226 = t1222 + t1225;
-    const real t1227 = t1219 + t1226;
-    const real t1228 = t1216 + t1227;
-    const real t1229 = t1213 + t1228;
-    const real t1230 = t1210 + t1229;
-    d_l[4] = t1230;
-    const real t1231 = relative[5] * d_W[35];
-    const real t1232 = W[35] * d_relative[5];
-    const real t1233 = t1231 + t1232;
-    const real t1234 = relative[4] * d_W[34];
-    const real t1235 = W[34] * d_relative[4];
-    const real t1236 = t1234 + t1235;
-    const real t1237 = relative[3] * d_W[33];
-    const real t1238 = W[33] * d_relative[3];
-    const real t1239 = t1237 + t1238;
-    const real t1240 = relative[2] * d_W[32];
-    const real t1241 = W[32] * d_relative[2];
-    const real t1242 = t1240 + t1241;
-    const real t1243 = relative[1] * d_W[31];
-    const real t1244 = W[31] * d_relative[1];
-    const real t1245 = t1243 + t1244;
-    const real t1246 = relative[0] * d_W[30];
-    const real t1247 = W[30] * d_relative[0];
-    const real t1248 = t1246 + t1247;
-    const real t1249 = t1245 + t1248;
-    const real t1250 = t1242 + t1249;
-    const real t1251 = t1239 + t1250;
-    const real t1252 = t1236 + t1251;
-    const real t1253 = t1233 + t1252;
-    d_l[5] = t1253;
+    d_J_B[0] = t118;
+    const real t119 = R_C[4] * d_w[1];
+    const real t120 = w[1] * d_R_C[4];
+    const real t121 = t119 + t120;
+    const real t122 = R_C[3] * d_w[0];
+    const real t123 = w[0] * d_R_C[3];
+    const real t124 = t122 + t123;
+    const real t125 = t121 + t124;
+    const real t126 = R_C[5] * d_w[2];
+    const real t127 = w[2] * d_R_C[5];
+    const real t128 = t126 + t127;
+    const real t129 = t125 + t128;
+    d_J_B[1] = t129;
+    const real t130 = R_C[7] * d_w[1];
+    const real t131 = w[1] * d_R_C[7];
+    const real t132 = t130 + t131;
+    const real t133 = R_C[6] * d_w[0];
+    const real t134 = w[0] * d_R_C[6];
+    const real t135 = t133 + t134;
+    const real t136 = t132 + t135;
+    const real t137 = R_C[8] * d_w[2];
+    const real t138 = w[2] * d_R_C[8];
+    const real t139 = t137 + t138;
+    const real t140 = t136 + t139;
+    d_J_B[2] = t140;
+    const real t141 = r_e[1] * t140;
+    const real t142 = r_e[2] * t129;
+    const real t143 = t141 - t142;
+    const real t144 = R_C[0] * d_w[3];
+    const real t145 = w[3] * d_R_C[0];
+    const real t146 = t144 + t145;
+    const real t147 = t143 + t146;
+    const real t148 = R_C[1] * d_w[4];
+    const real t149 = w[4] * d_R_C[1];
+    const real t150 = t148 + t149;
+    const real t151 = t147 + t150;
+    const real t152 = R_C[2] * d_w[5];
+    const real t153 = w[5] * d_R_C[2];
+    const real t154 = t152 + t153;
+    const real t155 = t151 + t154;
+    d_J_B[3] = t155;
+    const real t156 = r_e[2] * t118;
+    const real t157 = r_e[0] * t140;
+    const real t158 = t156 - t157;
+    const real t159 = R_C[3] * d_w[3];
+    const real t160 = w[3] * d_R_C[3];
+    const real t161 = t159 + t160;
+    const real t162 = t158 + t161;
+    const real t163 = R_C[4] * d_w[4];
+    const real t164 = w[4] * d_R_C[4];
+    const real t165 = t163 + t164;
+    const real t166 = t162 + t165;
+    const real t167 = R_C[5] * d_w[5];
+    const real t168 = w[5] * d_R_C[5];
+    const real t169 = t167 + t168;
+    const real t170 = t166 + t169;
+    d_J_B[4] = t170;
+    const real t171 = r_e[0] * t129;
+    const real t172 = r_e[1] * t118;
+    const real t173 = t171 - t172;
+    const real t174 = R_C[6] * d_w[3];
+    const real t175 = w[3] * d_R_C[6];
+    const real t176 = t174 + t175;
+    const real t177 = t173 + t176;
+    const real t178 = R_C[7] * d_w[4];
+    const real t179 = w[4] * d_R_C[7];
+    const real t180 = t178 + t179;
+    const real t181 = t177 + t180;
+    const real t182 = R_C[8] * d_w[5];
+    const real t183 = w[5] * d_R_C[8];
+    const real t184 = t182 + t183;
+    const real t185 = t181 + t184;
+    d_J_B[5] = t185;
     return 0;
 }
 
-static int mstmm_sweep_loops_rows_slope_call(int n, const real *const *in, real *const *out)
+static int mstmm_sweep_loops_row_slope_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_loops_rows_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
+    return mstmm_sweep_loops_row_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
 }
 
-static const mstmm_port mstmm_sweep_loops_rows_slope_inputs[] = {
-    {"W", 36, "", 0, 0},
+static const mstmm_port mstmm_sweep_loops_row_slope_inputs[] = {
+    {"w", 6, "", 0, 0},
     {"R_C", 9, "", 0, 0},
     {"r_e", 3, "m", 0, 0},
     {"Rc", 9, "", 0, 0},
     {"r_A", 3, "m", 0, 0},
-    {"relative", 6, "", 0, 0},
-    {"d_W", 36, "", 0, 0},
+    {"d_w", 6, "", 0, 0},
     {"d_R_C", 9, "", 0, 0},
     {"d_Rc", 9, "", 0, 0},
     {"d_r_A", 3, "m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_row_slope_outputs[] = {
+    {"d_J_A", 6, "", 0, 0},
+    {"d_J_B", 6, "", 0, 0},
+};
+
+/* known and its derivative along a direction
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  W[6][6] rows: H^+, then what the hinge holds
+ * in  relative[6] motion of the end of B relative to C
+ * in  d_W[6][6] derivative of W
+ * in  d_relative[6] derivative of relative
+ * out d_l[6] derivative of l
+ */
+int mstmm_sweep_loops_known_slope(const real *restrict W, const real *restrict relative,
+    const real *restrict d_W, const real *restrict d_relative, real *restrict d_l)
+{
+    const real t0 = relative[5] * d_W[5];
+    const real t1 = W[5] * d_relative[5];
+    const real t2 = t0 + t1;
+    const real t3 = relative[4] * d_W[4];
+    const real t4 = W[4] * d_relative[4];
+    const real t5 = t3 + t4;
+    const real t6 = relative[3] * d_W[3];
+    const real t7 = W[3] * d_relative[3];
+    const real t8 = t6 + t7;
+    const real t9 = relative[2] * d_W[2];
+    const real t10 = W[2] * d_relative[2];
+    const real t11 = t9 + t10;
+    const real t12 = relative[1] * d_W[1];
+    const real t13 = W[1] * d_relative[1];
+    const real t14 = t12 + t13;
+    const real t15 = relative[0] * d_W[0];
+    const real t16 = W[0] * d_relative[0];
+    const real t17 = t15 + t16;
+    const real t18 = t14 + t17;
+    const real t19 = t11 + t18;
+    const real t20 = t8 + t19;
+    const real t21 = t5 + t20;
+    const real t22 = t2 + t21;
+    d_l[0] = t22;
+    const real t23 = W[11] * d_relative[5];
+    const real t24 = relative[5] * d_W[11];
+    const real t25 = t23 + t24;
+    const real t26 = W[10] * d_relative[4];
+    const real t27 = relative[4] * d_W[10];
+    const real t28 = t26 + t27;
+    const real t29 = W[9] * d_relative[3];
+    const real t30 = relative[3] * d_W[9];
+    const real t31 = t29 + t30;
+    const real t32 = W[8] * d_relative[2];
+    const real t33 = relative[2] * d_W[8];
+    const real t34 = t32 + t33;
+    const real t35 = W[7] * d_relative[1];
+    const real t36 = relative[1] * d_W[7];
+    const real t37 = t35 + t36;
+    const real t38 = W[6] * d_relative[0];
+    const real t39 = relative[0] * d_W[6];
+    const real t40 = t38 + t39;
+    const real t41 = t37 + t40;
+    const real t42 = t34 + t41;
+    const real t43 = t31 + t42;
+    const real t44 = t28 + t43;
+    const real t45 = t25 + t44;
+    d_l[1] = t45;
+    const real t46 = W[17] * d_relative[5];
+    const real t47 = relative[5] * d_W[17];
+    const real t48 = t46 + t47;
+    const real t49 = W[16] * d_relative[4];
+    const real t50 = relative[4] * d_W[16];
+    const real t51 = t49 + t50;
+    const real t52 = W[15] * d_relative[3];
+    const real t53 = relative[3] * d_W[15];
+    const real t54 = t52 + t53;
+    const real t55 = W[14] * d_relative[2];
+    const real t56 = relative[2] * d_W[14];
+    const real t57 = t55 + t56;
+    const real t58 = W[13] * d_relative[1];
+    const real t59 = relative[1] * d_W[13];
+    const real t60 = t58 + t59;
+    const real t61 = W[12] * d_relative[0];
+    const real t62 = relative[0] * d_W[12];
+    const real t63 = t61 + t62;
+    const real t64 = t60 + t63;
+    const real t65 = t57 + t64;
+    const real t66 = t54 + t65;
+    const real t67 = t51 + t66;
+    const real t68 = t48 + t67;
+    d_l[2] = t68;
+    const real t69 = W[23] * d_relative[5];
+    const real t70 = relative[5] * d_W[23];
+    const real t71 = t69 + t70;
+    const real t72 = W[22] * d_relative[4];
+    const real t73 = relative[4] * d_W[22];
+    const real t74 = t72 + t73;
+    const real t75 = W[21] * d_relative[3];
+    const real t76 = relative[3] * d_W[21];
+    const real t77 = t75 + t76;
+    const real t78 = W[20] * d_relative[2];
+    const real t79 = relative[2] * d_W[20];
+    const real t80 = t78 + t79;
+    const real t81 = W[19] * d_relative[1];
+    const real t82 = relative[1] * d_W[19];
+    const real t83 = t81 + t82;
+    const real t84 = W[18] * d_relative[0];
+    const real t85 = relative[0] * d_W[18];
+    const real t86 = t84 + t85;
+    const real t87 = t83 + t86;
+    const real t88 = t80 + t87;
+    const real t89 = t77 + t88;
+    const real t90 = t74 + t89;
+    const real t91 = t71 + t90;
+    d_l[3] = t91;
+    const real t92 = W[29] * d_relative[5];
+    const real t93 = relative[5] * d_W[29];
+    const real t94 = t92 + t93;
+    const real t95 = W[28] * d_relative[4];
+    const real t96 = relative[4] * d_W[28];
+    const real t97 = t95 + t96;
+    const real t98 = W[27] * d_relative[3];
+    const real t99 = relative[3] * d_W[27];
+    const real t100 = t98 + t99;
+    const real t101 = W[26] * d_relative[2];
+    const real t102 = relative[2] * d_W[26];
+    const real t103 = t101 + t102;
+    const real t104 = W[25] * d_relative[1];
+    const real t105 = relative[1] * d_W[25];
+    const real t106 = t104 + t105;
+    const real t107 = W[24] * d_relative[0];
+    const real t108 = relative[0] * d_W[24];
+    const real t109 = t107 + t108;
+    const real t110 = t106 + t109;
+    const real t111 = t103 + t110;
+    const real t112 = t100 + t111;
+    const real t113 = t97 + t112;
+    const real t114 = t94 + t113;
+    d_l[4] = t114;
+    const real t115 = W[35] * d_relative[5];
+    const real t116 = relative[5] * d_W[35];
+    const real t117 = t115 + t116;
+    const real t118 = W[34] * d_relative[4];
+    const real t119 = relative[4] * d_W[34];
+    const real t120 = t118 + t119;
+    const real t121 = W[33] * d_relative[3];
+    const real t122 = relative[3] * d_W[33];
+    const real t123 = t121 + t122;
+    const real t124 = W[32] * d_relative[2];
+    const real t125 = relative[2] * d_W[32];
+    const real t126 = t124 + t125;
+    const real t127 = W[31] * d_relative[1];
+    const real t128 = relative[1] * d_W[31];
+    const real t129 = t127 + t128;
+    const real t130 = W[30] * d_relative[0];
+    const real t131 = relative[0] * d_W[30];
+    const real t132 = t130 + t131;
+    const real t133 = t129 + t132;
+    const real t134 = t126 + t133;
+    const real t135 = t123 + t134;
+    const real t136 = t120 + t135;
+    const real t137 = t117 + t136;
+    d_l[5] = t137;
+    return 0;
+}
+
+static int mstmm_sweep_loops_known_slope_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_known_slope(in[0], in[1], in[2], in[3], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_known_slope_inputs[] = {
+    {"W", 36, "", 0, 0},
+    {"relative", 6, "", 0, 0},
+    {"d_W", 36, "", 0, 0},
     {"d_relative", 6, "", 0, 0},
 };
 
-static const mstmm_port mstmm_sweep_loops_rows_slope_outputs[] = {
-    {"d_J_A", 36, "", 0, 0},
-    {"d_J_B", 36, "", 0, 0},
+static const mstmm_port mstmm_sweep_loops_known_slope_outputs[] = {
     {"d_l", 6, "", 0, 0},
 };
 
@@ -5375,14 +3934,26 @@ static const mstmm_port mstmm_sweep_loops_rolling_drift_slope_outputs[] = {
 
 static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
     {
+        .name = "meet",
+        .function = (void (*)(void))mstmm_sweep_loops_meet,
+        .call = mstmm_sweep_loops_meet_call,
+        .n_inputs = 7,
+        .n_outputs = 3,
+        .inputs = mstmm_sweep_loops_meet_inputs,
+        .outputs = mstmm_sweep_loops_meet_outputs,
+        .ir_hash = "3082a20efb8f764907d5d1b88fc222cef01335ecd879a5302501f4f6917a2bed",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "gap",
         .function = (void (*)(void))mstmm_sweep_loops_gap,
         .call = mstmm_sweep_loops_gap_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
+        .n_inputs = 3,
+        .n_outputs = 1,
         .inputs = mstmm_sweep_loops_gap_inputs,
         .outputs = mstmm_sweep_loops_gap_outputs,
-        .ir_hash = "c196318891b6dbbe04056adfc88c8ea0d300432244a287ae1338a165f9f61db7",
+        .ir_hash = "f8f915f977ac47219a8f6497d044e1a4e4cf884a6cca06249463f5fba1d31009",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5411,14 +3982,26 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "rows",
-        .function = (void (*)(void))mstmm_sweep_loops_rows,
-        .call = mstmm_sweep_loops_rows_call,
-        .n_inputs = 6,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_loops_rows_inputs,
-        .outputs = mstmm_sweep_loops_rows_outputs,
-        .ir_hash = "88f1f09650a37550d37b81b7a3a04f74845588742341c9d18b01f6a7028671d8",
+        .name = "row",
+        .function = (void (*)(void))mstmm_sweep_loops_row,
+        .call = mstmm_sweep_loops_row_call,
+        .n_inputs = 5,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_loops_row_inputs,
+        .outputs = mstmm_sweep_loops_row_outputs,
+        .ir_hash = "04db92af832fa69387662d913f4574d60a0e5b08a4eae998394929540ce35691",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "known",
+        .function = (void (*)(void))mstmm_sweep_loops_known,
+        .call = mstmm_sweep_loops_known_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_known_inputs,
+        .outputs = mstmm_sweep_loops_known_outputs,
+        .ir_hash = "19cfc28fd574aa56ec15d7c79e86010e2294f90cbfef9d79263c8bb99477faba",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5430,7 +4013,7 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_told_inputs,
         .outputs = mstmm_sweep_loops_told_outputs,
-        .ir_hash = "e06a5f15663f735bb685c3aeb263cbde86923583120a39e54b2da58f3a66a83a",
+        .ir_hash = "b222e52d32478340877e552514bf885b9bc618767d4bc2687707ec85bc44a920",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5447,14 +4030,26 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "settle",
+        .function = (void (*)(void))mstmm_sweep_loops_settle,
+        .call = mstmm_sweep_loops_settle_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_settle_inputs,
+        .outputs = mstmm_sweep_loops_settle_outputs,
+        .ir_hash = "cab91aa6fe166753058a065b2f748455743a85eb24fd840b49789c55fee28f85",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "close",
         .function = (void (*)(void))mstmm_sweep_loops_close,
         .call = mstmm_sweep_loops_close_call,
-        .n_inputs = 4,
-        .n_outputs = 3,
+        .n_inputs = 3,
+        .n_outputs = 2,
         .inputs = mstmm_sweep_loops_close_inputs,
         .outputs = mstmm_sweep_loops_close_outputs,
-        .ir_hash = "bfdbf07d4f7abd8948eb6a1c7418800aff31637871c584fdfcea6a72ea8ae9ff",
+        .ir_hash = "4d2fb509f16e27b239384323bb9bb700ee5542e1ccd103cafb316bbd8b7c08b5",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5462,11 +4057,23 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .name = "shed",
         .function = (void (*)(void))mstmm_sweep_loops_shed,
         .call = mstmm_sweep_loops_shed_call,
-        .n_inputs = 4,
-        .n_outputs = 2,
+        .n_inputs = 3,
+        .n_outputs = 1,
         .inputs = mstmm_sweep_loops_shed_inputs,
         .outputs = mstmm_sweep_loops_shed_outputs,
-        .ir_hash = "77b6a46ed6e3af8b55c1ec8b1b4b9f6c116e1163e29aa4fec867b24f43ce52ad",
+        .ir_hash = "6cd7098f5f4f26ac7614817c313342989936136d6c13c652a7a19461d4f60ac8",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "shed_known",
+        .function = (void (*)(void))mstmm_sweep_loops_shed_known,
+        .call = mstmm_sweep_loops_shed_known_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_shed_known_inputs,
+        .outputs = mstmm_sweep_loops_shed_known_outputs,
+        .ir_hash = "7ab12570ca2d1c24d34ed5a50eafa2ddd6b2ea0201f740dfbfe8475029b2f82a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5486,11 +4093,23 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .name = "multiplier",
         .function = (void (*)(void))mstmm_sweep_loops_multiplier,
         .call = mstmm_sweep_loops_multiplier_call,
-        .n_inputs = 4,
+        .n_inputs = 2,
         .n_outputs = 1,
         .inputs = mstmm_sweep_loops_multiplier_inputs,
         .outputs = mstmm_sweep_loops_multiplier_outputs,
-        .ir_hash = "98d5788f50d64f30ae765745b59b707d106a900c3d93db17de7d4f9e4a66f2dd",
+        .ir_hash = "1ed672dd8476a5bbce27f0922b20b7f911f0613f0c95671dc7fbd2c8235ab202",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "multiplier_more",
+        .function = (void (*)(void))mstmm_sweep_loops_multiplier_more,
+        .call = mstmm_sweep_loops_multiplier_more_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_multiplier_more_inputs,
+        .outputs = mstmm_sweep_loops_multiplier_more_outputs,
+        .ir_hash = "27f445a999e22924434e640e3af9d3ac07772c709000bf9bd5563d208bc9b413",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5591,14 +4210,14 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "gap_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_gap_slope,
-        .call = mstmm_sweep_loops_gap_slope_call,
-        .n_inputs = 14,
+        .name = "meet_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_meet_slope,
+        .call = mstmm_sweep_loops_meet_slope_call,
+        .n_inputs = 13,
         .n_outputs = 3,
-        .inputs = mstmm_sweep_loops_gap_slope_inputs,
-        .outputs = mstmm_sweep_loops_gap_slope_outputs,
-        .ir_hash = "78ab5c623d83c8b29bb13c5c6760972a129fc38630cdc9a00a1b33ac30d247b4",
+        .inputs = mstmm_sweep_loops_meet_slope_inputs,
+        .outputs = mstmm_sweep_loops_meet_slope_outputs,
+        .ir_hash = "4483951d45d0c655fb4401e1744c2b3e088dd7f80d23ca2a9cc7662a6e569b97",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5627,14 +4246,26 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "rows_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_rows_slope,
-        .call = mstmm_sweep_loops_rows_slope_call,
-        .n_inputs = 11,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_loops_rows_slope_inputs,
-        .outputs = mstmm_sweep_loops_rows_slope_outputs,
-        .ir_hash = "199e11047479b830f9a4bb29adcc4715c1770c05826d97bc9d34aef52e77fca9",
+        .name = "row_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_row_slope,
+        .call = mstmm_sweep_loops_row_slope_call,
+        .n_inputs = 9,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_loops_row_slope_inputs,
+        .outputs = mstmm_sweep_loops_row_slope_outputs,
+        .ir_hash = "3e906aaaf3fc64ef678d97be1fd2fb38eb4d908cd95b0cdf5734ac6a60358133",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "known_slope",
+        .function = (void (*)(void))mstmm_sweep_loops_known_slope,
+        .call = mstmm_sweep_loops_known_slope_call,
+        .n_inputs = 4,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_known_slope_inputs,
+        .outputs = mstmm_sweep_loops_known_slope_outputs,
+        .ir_hash = "e2965391bbd4f0ffa268d9324e02d57b46018df73af003aeb8ffe48549181652",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -5728,7 +4359,7 @@ const mstmm_element mstmm_sweep_loops = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "loops",
-    .hash = "95ed049c9b5634aa3487d04e7aabc52146cc95ac8209813a5745f0846348422c",
+    .hash = "413bd88fc0b9602d7a2c6fc34bd20dfdcb2339b7e03d67ceeefb55f7154943df",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -5738,6 +4369,6 @@ const mstmm_element mstmm_sweep_loops = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 29,
+    .n_kernels = 35,
     .kernels = mstmm_sweep_loops_kernels,
 };

@@ -79,6 +79,16 @@ mstmm_generic_push_kernel *const mstmm_generic_push_table[] = {
     mstmm_sweep_generic6_push,
 };
 
+mstmm_generic_push_on_ground_kernel *const mstmm_generic_push_on_ground_table[] = {
+    NULL,
+    mstmm_sweep_generic1_push_on_ground,
+    mstmm_sweep_generic2_push_on_ground,
+    mstmm_sweep_generic3_push_on_ground,
+    mstmm_sweep_generic4_push_on_ground,
+    mstmm_sweep_generic5_push_on_ground,
+    mstmm_sweep_generic6_push_on_ground,
+};
+
 mstmm_generic_answer_kernel *const mstmm_generic_answer_table[] = {
     mstmm_sweep_generic0_answer,
     mstmm_sweep_generic1_answer,
@@ -1041,26 +1051,27 @@ static int mstmm_at_closures(mstmm_state *state, int index)
     real *closed = closure ? loops + closure->numbers : NULL;
     int code;
     if (!looped->closure) return 0;
-    if (!body->generic) {
-        code = mstmm_at_hinge_motion(state, index);
-        if (code) return code;
-    }
     if (closure->kind == MSTMM_HINGE) {
         code = mstmm_generic_complement(nu,
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .W = closed + MSTMM_CLOSURE_W);
         if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
     }
-    mstmm_loops_gap(
+    mstmm_loops_meet(
         .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
-        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .R_e = closure->turn,
-        .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .r_e = closure->end,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_A = closed + MSTMM_CLOSURE_LEVER,
-        .d = closed + MSTMM_CLOSURE_D, .gap = closed + MSTMM_CLOSURE_GAP);
+        .d = closed + MSTMM_CLOSURE_D);
     mstmm_loops_slip(
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
         .v_C = block + MSTMM_BLOCK_V, .w_C = block + MSTMM_BLOCK_MOTION,
         .v_B = outboard + MSTMM_BLOCK_V, .w_B = outboard + MSTMM_BLOCK_MOTION,
         .slip = closed + MSTMM_CLOSURE_SLIP);
+    if (state->level == MSTMM_GAP) {
+        mstmm_loops_gap(
+            .R_e = closure->turn, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .d = closed + MSTMM_CLOSURE_D, .gap = closed + MSTMM_CLOSURE_GAP);
+    }
     if (closure->kind == MSTMM_DISTANCE) {
         mstmm_loops_distance(
             .p = closure->p, .d = closed + MSTMM_CLOSURE_D, .W = closed + MSTMM_CLOSURE_W,
@@ -1078,19 +1089,13 @@ static int mstmm_at_closures(mstmm_state *state, int index)
         if (code) return mstmm_fail(state, MSTMM_FAILED_LOOP, index, code);
     }
     if (state->level == MSTMM_GAP) {
-        mstmm_loops_rows(
-            .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C,
-            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
-            .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = closed + MSTMM_CLOSURE_GAP,
-            .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
+        mstmm_loops_known(
+            .W = closed + MSTMM_CLOSURE_W, .relative = closed + MSTMM_CLOSURE_GAP,
             .l = closed + MSTMM_CLOSURE_L);
     }
     if (state->level == MSTMM_SLIP) {
-        mstmm_loops_rows(
-            .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C,
-            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
-            .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = closed + MSTMM_CLOSURE_SLIP,
-            .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
+        mstmm_loops_known(
+            .W = closed + MSTMM_CLOSURE_W, .relative = closed + MSTMM_CLOSURE_SLIP,
             .l = closed + MSTMM_CLOSURE_L);
     }
     if (state->refined) {
@@ -1119,14 +1124,15 @@ static int mstmm_at_closures(mstmm_state *state, int index)
             .slip = closed + MSTMM_CLOSURE_SLIP, .drift = drift);
     }
     if (!state->level) {
-        mstmm_loops_rows(
-            .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C,
-            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
-            .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = drift,
-            .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
-            .l = closed + MSTMM_CLOSURE_L);
+        mstmm_loops_known(
+            .W = closed + MSTMM_CLOSURE_W, .relative = drift, .l = closed + MSTMM_CLOSURE_L);
     }
     for (int k = 0; k < body->nu; k++) {
+        mstmm_loops_row(
+            .w = closed + MSTMM_CLOSURE_W + 6 * k, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k,
+            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k);
         mstmm_loops_act(
             .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = parent + MSTMM_BLOCK_E);
@@ -1137,6 +1143,11 @@ static int mstmm_at_closures(mstmm_state *state, int index)
     }
     for (int c = 0; c < 6; c++) {
         if (closure->rows[c] < 0) continue;
+        mstmm_loops_row(
+            .w = closed + MSTMM_CLOSURE_W + 6 * c, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * c,
+            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * c);
         memcpy(loops + closure->inner[c], closed + MSTMM_CLOSURE_J_A + 6 * c, (size_t)(6) * sizeof(real));
         memcpy(loops + closure->outer[c], closed + MSTMM_CLOSURE_J_B + 6 * c, (size_t)(6) * sizeof(real));
         memcpy(loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN, closed + MSTMM_CLOSURE_L + c, (size_t)(1) * sizeof(real));
@@ -1189,17 +1200,25 @@ static int mstmm_at_row_closed(mstmm_state *state, int index)
     real *loops = state->workspace + state->model->loops;
     const mstmm_loop_row *row = &state->model->rows[index];
     real *line = loops + MSTMM_ROW * (int64_t)index;
-    real *meeting = mstmm_block(state->model, state->workspace, row->body);
-    mstmm_loops_close(
-        .K = line + MSTMM_ROW_K, .l = line + MSTMM_ROW_KNOWN, .L = line + MSTMM_ROW_PIVOT,
-        .floor_ = &row->floor, .inverse = line + MSTMM_ROW_INVERSE, .S = meeting + MSTMM_BLOCK_S,
-        .e = meeting + MSTMM_BLOCK_E);
+    mstmm_loops_settle(
+        .L = line + MSTMM_ROW_PIVOT, .floor_ = &row->floor, .inverse = line + MSTMM_ROW_INVERSE);
+    if ((row->body >= 0)) {
+        real *meeting = mstmm_block(state->model, state->workspace, row->body);
+        mstmm_loops_close(
+            .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
+            .l = line + MSTMM_ROW_KNOWN, .S = meeting + MSTMM_BLOCK_S,
+            .e = meeting + MSTMM_BLOCK_E);
+    }
     for (int c = 0; c < row->n_others; c++) {
         const mstmm_other *other = &row->others[c];
-        mstmm_loops_shed(
-            .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
-            .l = line + MSTMM_ROW_KNOWN, .L_p = loops + other->pair,
-            .K_p = loops + other->column,
+        if ((row->body >= 0)) {
+            mstmm_loops_shed(
+                .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
+                .L_p = loops + other->pair, .K_p = loops + other->column);
+        }
+        mstmm_loops_shed_known(
+            .inverse = line + MSTMM_ROW_INVERSE, .l = line + MSTMM_ROW_KNOWN,
+            .L_p = loops + other->pair,
             .l_p = loops + MSTMM_ROW * (int64_t)other->row + MSTMM_ROW_KNOWN);
         for (int b = 0; b <= c; b++) {
             mstmm_loops_shed_pair(
@@ -1268,10 +1287,6 @@ static int mstmm_at_carried(mstmm_state *state, int index)
             .S_rf = modes + MSTMM_MODES_S_RF(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
             .e_f = modes + MSTMM_MODES_E_F(n));
     }
-    if (!body->generic) {
-        code = mstmm_at_hinge_motion(state, index);
-        if (code) return code;
-    }
     for (int k = 0; k < speeds; k++)
         for (int row = 0; row < 6; row++)
             (mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
@@ -1297,12 +1312,19 @@ static int mstmm_at_carried(mstmm_state *state, int index)
         .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
         .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .S_I = parent + MSTMM_BLOCK_S);
     if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
-    mstmm_generic_push(speeds,
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
-        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = block + MSTMM_BLOCK_E,
-        .tau = hinge_tau_free, .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET),
-        .e_I = parent + MSTMM_BLOCK_E);
+    if ((body->parent >= 0)) {
+        mstmm_generic_push(speeds,
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
+            .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = block + MSTMM_BLOCK_E,
+            .tau = hinge_tau_free, .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET),
+            .e_I = parent + MSTMM_BLOCK_E);
+    }
+    if (!body->section && speeds && !(body->parent >= 0)) {
+        mstmm_generic_push_on_ground(speeds,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE), .e = block + MSTMM_BLOCK_E,
+            .tau = hinge_tau_free, .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET));
+    }
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
         if (body->section && !body->section->inward) {
@@ -1310,23 +1332,33 @@ static int mstmm_at_carried(mstmm_state *state, int index)
                 .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .K = loops + pending->column,
                 .K_f = loops + pending->modes);
         }
-        if (!(pending->tau >= 0)) {
+        if (!(pending->tau >= 0) && (body->parent >= 0)) {
             mstmm_generic_push(speeds,
                 .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
                 .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
                 .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = loops + pending->column,
                 .tau = mstmm_zeros, .y = loops + pending->y, .e_I = loops + pending->onward);
         }
+        if (!(pending->tau >= 0) && !body->section && speeds && !(body->parent >= 0)) {
+            mstmm_generic_push_on_ground(speeds,
+                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
+                .e = loops + pending->column, .tau = mstmm_zeros, .y = loops + pending->y);
+        }
         if ((pending->tau >= 0)) {
             for (int k = 0; k < speeds; k++)
                 tau[k] = (loops + pending->tau)[columns[k]];
         }
-        if ((pending->tau >= 0)) {
+        if ((pending->tau >= 0) && (body->parent >= 0)) {
             mstmm_generic_push(speeds,
                 .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
                 .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
                 .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = loops + pending->column,
                 .tau = tau, .y = loops + pending->y, .e_I = loops + pending->onward);
+        }
+        if ((pending->tau >= 0) && !body->section && speeds && !(body->parent >= 0)) {
+            mstmm_generic_push_on_ground(speeds,
+                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
+                .e = loops + pending->column, .tau = tau, .y = loops + pending->y);
         }
         if ((pending->tau >= 0)) {
             mstmm_generic_answered(nu,
@@ -1358,11 +1390,15 @@ static int mstmm_at_row_found(mstmm_state *state, int index)
     real *loops = state->workspace + state->model->loops;
     const mstmm_loop_row *row = &state->model->rows[index];
     real *line = loops + MSTMM_ROW * (int64_t)index;
-    real *meeting = mstmm_block(state->model, state->workspace, row->body);
     mstmm_loops_multiplier(
-        .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
-        .l = line + MSTMM_ROW_KNOWN, .delta = meeting + MSTMM_BLOCK_DELTA,
+        .inverse = line + MSTMM_ROW_INVERSE, .l = line + MSTMM_ROW_KNOWN,
         .x = line + MSTMM_ROW_X);
+    if ((row->body >= 0)) {
+        real *meeting = mstmm_block(state->model, state->workspace, row->body);
+        mstmm_loops_multiplier_more(
+            .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
+            .delta = meeting + MSTMM_BLOCK_DELTA, .x = line + MSTMM_ROW_X);
+    }
     for (int c = 0; c < row->n_others; c++) {
         const mstmm_other *other = &row->others[c];
         mstmm_loops_multiplier_less(
@@ -1475,7 +1511,7 @@ static int mstmm_at_answered(mstmm_state *state, int index)
 /* Accelerations and load of a hinge that closes a loop. */
 static int mstmm_at_closures_answered(mstmm_state *state, int index)
 {
-    real along[6];
+    real along[1];
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
@@ -1486,14 +1522,14 @@ static int mstmm_at_closures_answered(mstmm_state *state, int index)
     real *loops = state->workspace + state->model->loops;
     real *closed = closure ? loops + closure->numbers : NULL;
     if (!looped->closure) return 0;
-    mstmm_loops_told(
-        .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
-        .l = closed + MSTMM_CLOSURE_L, .delta_A = parent + MSTMM_BLOCK_DELTA,
-        .delta_B = outboard + MSTMM_BLOCK_DELTA, .c = along);
     for (int j = 0; j < nu; j++)
         (state->udot + body->u)[j] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j];
     for (int k = 0; k < body->nu; k++) {
-        (state->udot + body->u + k)[0] += (along + k)[0];
+        mstmm_loops_told(
+            .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k, .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k,
+            .l = closed + MSTMM_CLOSURE_L + k, .delta_A = parent + MSTMM_BLOCK_DELTA,
+            .delta_B = outboard + MSTMM_BLOCK_DELTA, .c = along);
+        (state->udot + body->u + k)[0] += along[0];
     }
     if (state->refined) {
         for (int c = 0; c < 6; c++) {
@@ -1617,21 +1653,17 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
     real *closed = closure ? loops + closure->numbers : NULL;
     int code;
     if (!looped->closure) return 0;
-    if (!body->generic) {
-        code = mstmm_at_hinge_motion(state, index);
-        if (code) return code;
-    }
     if (closure->kind == MSTMM_HINGE) {
         code = mstmm_generic_complement(nu,
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .W = closed + MSTMM_CLOSURE_W);
         if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
     }
-    mstmm_loops_gap(
+    mstmm_loops_meet(
         .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
-        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .R_e = closure->turn,
-        .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .r_e = closure->end,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_A = closed + MSTMM_CLOSURE_LEVER,
-        .d = closed + MSTMM_CLOSURE_D, .gap = closed + MSTMM_CLOSURE_GAP);
+        .d = closed + MSTMM_CLOSURE_D);
     mstmm_loops_slip(
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
         .v_C = block + MSTMM_BLOCK_V, .w_C = block + MSTMM_BLOCK_MOTION,
@@ -1666,11 +1698,8 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
             .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C,
             .slip = closed + MSTMM_CLOSURE_SLIP, .drift = drift);
     }
-    mstmm_loops_rows(
-        .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
-        .Rc = block + MSTMM_BLOCK_R, .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = drift,
-        .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
-        .l = closed + MSTMM_CLOSURE_L);
+    mstmm_loops_known(
+        .W = closed + MSTMM_CLOSURE_W, .relative = drift, .l = closed + MSTMM_CLOSURE_L);
     for (int c = 0; c < looped->n_own; c++) {
         const mstmm_own *own = &looped->own[c];
         mstmm_generic_pull(nu,
@@ -1678,6 +1707,11 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
             .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
     }
     for (int k = 0; k < body->nu; k++) {
+        mstmm_loops_row(
+            .w = closed + MSTMM_CLOSURE_W + 6 * k, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k,
+            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k);
         mstmm_loops_act(
             .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = parent + MSTMM_BLOCK_E);
@@ -1688,6 +1722,11 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
     }
     for (int c = 0; c < 6; c++) {
         if (closure->rows[c] < 0) continue;
+        mstmm_loops_row(
+            .w = closed + MSTMM_CLOSURE_W + 6 * c, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * c,
+            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * c);
         mstmm_loops_loaded(
             .K = closed + MSTMM_CLOSURE_J_A + 6 * c,
             .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
@@ -2464,10 +2503,10 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
             .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
             .d_W = d_closed + MSTMM_CLOSURE_W);
     }
-    mstmm_loops_gap_slope(
+    mstmm_loops_meet_slope(
         .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
-        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .R_e = closure->turn,
-        .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .r_e = closure->end,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .d_A_C = d_block + MSTMM_BLOCK_A, .d_x_C = d_block + MSTMM_BLOCK_X,
         .d_A_B = d_outboard + MSTMM_BLOCK_A, .d_x_B = d_outboard + MSTMM_BLOCK_X,
         .d_Rc = d_block + MSTMM_BLOCK_R, .d_r = d_block + MSTMM_BLOCK_SHIFT,
@@ -2520,13 +2559,9 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
             .slip = closed + MSTMM_CLOSURE_SLIP, .d_R_C = d_closed + MSTMM_CLOSURE_R_C,
             .d_slip = d_closed + MSTMM_CLOSURE_SLIP, .d_drift = d_drift);
     }
-    mstmm_loops_rows_slope(
-        .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
-        .Rc = block + MSTMM_BLOCK_R, .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = drift,
-        .d_W = d_closed + MSTMM_CLOSURE_W, .d_R_C = d_closed + MSTMM_CLOSURE_R_C,
-        .d_Rc = d_block + MSTMM_BLOCK_R, .d_r_A = d_closed + MSTMM_CLOSURE_LEVER,
-        .d_relative = d_drift, .d_J_A = d_closed + MSTMM_CLOSURE_J_A,
-        .d_J_B = d_closed + MSTMM_CLOSURE_J_B, .d_l = d_closed + MSTMM_CLOSURE_L);
+    mstmm_loops_known_slope(
+        .W = closed + MSTMM_CLOSURE_W, .relative = drift, .d_W = d_closed + MSTMM_CLOSURE_W,
+        .d_relative = d_drift, .d_l = d_closed + MSTMM_CLOSURE_L);
     for (int c = 0; c < looped->n_own; c++) {
         const mstmm_own *own = &looped->own[c];
         mstmm_generic_pull_slope(nu,
@@ -2536,6 +2571,14 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
             .d_y_0 = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU));
     }
     for (int k = 0; k < body->nu; k++) {
+        mstmm_loops_row_slope(
+            .w = closed + MSTMM_CLOSURE_W + 6 * k, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .d_w = d_closed + MSTMM_CLOSURE_W + 6 * k,
+            .d_R_C = d_closed + MSTMM_CLOSURE_R_C, .d_Rc = d_block + MSTMM_BLOCK_R,
+            .d_r_A = d_closed + MSTMM_CLOSURE_LEVER,
+            .d_J_A = d_closed + MSTMM_CLOSURE_J_A + 6 * k,
+            .d_J_B = d_closed + MSTMM_CLOSURE_J_B + 6 * k);
         mstmm_loops_act_slope(
             .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
@@ -2551,6 +2594,14 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
     }
     for (int c = 0; c < 6; c++) {
         if (closure->rows[c] < 0) continue;
+        mstmm_loops_row_slope(
+            .w = closed + MSTMM_CLOSURE_W + 6 * c, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .d_w = d_closed + MSTMM_CLOSURE_W + 6 * c,
+            .d_R_C = d_closed + MSTMM_CLOSURE_R_C, .d_Rc = d_block + MSTMM_BLOCK_R,
+            .d_r_A = d_closed + MSTMM_CLOSURE_LEVER,
+            .d_J_A = d_closed + MSTMM_CLOSURE_J_A + 6 * c,
+            .d_J_B = d_closed + MSTMM_CLOSURE_J_B + 6 * c);
         mstmm_loops_loaded_slope(
             .K = closed + MSTMM_CLOSURE_J_A + 6 * c,
             .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
@@ -5179,7 +5230,8 @@ MSTMM_AT_ONCE void mstmm_fetch_closures(const mstmm_state *state, int index, int
     real *block = state->workspace + body->block;
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_MOTION + 9);
-    mstmm_fetch(block + MSTMM_BLOCK_A, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
 }
 static int mstmm_pass_closures(mstmm_state *state)
 {
@@ -5200,7 +5252,7 @@ MSTMM_AT_ONCE void mstmm_fetch_carried(const mstmm_state *state, int index, int 
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E + 6);
-    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
 }
 static int mstmm_pass_carried(mstmm_state *state)
 {
@@ -5321,7 +5373,8 @@ MSTMM_AT_ONCE void mstmm_fetch_closures_loaded(const mstmm_state *state, int ind
     real *block = state->workspace + body->block;
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_MOTION + 9);
-    mstmm_fetch(block + MSTMM_BLOCK_A, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
 }
 static int mstmm_pass_closures_loaded(mstmm_state *state)
 {

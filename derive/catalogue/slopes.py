@@ -58,10 +58,11 @@ _MOVING: dict[str, dict[str, tuple[str, str]]] = {
         "driven_effort": ("felt udot tau", ""),
     },
     "loops": {
-        "gap": ("A_C x_C A_B x_B Rc r", "R_C r_A d"),
+        "meet": ("A_C x_C A_B x_B Rc r", ""),
         "slip": ("R_C d v_C w_C v_B w_B", ""),
         "drift": ("R_C d slip motion_C motion_B", ""),
-        "rows": ("W R_C Rc r_A relative", ""),
+        "row": ("w R_C Rc r_A", ""),
+        "known": ("W relative", ""),
         "act": ("J tau", ""),
         "loaded": ("K x", ""),
         "distance": ("d", "W"),

@@ -120,6 +120,19 @@ def push(nu: int) -> Derivation:
     )
 
 
+def push_on_ground(nu: int) -> Derivation:
+    """y of one column at a hinge on the ground, which takes the load."""
+    h, _, _, surplus = _hinge(nu)
+    tau = Quantity(symbol("tau", nu), "N, N*m", "the column's efforts on the free coordinates")
+    value = tau.symbol - h.symbol.T * E.symbol
+    return Derivation(
+        f"generic{nu}",
+        f"load of a column felt by a hinge on the ground with {free_speeds(nu)}",
+        (h, E, tau), (surplus,),
+        (Equation("y = tau - H^T e", surplus.symbol, value),), sources=SOURCES,
+    )  # fmt: skip
+
+
 def answer(nu: int) -> Derivation:
     """udot = D^-1 y - G X delta_I and the body's own deviation X delta_I + H udot."""
     h, factor, gain, surplus = _hinge(nu)

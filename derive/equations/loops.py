@@ -46,39 +46,52 @@ _HALF_TURN = sp.Rational(1, 10**12)
 
 TURN = Quantity(symbol("R_C", 3, 3), "", "rotation, axes of C to axes of B")
 END = Quantity(symbol("r_e", 3), "m", "the end of B that the hinge holds, from P, axes of B")
+LEVER = Quantity(symbol("r_A", 3), "m", "the end of B from P of A, axes of A")
 APART = Quantity(symbol("d", 3), "m", "that end from the origin of C, axes of C")
 SLIP = Quantity(symbol("slip", 6), "", "rate of d and relative angular velocity, axes of C")
 RELATIVE = Quantity(symbol("relative", 6), "", "motion of the end of B relative to C")
-INBOARD_ROWS = Quantity(symbol("J_A", 6, 6), "", "rows by the acceleration of A, at its P")
-OUTBOARD_ROWS = Quantity(symbol("J_B", 6, 6), "", "rows by the acceleration of B, at its P")
+INBOARD_ROW = Quantity(symbol("J_A", 6), "", "row by the acceleration of A, at its P")
+OUTBOARD_ROW = Quantity(symbol("J_B", 6), "", "row by the acceleration of B, at its P")
 BIAS = Quantity(symbol("l", 6), "", "rows of what is known")
+
+
+def meet() -> Derivation:
+    """Where the end of B is, seen from C and from A."""
+    a_c, x_c = symbol("A_C", 3, 3), symbol("x_C", 3)
+    a_b, x_b = symbol("A_B", 3, 3), symbol("x_B", 3)
+    return Derivation(
+        "loops",
+        "the two sides of a hinge that closes a loop",
+        (
+            Quantity(a_c, "", "rotation, axes of C to inertial axes"),
+            Quantity(x_c, "m", "origin of C, inertial axes"),
+            Quantity(a_b, "", "rotation, axes of B to inertial axes"),
+            Quantity(x_b, "m", "P of B, inertial axes"),
+            END, R, SHIFT,
+        ),
+        (TURN, LEVER, APART),
+        (
+            Equation("rotation from C to B", TURN.symbol, a_b.T * a_c),
+            Equation("d", APART.symbol, a_c.T * (x_b - x_c + a_b * END.symbol)),
+            Equation("end from P of A", LEVER.symbol, SHIFT.symbol + R.symbol * APART.symbol),
+        ),
+        sources=SOURCES,
+    )  # fmt: skip
 
 
 def gap() -> Derivation:
     """How far the end of B and C are apart."""
-    a_c, x_c = symbol("A_C", 3, 3), symbol("x_C", 3)
-    a_b, x_b, own = symbol("A_B", 3, 3), symbol("x_B", 3), symbol("R_e", 3, 3)
-    lever, apart, whole = symbol("r_A", 3), symbol("gap", 6), symbol("R_rel", 3, 3)
+    own, apart, whole = symbol("R_e", 3, 3), symbol("gap", 6), symbol("R_rel", 3, 3)
     trace = whole[0, 0] + whole[1, 1] + whole[2, 2]
     half = sp.sqrt(sp.Max(1 + trace, _HALF_TURN))
     turned = sp.ImmutableDenseMatrix([2 * entry / half for entry in axial(whole)])
     return Derivation(
         "loops",
         "gap of a hinge that closes a loop",
+        (Quantity(own, "", "rotation, axes of C to axes of B where the loop is closed"), TURN,
+         APART),
+        (Quantity(apart, "m, rad", "gap, axes of C"),),
         (
-            Quantity(a_c, "", "rotation, axes of C to inertial axes"),
-            Quantity(x_c, "m", "origin of C, inertial axes"),
-            Quantity(a_b, "", "rotation, axes of B to inertial axes"),
-            Quantity(x_b, "m", "P of B, inertial axes"),
-            Quantity(own, "", "rotation, axes of C to axes of B where the loop is closed"),
-            END, R, SHIFT,
-        ),
-        (TURN, Quantity(lever, "m", "the end of B from P of A, axes of A"), APART,
-         Quantity(apart, "m, rad", "gap, axes of C")),
-        (
-            Equation("rotation from C to B", TURN.symbol, a_b.T * a_c),
-            Equation("d", APART.symbol, a_c.T * (x_b - x_c + a_b * END.symbol)),
-            Equation("end from P of A", lever, SHIFT.symbol + R.symbol * APART.symbol),
             Equation("rotation of the end of B against C", whole, TURN.symbol.T * own),
             Equation("gap", apart, stack(column(APART.symbol), turned)),
         ),
@@ -131,29 +144,38 @@ def drift() -> Derivation:
     )
 
 
-def rows() -> Derivation:
-    """Rows of all six directions: by the accelerations of A and of B, and what is known.
+def row() -> Derivation:
+    """The row of one direction, by the accelerations of A and of B.
 
     A row is a load of C on B as well, and its reaction on A where B is; so its columns are loads,
     carried to P of either.
     """
-    lever = Quantity(symbol("r_A", 3), "m", "the end of B from P of A, axes of A")
-    outboard, inboard = [], []
-    for k in range(6):
-        force = sp.ImmutableDenseMatrix([DIRECTIONS.symbol[k, i] for i in range(3)])
-        moment = sp.ImmutableDenseMatrix([DIRECTIONS.symbol[k, i] for i in range(3, 6)])
-        outboard.append(_carried(TURN.symbol, END.symbol, force, moment))
-        inboard.append(_carried(R.symbol, lever.symbol, -force, -moment))
+    along = Quantity(symbol("w", 6), "", "the direction: a row of W")
+    force = sp.ImmutableDenseMatrix([along.symbol[i, 0] for i in range(3)])
+    moment = sp.ImmutableDenseMatrix([along.symbol[i, 0] for i in range(3, 6)])
+    outboard = _carried(TURN.symbol, END.symbol, force, moment)
+    inboard = _carried(R.symbol, LEVER.symbol, -force, -moment)
     return Derivation(
         "loops",
-        "rows of a hinge that closes a loop",
-        (DIRECTIONS, TURN, END, R, lever, RELATIVE),
-        (INBOARD_ROWS, OUTBOARD_ROWS, BIAS),
+        "row of a direction of a hinge that closes a loop",
+        (along, TURN, END, R, LEVER),
+        (INBOARD_ROW, OUTBOARD_ROW),
         (
-            Equation("J_A", INBOARD_ROWS.symbol, sp.ImmutableDenseMatrix(inboard)),
-            Equation("J_B", OUTBOARD_ROWS.symbol, sp.ImmutableDenseMatrix(outboard)),
-            Equation("l", BIAS.symbol, DIRECTIONS.symbol * RELATIVE.symbol),
+            Equation("J_A", INBOARD_ROW.symbol, sp.ImmutableDenseMatrix(inboard)),
+            Equation("J_B", OUTBOARD_ROW.symbol, sp.ImmutableDenseMatrix(outboard)),
         ),
+        sources=SOURCES,
+    )
+
+
+def known() -> Derivation:
+    """What is known of all six directions."""
+    return Derivation(
+        "loops",
+        "known parts of the rows of a hinge that closes a loop",
+        (DIRECTIONS, RELATIVE),
+        (BIAS,),
+        (Equation("l", BIAS.symbol, DIRECTIONS.symbol * RELATIVE.symbol),),
         sources=SOURCES,
     )
 
@@ -171,17 +193,18 @@ def _carried(
 
 
 def told() -> Derivation:
-    """l + J_A delta_A + J_B delta_B: what the six directions do in the motion that was found."""
+    """l + J_A delta_A + J_B delta_B: what a direction does in the motion that was found."""
     of_a, of_b = (
         Quantity(symbol(f"delta_{name}", 6), "", f"deviation of the acceleration of {name}")
         for name in "AB"
     )
-    found = Quantity(symbol("c", 6), "", "accelerations along the six directions")
-    value = BIAS.symbol + INBOARD_ROWS.symbol * of_a.symbol + OUTBOARD_ROWS.symbol * of_b.symbol
+    of_row = Quantity(symbol("l", 1), "", "row of what is known")
+    found = Quantity(symbol("c", 1), "", "acceleration along the direction")
+    value = of_row.symbol + INBOARD_ROW.symbol.T * of_a.symbol + OUTBOARD_ROW.symbol.T * of_b.symbol
     return Derivation(
         "loops",
-        "accelerations along the directions of a hinge that closes a loop",
-        (INBOARD_ROWS, OUTBOARD_ROWS, BIAS, of_a, of_b),
+        "acceleration along a direction of a hinge that closes a loop",
+        (INBOARD_ROW, OUTBOARD_ROW, of_row, of_a, of_b),
         (found,),
         (Equation("c", found.symbol, value),),
         sources=SOURCES,
@@ -214,25 +237,32 @@ def _more(name: str, rows: int = 1, said: str = "") -> Quantity:
     return Quantity(symbol(name, rows), "", said, accumulate=True)
 
 
-def close() -> Derivation:
-    """Row r closed on the body where its ends meet.
+def settle() -> Derivation:
+    """1 / L_rr of the row r that closes.
 
     A pivot below `floor` stands for rounding: what moves the row is held already, and the row goes
     without a multiplier.
     """
     floor = Quantity(symbol("floor", 1), "", "largest pivot that is rounding")
+    pivot = PIVOT.symbol[0, 0]
+    held = sp.Piecewise((1 / pivot, pivot > floor.symbol[0, 0]), (0, True))
+    return Derivation(
+        "loops", "pivot of a row that closes", (PIVOT, floor), (INVERSE,),
+        (Equation("1 / L_rr", INVERSE.symbol, sp.ImmutableDenseMatrix([held])),), sources=SOURCES,
+    )  # fmt: skip
+
+
+def close() -> Derivation:
+    """Row r closed on the body where its ends meet."""
     mass = Quantity(symbol("S", 6, 6), "", "S of the body", symmetric=True, accumulate=True)
     load = _more("e", 6, "e of the body")
-    pivot, k, inverse = PIVOT.symbol[0, 0], COLUMN.symbol, INVERSE.symbol[0, 0]
-    held = sp.Piecewise((1 / pivot, pivot > floor.symbol[0, 0]), (0, True))
-    scaled = symbol("K_d", 6)
+    k, inverse, scaled = COLUMN.symbol, INVERSE.symbol[0, 0], symbol("K_d", 6)
     return Derivation(
         "loops",
         "a row closed where its ends meet",
-        (COLUMN, KNOWN, PIVOT, floor),
-        (INVERSE, mass, load),
+        (INVERSE, COLUMN, KNOWN),
+        (mass, load),
         (
-            Equation("1 / L_rr", INVERSE.symbol, sp.ImmutableDenseMatrix([held])),
             Equation("K_r / L_rr", scaled, _times(inverse, k)),
             Equation("S += K_r K_r^T / L_rr", mass.symbol, scaled * k.T, symmetric=True),
             Equation("e += K_r l_r / L_rr", load.symbol, _times(KNOWN.symbol[0, 0], scaled)),
@@ -246,21 +276,27 @@ def _times(factor: sp.Expr, vector: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
 
 
 def shed() -> Derivation:
-    """Column and known part of a row p that stays, as row r is closed."""
-    share, other = symbol("share", 1), _more("K_p", 6, "column of row p")
-    known = _more("l_p", 1, "known part of row p")
+    """Column of a row p that stays, as row r is closed."""
+    other = _more("K_p", 6, "column of row p")
+    share = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0]
     return Derivation(
-        "loops",
-        "a row that stays while another is closed",
-        (INVERSE, COLUMN, KNOWN, COUPLING),
-        (other, known),
-        (
-            Equation("L_rp / L_rr", share, -INVERSE.symbol * COUPLING.symbol),
-            Equation("K_p -= K_r L_rp / L_rr", other.symbol, _times(share[0, 0], COLUMN.symbol)),
-            Equation("l_p -= l_r L_rp / L_rr", known.symbol, _times(share[0, 0], KNOWN.symbol)),
-        ),
+        "loops", "column of a row that stays while another is closed",
+        (INVERSE, COLUMN, COUPLING), (other,),
+        (Equation("K_p -= K_r L_rp / L_rr", other.symbol, _times(share, COLUMN.symbol)),),
         sources=SOURCES,
-    )
+    )  # fmt: skip
+
+
+def shed_known() -> Derivation:
+    """Known part of a row p that stays, as row r is closed."""
+    other = _more("l_p", 1, "known part of row p")
+    value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * KNOWN.symbol[0, 0]
+    return Derivation(
+        "loops", "known part of a row that stays while another is closed",
+        (INVERSE, KNOWN, COUPLING), (other,),
+        (Equation("l_p -= l_r L_rp / L_rr", other.symbol, sp.ImmutableDenseMatrix([value])),),
+        sources=SOURCES,
+    )  # fmt: skip
 
 
 def shed_pair() -> Derivation:
@@ -277,12 +313,24 @@ def shed_pair() -> Derivation:
 
 
 def multiplier() -> Derivation:
-    """x_r, but for the rows that were left when it was closed."""
-    delta = Quantity(symbol("delta", 6), "", "deviation of the acceleration of the body")
-    value = INVERSE.symbol * (COLUMN.symbol.T * delta.symbol + KNOWN.symbol)
+    """x_r at the ground, which keeps to its bias motion, but for the rows that were left when it
+    was closed."""
     return Derivation(
-        "loops", "multiplier of a row", (INVERSE, COLUMN, KNOWN, delta), (MULTIPLIER,),
-        (Equation("x_r", MULTIPLIER.symbol, value),), sources=SOURCES,
+        "loops", "multiplier of a row", (INVERSE, KNOWN), (MULTIPLIER,),
+        (Equation("x_r", MULTIPLIER.symbol, INVERSE.symbol * KNOWN.symbol),), sources=SOURCES,
+    )  # fmt: skip
+
+
+def multiplier_more() -> Derivation:
+    """The share of the body where the row closes."""
+    delta = Quantity(symbol("delta", 6), "", "deviation of the acceleration of the body")
+    found = _more("x", 1, "multiplier of row r")
+    return Derivation(
+        "loops", "share of a motion in a multiplier", (INVERSE, COLUMN, delta), (found,),
+        (Equation(
+            "x_r += K_r^T a / L_rr", found.symbol, INVERSE.symbol * (COLUMN.symbol.T * delta.symbol)
+        ),),
+        sources=SOURCES,
     )  # fmt: skip
 
 
@@ -383,8 +431,8 @@ def pull(nu: int) -> Derivation:
 
 #: Steps that have no size of a hinge.
 STEPS = (
-    gap, slip, drift, rows, told, act, close, shed, shed_pair, multiplier, multiplier_less, yielded,
-    loaded,
+    meet, gap, slip, drift, row, known, told, act, settle, close, shed, shed_known, shed_pair,
+    multiplier, multiplier_more, multiplier_less, yielded, loaded,
 )  # fmt: skip
 #: Steps for hinges that have speeds.
 OF_SPEEDS = (divide, couple, answered, pull)

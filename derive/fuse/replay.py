@@ -427,6 +427,7 @@ _TRAITS: dict[str, Callable[[Replay, BodyStructure], bool]] = {
     "kept": lambda replay, body: not replay.level,
     "corrected": lambda replay, body: bool(replay.level),
     "soft": lambda replay, body: bool(replay.row().soft),
+    "inside": lambda replay, body: replay.row().body >= 0,
     "unmoved": lambda replay, body: replay.rests(),
 }
 

@@ -107,11 +107,12 @@ class Slots:
         return self._filled[key]
 
     def fill(self, slot: str, nodes: Nodes) -> None:
-        """Put nodes into a slot, or into the one entry that is named."""
-        name, _, place = slot.partition("[")
-        if place:
+        """Put nodes into a slot, or into the entries that are named."""
+        name, _, picked = slot.partition("[")
+        if picked:
             whole = list(self._whole(name))
-            whole[int(place.rstrip("]"))] = nodes[0]
+            for place, node in zip(picked.rstrip("]").split(), nodes, strict=True):
+                whole[int(place)] = node
             nodes = whole
         if name.startswith("local."):
             self.local[name] = nodes

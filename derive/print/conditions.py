@@ -28,7 +28,7 @@ _TRAITS = {
     "distance": "closure->kind == MSTMM_DISTANCE", "plane": "closure->kind == MSTMM_PLANE",
     "rolling": "closure->kind == MSTMM_ROLLING",
     "soft": "(state->model->rows[closure->rows[c]].softness > 0)",
-    "refined": "state->refined", "couplings": "model->n_couplings",
+    "inside": "(row->body >= 0)", "refined": "state->refined", "couplings": "model->n_couplings",
     "unmet": "(coupling->row < 0)",
     "coupled": "(pending->tau >= 0)",
     "gaping": "state->level == MSTMM_GAP", "slipping": "state->level == MSTMM_SLIP",

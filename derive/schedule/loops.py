@@ -41,22 +41,23 @@ from .steps import (
 
 _MET = {"R_C": "closure.R_C", "r_e": "closure.end"}
 _OWN = {"W": "closure.W", "gap": "closure.gap"}
-_ROWS = {"J_A": "closure.J_A", "J_B": "closure.J_B", "l": "closure.l"}
 
 
-def _rows(relative: str, when: str) -> Call:
-    return call("loops.rows", when=when, W="closure.W", **_MET, Rc="body.R", r_A="closure.lever",
-                relative=relative, **_ROWS)  # fmt: skip
+def _row(k: str) -> Call:
+    return call("loops.row", w=f"closure.W[6 * {k}]", **_MET, Rc="body.R", r_A="closure.lever",
+                J_A=f"closure.J_A[6 * {k}]", J_B=f"closure.J_B[6 * {k}]")  # fmt: skip
+
+
+def _known(relative: str, when: str) -> Call:
+    return call("loops.known", when=when, W="closure.W", relative=relative, l="closure.l")
 
 
 _MEETING = (
-    Do(whole=HINGE_MOTION, when="own"),
     call("frames.pose", when="staged", A_I="connection.R", x_I="connection.r", Rc="hinge.R",
          r="hinge.d", A="body.R", x="body.r"),
     call("generic{nu}.complement", when="hinged", fails="hinge", H="hinge.H", W="closure.W"),
-    call("loops.gap", A_C="body.A", x_C="body.x", A_B="outboard.A", x_B="outboard.x",
-         R_e="closure.turn", r_e="closure.end", **BODY, R_C="closure.R_C",
-         r_A="closure.lever", d="closure.d", gap="closure.gap"),
+    call("loops.meet", A_C="body.A", x_C="body.x", A_B="outboard.A", x_B="outboard.x",
+         r_e="closure.end", **BODY, R_C="closure.R_C", r_A="closure.lever", d="closure.d"),
     call("loops.slip", **_MET, d="closure.d", v_C="body.v", w_C="body.w", v_B="outboard.v",
          w_B="outboard.w", slip="closure.slip"),
 )  # fmt: skip
@@ -76,12 +77,10 @@ _BENT = (
     call("loops.rolling_drift", when="rolling", p="closure.p", R_C="closure.R_C",
          slip="closure.slip", drift="local.drift"),
 )  # fmt: skip
-#: Rows of accelerations; the load of the hinge's laws.
-_DRIVEN = (
-    _rows("local.drift", ""),
-)  # fmt: skip
+#: The load of the hinge's laws, along its own directions.
 _EFFORTS = EachSpeed(
     steps=(
+        _row("k"),
         call("loops.act", J="closure.J_A[6 * k]", tau="body.tau[k]", e="parent.e"),
         call("loops.act", J="closure.J_B[6 * k]", tau="body.tau[k]", e="outboard.e"),
     ),
@@ -91,15 +90,18 @@ CLOSURES = Pass(
     "closures", "body", "Rows of what closes a loop, and the load of a hinge's laws.",
     (
         *_MEETING,
+        call("loops.gap", when="gaping", R_e="closure.turn", R_C="closure.R_C", d="closure.d",
+             gap="closure.gap"),
         *_CONSTRAINED,
-        _rows("closure.gap", "gaping"),
-        _rows("closure.slip", "slipping"),
+        _known("closure.gap", "gaping"),
+        _known("closure.slip", "slipping"),
         efforts_of_own("own.told", "!staged refined"),
-        *only("!corrected", _DRIFT, *_BENT, *_DRIVEN),
+        *only("!corrected", _DRIFT, *_BENT, _known("local.drift", "")),
         _EFFORTS,
         Each(
             of="rows",
             steps=(
+                _row("c"),
                 Move(to="side.inner", source="closure.J_A[6 * c]", count="6"),
                 Move(to="side.outer", source="closure.J_B[6 * c]", count="6"),
                 Move(to="line.known", source="closure.l[c]", count="1"),
@@ -128,12 +130,13 @@ CLOSURES_LOADED = Pass(
         *_CONSTRAINED,
         _DRIFT,
         *_BENT,
-        *_DRIVEN,
+        _known("local.drift", ""),
         efforts_of_own("own.x", ""),
         _EFFORTS,
         Each(
             of="rows",
             steps=(
+                _row("c"),
                 call("loops.loaded", K="closure.J_A[6 * c]", x="line.x", e="parent.e"),
                 call("loops.loaded", K="closure.J_B[6 * c]", x="line.x", e="outboard.e"),
             ),
@@ -143,18 +146,22 @@ CLOSURES_LOADED = Pass(
     skip="!cut",
 )  # fmt: skip
 
-_ROW = {"inverse": "row.inverse", "K": "row.K", "l": "row.known"}
+_ROW = {"inverse": "row.inverse", "l": "row.known"}
+_COLUMN = {"inverse": "row.inverse", "K": "row.K"}
 
 ROW_CLOSED = Pass(
     "row_closed", "row", "A row closed on the body where its ends meet.",
     (
         Copy(to="row.inverse", when="unmoved"),
-        call("loops.close", when="!unmoved", **_ROW, L="row.pivot", floor="row.floor",
-             S="meeting.S", e="meeting.e"),
+        call("loops.settle", when="!unmoved", inverse="row.inverse", L="row.pivot",
+             floor="row.floor"),
+        call("loops.close", when="!unmoved inside", **_COLUMN, l="row.known", S="meeting.S",
+             e="meeting.e"),
         Each(
             of="others",
             steps=(
-                call("loops.shed", **_ROW, L_p="other.L", K_p="other.K", l_p="other.known"),
+                call("loops.shed", when="inside", **_COLUMN, L_p="other.L", K_p="other.K"),
+                call("loops.shed_known", **_ROW, L_p="other.L", l_p="other.known"),
                 Each(
                     of="seconds",
                     steps=(
@@ -170,7 +177,8 @@ ROW_CLOSED = Pass(
 ROW_FOUND = Pass(
     "row_found", "row", "The multiplier of a row, from the motion of the body where it closes.",
     (
-        call("loops.multiplier", **_ROW, delta="meeting.delta", x="row.x"),
+        call("loops.multiplier", **_ROW, x="row.x"),
+        call("loops.multiplier_more", when="inside", **_COLUMN, delta="meeting.delta", x="row.x"),
         Each(
             of="others",
             steps=(
@@ -256,25 +264,33 @@ def _felt(load: str, effort: str, rest: str) -> Call:
                 G="zero", e=load, tau=effort, y=rest)  # fmt: skip
 
 
+def _pushed(when: str, load: str, effort: str, rest: str, onward: str) -> tuple[Call, ...]:
+    """A load carried on, or felt alone by a hinge on the ground, which takes what comes."""
+    felt = {"e": load, "tau": effort, "y": rest}
+    return (
+        call("generic{free}.push", when=f"{when} hung".strip(), **BODY, **_ACROSS, **felt,
+             e_I=onward),
+        call("generic{free}.push_on_ground", when=f"{when} moving !hung".strip(),
+             H="hinge.H_free", **felt),
+    )  # fmt: skip
+
+
 _ALONE = only(
     "!staged",
     call("generic{free}.factor", fails="undetermined", **BODY, H="hinge.H_free",
          J="hinge.J_free", W="zero", floor="body.floor", S="body.S", F="hinge.F",
          G="hinge.G", S_I="parent.S"),
-    call("generic{free}.push", **BODY, **_ACROSS, e="body.e", tau="hinge.tau_free",
-         y="hinge.g", e_I="parent.e"),
+    *_pushed("", "body.e", "hinge.tau_free", "hinge.g", "parent.e"),
     Each(
         of="pending",
         steps=(
             call("modal.row_felt", when="outward", H="section.H", K="pending.K",
                  K_f="pending.modes"),
-            call("generic{free}.push", when="!coupled", **BODY, **_ACROSS, e="pending.K",
-                 tau="zero", y="pending.y", e_I="pending.onward"),
+            *_pushed("!coupled", "pending.K", "zero", "pending.y", "pending.onward"),
             *only(
                 "coupled",
                 Pick(to="local.tau", source="pending.tau"),
-                call("generic{free}.push", **BODY, **_ACROSS, e="pending.K", tau="local.tau",
-                     y="pending.y", e_I="pending.onward"),
+                *_pushed("", "pending.K", "local.tau", "pending.y", "pending.onward"),
                 replace(TOLD, when=""),
             ),
             *_COUPLED,
@@ -309,7 +325,6 @@ CARRIED = Pass(
         *only("modal", Do(whole=MODAL_CONDENSE), _ROWS_CONDENSED),
         Each(of="closings", steps=(Do(whole=ROW_CLOSED),)),
         *only("outward", ABSORBED),
-        Do(whole=HINGE_MOTION, when="own"),
         *FREE,
         efforts_of("pending.told", "!staged refined"),
         FREE_EFFORTS,
@@ -361,11 +376,16 @@ ANSWERED = Pass(
 CLOSURES_ANSWERED = Pass(
     "closures_answered", "body", "Accelerations and load of a hinge that closes a loop.",
     (
-        call("loops.told", **_ROWS, delta_A="parent.delta", delta_B="outboard.delta",
-             c="local.along"),
         Copy(to="body.udot", source="body.s"),
         Add(to="body.udot", source="body.chosen", when="staged !corrected"),
-        EachSpeed(steps=(Add(to="body.udot[k]", source="local.along[k]"),)),
+        EachSpeed(
+            steps=(
+                call("loops.told", J_A="closure.J_A[6 * k]", J_B="closure.J_B[6 * k]",
+                     l="closure.l[k]", delta_A="parent.delta", delta_B="outboard.delta",
+                     c="local.along"),
+                Add(to="body.udot[k]", source="local.along"),
+            ),
+        ),
         Each(of="rows", when="refined", steps=(Add(to="line.x", source="line.told"),)),
         *only(
             "kept",

@@ -366,6 +366,7 @@ TRAITS: dict[str, str] = {
     "corrected": "a gap or a slip is to be corrected",
     "soft": "the row is that of a rotor",
     "refined": "what an answer before leaves over is answered, and added to it",
+    "inside": "the row closes on a body, not at the ground, which keeps to its bias motion",
     "unmoved": "nothing moves the row in any position: code for one scene goes without it",
     "couplings": "coordinates are coupled",
     "unmet": "other rows do what the coupling asks",

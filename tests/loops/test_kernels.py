@@ -81,18 +81,17 @@ def _turn(v: Any, t: Any) -> Any:
 
 
 def relative(c: Body, b: Body, end: list[Any], t: Any) -> tuple[dict[str, Any], list[Any]]:
-    """Outputs of the kernels gap and slip at a time."""
+    """Outputs of the kernels meet and slip at a time."""
     of_c, of_b = c.motion(t), b.motion(t)
-    gap = evaluate(KERNELS["gap"], {
+    met = evaluate(KERNELS["meet"], {
         "A_C": of_c["A"], "x_C": of_c["x"], "A_B": of_b["A"], "x_B": of_b["x"],
-        "R_e": [1, 0, 0, 0, 1, 0, 0, 0, 1], "r_e": end, "Rc": [1, 0, 0, 0, 1, 0, 0, 0, 1],
-        "r": [0, 0, 0],
+        "r_e": end, "Rc": [1, 0, 0, 0, 1, 0, 0, 0, 1], "r": [0, 0, 0],
     }, 60)  # fmt: skip
     slip = evaluate(KERNELS["slip"], {
-        "R_C": gap["R_C"], "r_e": end, "d": gap["d"], "v_C": of_c["v"], "w_C": of_c["w"],
+        "R_C": met["R_C"], "r_e": end, "d": met["d"], "v_C": of_c["v"], "w_C": of_c["w"],
         "v_B": of_b["v"], "w_B": of_b["w"],
     }, 60)["slip"]  # fmt: skip
-    return gap, list(slip)
+    return met, list(slip)
 
 
 def test_slip_and_drift_are_rates_of_an_open_gap() -> None:
@@ -103,11 +102,11 @@ def test_slip_and_drift_are_rates_of_an_open_gap() -> None:
         c, b = Body(numbers), Body(numbers)
         end = [mpmath.mpf(numbers.uniform(-1, 1)) for _ in range(3)]
         t, step = mpmath.mpf("0.3"), mpmath.mpf(10) ** -18
-        gap, slip = relative(c, b, end, t)
+        met, slip = relative(c, b, end, t)
         ahead, behind = (relative(c, b, end, t + sign * step) for sign in (1, -1))
         of_c, of_b = c.motion(t), b.motion(t)
         drift = evaluate(KERNELS["drift"], {
-            "R_C": gap["R_C"], "r_e": end, "d": gap["d"], "slip": slip,
+            "R_C": met["R_C"], "r_e": end, "d": met["d"], "slip": slip,
             "motion_C": [*of_c["w"], *of_c["wd"], *of_c["rdd"]],
             "motion_B": [*of_b["w"], *of_b["wd"], *of_b["rdd"]],
         }, 60)["drift"]  # fmt: skip

@@ -74,7 +74,9 @@ class BodyRecords:
         record.n_imposed, record.imposed_mask = sum(body.imposed), self.memory.ints(body.imposed)
         self._numbers(record, body)
         unknown = not self.elements[body.hinge].functions.get("condense")
-        generic = unknown or body.section is not None or any(body.imposed) or any(body.rotor)
+        bound = any(body.imposed) or any(body.rotor)
+        # Columns of rows and poses ask for the hinge's motion, which is then found once for all.
+        generic = unknown or bound or body.section is not None or self.system.closes
         record.generic, record.kernels = int(generic), self._kernels(body, generic)
         if body.modal is not None:
             record.modal = self.modal.add_modal(place, body.modal)
