@@ -21,6 +21,7 @@ from .studies.advise import advise
 from .studies.chart import chart
 from .studies.linear import frf, linearize, modes
 from .studies.stability import stability
+from .view import view
 
 
 class Commands(TyperGroup):
@@ -72,6 +73,7 @@ def mstmm(
 
 app.command("demo")(demo)
 app.command("simulate")(simulate)
+app.command("view")(view)
 app.command("chart")(chart)
 app.command("advise")(advise)
 app.command("linearize")(linearize)

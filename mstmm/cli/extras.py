@@ -8,8 +8,11 @@ from pathlib import Path
 from mstmm.errors import EnvironmentFailure
 
 #: Extra -> what is imported for it.
-PACKAGES = {"io": ("xarray", "h5netcdf", "h5py"), "plot": ("matplotlib",)}
-_EXTRA_OF = {".nc": "io", ".png": "plot", ".svg": "plot", ".pdf": "plot"}
+PACKAGES = {"io": ("xarray", "h5netcdf", "h5py"), "plot": ("matplotlib",), "view": ("viser",)}
+_EXTRA_OF = {
+    ".nc": "io", ".png": "plot", ".svg": "plot", ".pdf": "plot", ".gif": "plot", ".mp4": "plot",
+    ".html": "view",
+}  # fmt: skip
 
 
 def missing(extra: str) -> list[str]:

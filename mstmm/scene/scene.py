@@ -102,7 +102,7 @@ class Scene(SceneTables):
 
     @model_validator(mode="after")
     def _settle(self) -> Scene:
-        for table in ("load", "event", "spring", "bushing", "constraint", "coupling"):
+        for table in _UNNAMED:
             object.__setattr__(self, table, _named(table, getattr(self, table)))
         for table, elements in _at_roots(self).items():
             object.__setattr__(self, table, elements)
@@ -110,6 +110,10 @@ class Scene(SceneTables):
         if problems:
             raise Refused(*problems)
         return self
+
+
+#: Tables whose elements need no name.
+_UNNAMED = ("load", "event", "spring", "bushing", "constraint", "coupling", "shape")
 
 
 def _names(data: Mapping[str, Any]) -> Iterator[str]:
@@ -142,6 +146,7 @@ def _named(table: str, elements: tuple[Any, ...]) -> tuple[Any, ...]:
 _REFERENCES = {
     "hinge": ("inboard", "outboard"), "chain": ("inboard",), "load": ("on",),
     "spring": ("from_", "to"), "bushing": ("from_", "to"), "constraint": ("from_", "to"),
+    "shape": ("on",),
 }  # fmt: skip
 
 

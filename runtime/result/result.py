@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .certificate import Certificate
 from .record import Record
+
+if TYPE_CHECKING:
+    from .view.view import View
 
 
 class Result(Record):
@@ -90,6 +94,30 @@ class Result(Record):
         from .output.plot import plot
 
         return plot(self, names, None if path is None else Path(path), title)
+
+    def view(
+        self,
+        path: str | Path | None = None,
+        *,
+        trails: Sequence[str] = (),
+        speed: float | None = None,
+        title: str | None = None,
+    ) -> View:
+        """The run in three dimensions, to look at; with `path` also written there, see `View.save`.
+
+        Bodies are drawn by their ends, mass centres and inertia, or by the shapes that the scene
+        gives them; deflections of beams are as they are.  `trails` are ends whose ways are drawn;
+        `speed` is how many seconds of the run pass in one, by itself 1, or for runs below 1.5 s or
+        above 20 s what makes a film of some seconds.  SceneError for an end that there is not and
+        for a run without samples.
+        """
+        from .view.view import view
+
+        named = Path(path).stem if title is None and path is not None else title
+        made = view(self, named or "A run", trails, speed)
+        if path is not None:
+            made.save(path)
+        return made
 
     def __repr__(self) -> str:
         return f"<Result: {self.trajectory.message}; {len(self.t)} samples>"

@@ -94,6 +94,8 @@ def _references(scene: SceneTables) -> Iterator[Problem]:
     for i, load in enumerate(scene.load):
         yield from _end(load.on, scene, ("load", i, "on"))
         yield from _axes(scene, i)
+    for i, shape in enumerate(scene.shape):
+        yield from _end(shape.on, scene, ("shape", i, "on"))
     for table in ("spring", "bushing", "constraint"):
         for i, element in enumerate(getattr(scene, table)):
             yield from _end(element.from_, scene, (table, i, "from"))

@@ -32,7 +32,7 @@ _LOOPS = ("loop", "loops", "closure", "closures", "joint", "joints")
 #: The lists of tables of a scene.
 TABLES = (
     "input", "signal", "output", "controller", "body", "hinge", "chain", "beam", "elastic",
-    "load", "event", "spring", "bushing", "constraint", "coupling",
+    "load", "event", "spring", "bushing", "constraint", "coupling", "shape",
 )  # fmt: skip
 
 Problem = tuple[Location, str]

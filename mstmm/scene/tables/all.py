@@ -26,6 +26,7 @@ from .members import Bodies, Hinges
 from .outside.controller import Controller
 from .outside.inputs import Input, Output, Signal
 from .rigid import bare
+from .shape import Shape
 
 
 def _version(value: Any) -> int:
@@ -56,6 +57,7 @@ class SceneTables(Table):
     bushing: tuple[Bushing, ...] = ()
     constraint: tuple[Constraint, ...] = ()
     coupling: tuple[Coupling, ...] = ()
+    shape: tuple[Shape, ...] = ()
 
     @cached_property
     def bodies(self) -> Bodies:

@@ -1,0 +1,102 @@
+"""`mstmm view`: a scene or a result as a page that moves, a strip, a film or frames."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mstmm.errors import MstmmError
+
+from .extras import need_for
+from .options import Elements, output_file, output_folder, positive
+from .progress import bar
+from .simulate import compiled, load_method, use_files
+
+if TYPE_CHECKING:
+    from mstmm.runtime.result.result import Result
+
+ENDINGS = (".html", ".png", ".svg", ".pdf", ".gif", ".mp4")
+_RESULT = ".nc"
+
+
+def view(
+    what: Annotated[
+        str,
+        typer.Argument(metavar="SCENE|RESULT", help="A scene file, .toml or .json, at its start; "
+                       "or a result, .nc, as it moves."),
+    ],
+    output: Annotated[
+        list[str] | None,
+        typer.Option("--output", "-o", metavar="FILE", help="A page that moves, .html; a strip of "
+                     "moments, .png, .svg or .pdf; a film, .gif or .mp4; may be repeated.  By "
+                     "default a page with the scene's name, here."),
+    ] = None,
+    frames: Annotated[
+        str | None,
+        typer.Option("--frames", metavar="FOLDER", help="Every picture of the film, as .png."),
+    ] = None,
+    t_end: Annotated[
+        float | None,
+        typer.Option("--t-end", metavar="S", parser=positive, help="Simulate the scene first, to "
+                     "this time, s."),
+    ] = None,
+    trail: Annotated[
+        list[str] | None,
+        typer.Option("--trail", metavar="END", help="An end whose way is drawn, such as rod2.tip; "
+                     "may be repeated."),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option("--speed", metavar="X", parser=positive, help="Seconds of the run that pass "
+                     "in one: 0.1 is ten times slower."),
+    ] = None,
+    moments: Annotated[
+        int, typer.Option("--moments", metavar="N", min=1, help="Moments of a strip.")
+    ] = 6,
+    hinge: Elements = None,
+) -> None:  # fmt: skip
+    """Look at a scene, or at a run of it, in three dimensions."""
+    from . import output as terminal
+
+    named = output or ([] if frames else [f"{Path(what).stem or 'scene'}.html"])
+    targets = [output_file(name, ENDINGS) for name in named]
+    if frames:
+        targets.append(output_folder(frames, "frame_0001.png", "--frames"))
+    for target in targets:
+        need_for(target, "--output")
+    use_files(hinge or [])
+    result = _result(what, t_end)
+    seen = result.view(title=_title(Path(what)), trails=tuple(trail or ()), speed=speed)
+    for target in targets:
+        seen.save(target, moments)
+        terminal.say(f"{target}: {_about(target, result)}")
+
+
+def _result(what: str, t_end: float | None) -> Result:
+    """What is looked at: a saved result, a scene at its start, or a run of a scene."""
+    import mstmm
+
+    if Path(what).suffix.lower() == _RESULT:
+        if t_end is not None:
+            raise MstmmError("--t-end: a result has run already; give the scene to run it again")
+        return mstmm.load_result(what)
+    model = compiled(what, mstmm.load_scene(what))
+    if t_end is None:
+        return model.simulate(t_end=0.0, method="dop853")
+    load_method("auto")
+    with bar() as progress:
+        return model.simulate(t_end, method="auto", rtol=1e-7, atol=1e-10, progress=progress)
+
+
+def _about(target: Path, result: Result) -> str:
+    what = {".html": "a page for any browser, without a network", ".gif": "a film", ".mp4": "a film"}
+    kind = what.get(target.suffix.lower(), "pictures")
+    moves = len(result.t) > 1
+    return f"{kind}, t = {result.t[0]:g} to {result.t[-1]:g} s" if moves else f"{kind}, at the start"
+
+
+def _title(path: Path) -> str:
+    """The name of the file, or of its folder where every such file is called the same."""
+    return path.absolute().parent.name if path.stem == "scene" else path.stem

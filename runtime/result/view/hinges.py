@@ -1,0 +1,102 @@
+"""Glyphs of hinges by what they leave free, springs and bushings as coils, the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.scene import Hinge
+from mstmm.scene.tables.hinge_frames import hinge_frames
+
+from .solids import Colour, Surface, along, box, cylinder, ellipsoid, joined
+from .stage import Poses, Solid
+
+HINGE: Colour = (60, 66, 74)
+GROUND: Colour = (120, 126, 134)
+SPRING: Colour = (150, 110, 30)
+
+#: Turns of a coil, points in each, its radius by its length at the start.
+_TURNS, _FINE, _WIDE = 8, 10, 0.08
+
+
+def glyph(hinge: Hinge, r: float) -> Surface | None:
+    """A hinge in the axes of its outboard end; None for one that leaves all free.  `r` in m.
+
+    Each axis about which it turns is a pin, each along which it slides a square rail; three
+    rotations are a ball, none of either a small block; what is none of these is a ball as well.
+    """
+    facts = hinge.facts
+    if facts is None:
+        return ellipsoid((r, r, r), 8)
+    if facts.free_body:
+        return None
+    if facts.welds:
+        return box((1.3 * r, 1.3 * r, 1.3 * r))
+    axes = np.array(hinge_frames(hinge)[1])
+    parts = []
+    if len(facts.turns) == 3 or not facts.steady:
+        parts.append(ellipsoid((r, r, r), 16))
+    else:
+        parts += [cylinder(0.75 * r, 3.2 * r).placed(axes=along(v)) for v in _about(hinge)]
+    slides = _rails(hinge)
+    if len(slides) == 2:
+        parts.append(box((5 * r, 5 * r, 0.4 * r)).placed(axes=axes))
+    else:
+        parts += [box((1.1 * r, 1.1 * r, 7 * r)).placed(axes=along(v)) for v in slides]
+    if facts.frame == "crossing":
+        parts = [cylinder(0.6 * r, 4 * r).placed(axes=along(v)) for v in _crossing(hinge)]
+    return joined(parts) if parts else ellipsoid((r, r, r), 8)
+
+
+def _motions(hinge: Hinge) -> list[tuple[Array, Array]]:
+    """(translation, rotation) of each speed at the start, axes of the outboard end."""
+    from mstmm.scene.tables.hinge_frames import start_motion
+
+    return [(np.array(t), np.array(w)) for t, w in start_motion(hinge) or ()]
+
+
+def _about(hinge: Hinge) -> list[Array]:
+    return [w for _, w in _motions(hinge) if np.linalg.norm(w) > 0]
+
+
+def _rails(hinge: Hinge) -> list[Array]:
+    return [t for t, w in _motions(hinge) if np.linalg.norm(t) > 0 and not np.linalg.norm(w) > 0]
+
+
+def _crossing(hinge: Hinge) -> list[Array]:
+    second = hinge.unit_axis if hinge.unit_axis2 is None else hinge.unit_axis2
+    return [np.array(hinge.unit_axis), np.array(second)]
+
+
+def foot(at: Array, r: float) -> Solid:
+    """Where something is held by the ground; `at` (3,) in m."""
+    return Solid("ground", "", box((2.6 * r, 2.6 * r, 2.6 * r)).placed(at), GROUND)
+
+
+def coil(start: Array, end: Array, radius: float) -> Array:
+    """(f, n, 3) points of a coil between two points (f, 3) that move."""
+    s = np.linspace(0.0, 1.0, _TURNS * _FINE + 1)
+    turn = 2 * np.pi * _TURNS * np.clip((s - 0.12) / 0.76, 0.0, 1.0)
+    wide = radius * np.clip(np.minimum(s - 0.08, 0.92 - s) / 0.06, 0.0, 1.0)
+    way = end - start
+    points = []
+    for a, d in zip(start, way, strict=True):
+        length = np.linalg.norm(d)
+        axes = along(d) if length > 0 else np.eye(3)
+        local = np.stack([wide * np.cos(turn), wide * np.sin(turn), s * length], axis=1)
+        points.append(a + local @ axes.T)
+    return np.array(points)
+
+
+def held_by_ground(scene_hinges: Iterator[Hinge]) -> Iterator[Array]:
+    """Places on the ground at which hinges begin."""
+    for hinge in scene_hinges:
+        if hinge.inboard_body == "ground" and not (hinge.facts is not None and hinge.facts.free_body):
+            yield np.array(hinge.position)
+
+
+def still(at: Array) -> Poses:
+    """Axes that stay where they are."""
+    return Poses(np.atleast_2d(at), np.array([[1.0, 0.0, 0.0, 0.0]]))

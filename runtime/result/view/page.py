@@ -1,0 +1,196 @@
+"""A stage as one page: it moves, turns and answers without a network (extra: view)."""
+
+from __future__ import annotations
+
+import json
+from base64 import b64encode
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from html import escape
+from importlib.resources import files
+from io import StringIO
+from typing import Any
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import EnvironmentFailure
+from mstmm.extras import missing
+
+from ..observed import quaternions
+from .camera import FIELD, camera
+from .solids import along
+from .stage import Bent, Line, Poses, Solid, Stage
+
+#: Places closer than this by the size of the scene, and quaternions closer than this, are the same.
+_SAME = 1e-5
+#: Spacing of the ground's grid, and its width, by the size of the scene.
+_WIDE = 1.3
+_THIN, _THICK = (186, 190, 196), (150, 154, 160)
+
+
+def page(stage: Stage) -> str:
+    """The whole page.  EnvironmentFailure without the extra."""
+    with _server() as server:
+        recorder = server.get_scene_serializer()
+        moving = _Moving(server.scene, stage)
+        look = camera(stage)
+        server.scene.set_up_direction(tuple(stage.up))
+        server.initial_camera.position = tuple(look.position)
+        server.initial_camera.look_at = tuple(look.look_at)
+        server.initial_camera.up = tuple(look.up)
+        server.initial_camera.fov = float(FIELD)
+        server.scene.configure_default_lights(cast_shadow=False)
+        _grid(server.scene, stage)
+        for k in range(len(stage.times)):
+            moving.to(k)
+            if k + 1 < len(stage.times):
+                recorder.insert_sleep(_pause(stage))
+        text: str = recorder.as_html()
+    return _with_script(text, stage)
+
+
+def _pause(stage: Stage) -> float:
+    """Seconds of film from one picture to the next."""
+    lasts = float(stage.times[-1] - stage.times[0])
+    return lasts / stage.speed / (len(stage.times) - 1)
+
+
+@contextmanager
+def _server() -> Iterator[Any]:
+    """What records a scene: it listens on this machine alone, to nobody, for the moment."""
+    try:
+        import viser
+    except ImportError as error:
+        raise missing("view", "a page to look at", error) from None
+    try:
+        with redirect_stdout(StringIO()):
+            server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    except OSError as error:
+        raise EnvironmentFailure(
+            f"a page to look at: viser cannot listen on this machine ({error}); "
+            "a film needs no such thing: take a name ending in .gif or .png"
+        ) from None
+    try:
+        yield server
+    finally:
+        with redirect_stdout(StringIO()):
+            server.stop()
+
+
+class _Moving:
+    """The scene of a server, at one moment after another."""
+
+    def __init__(self, scene: Any, stage: Stage) -> None:
+        self.scene, self.stage = scene, stage
+        self.same = _SAME * stage.size
+        self.clock = scene.add_frame("/clock", show_axes=False)
+        self.frames = {
+            owner: scene.add_frame(f"/{owner}", show_axes=False) for owner in stage.poses
+        }
+        self.shown: dict[str, tuple[Array, Array]] = {}
+        for solid in stage.solids:
+            self._add(solid)
+        self.bent = [(bent, self._bend(bent)) for bent in stage.bent]
+        self.lines = [(line, self._draw(line)) for line in stage.lines]
+
+    def _add(self, solid: Solid) -> None:
+        name = "/".join(part for part in ("", solid.owner, solid.part) if part or not solid.owner)
+        self.scene.add_mesh_simple(
+            name if name.startswith("/") else f"/{name}",
+            vertices=solid.surface.vertices.astype(np.float32),
+            faces=solid.surface.faces.astype(np.uint32), color=solid.colour,
+            opacity=None if solid.opacity == 1 else solid.opacity, visible=not solid.hidden,
+        )  # fmt: skip
+
+    def _bend(self, bent: Bent) -> Any:
+        return self.scene.add_mesh_simple(
+            f"/{bent.name}", vertices=bent.vertices[0].astype(np.float32),
+            faces=bent.faces.astype(np.uint32), color=bent.colour,
+        )  # fmt: skip
+
+    def _draw(self, line: Line) -> Any:
+        return self.scene.add_line_segments(
+            f"/{line.name}", points=_segments(line.points[0]), colors=line.colour,
+            thickness=line.width * self.stage.size / 1000,
+        )  # fmt: skip
+
+    def to(self, k: int) -> None:
+        """Move what has moved to moment k."""
+        self.clock.position = (float(k), 0.0, 0.0)
+        for owner, pose in self.stage.poses.items():
+            self._pose(owner, pose, min(k, len(pose.position) - 1))
+        for bent, handle in self.bent if k else ():
+            handle.vertices = bent.vertices[k].astype(np.float32)
+        for line, handle in self.lines if k else ():
+            if len(line.points) > 1:
+                handle.points = _segments(line.points[k])
+
+    def _pose(self, owner: str, pose: Poses, k: int) -> None:
+        position, quaternion = pose.position[k], pose.quaternion[k]
+        before = self.shown.get(owner)
+        frame = self.frames[owner]
+        if before is None or np.abs(position - before[0]).max() > self.same:
+            frame.position = tuple(position)
+        else:
+            position = before[0]
+        if before is None or np.abs(quaternion - before[1]).max() > _SAME:
+            frame.wxyz = tuple(quaternion)
+        else:
+            quaternion = before[1]
+        self.shown[owner] = position, quaternion
+
+
+def _segments(points: Array) -> Any:
+    """(n - 1, 2, 3) pieces of a broken line (n, 3)."""
+    return np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
+
+
+def _grid(scene: Any, stage: Stage) -> None:
+    """A grid normal to up, below everything."""
+    low, high = stage.corners()
+    up, middle = stage.up, (low + high) / 2
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    floor = float(((low + corners * (high - low)) @ up).min()) - 0.04 * stage.size
+    cell = 10.0 ** np.floor(np.log10(stage.size / 2))
+    wide = float(np.ceil(_WIDE * stage.size / cell) * cell)
+    axes = along(up)
+    scene.add_grid(
+        "/grid", width=wide, height=wide, plane="xy", cell_size=float(cell / 5),
+        section_size=float(cell), cell_color=_THIN, section_color=_THICK,
+        shadow_opacity=0.0, wxyz=tuple(quaternions(axes.reshape(1, 9))[0]),
+        position=tuple(middle + (floor - middle @ up) * up),
+    )  # fmt: skip
+
+
+def _with_script(text: str, stage: Stage) -> str:
+    """The page with its title, what it says of bodies and hinges, and the script that says it."""
+    told = json.dumps(_told(stage), separators=(",", ":")).replace("<", "\\u003c")
+    script = files(__package__).joinpath("page.js").read_text(encoding="utf-8")
+    head = text.index("</head>")
+    ours = f"<script>window.MSTMM={told};\n{script}</script>"
+    text = text[:head] + ours + text[head:]
+    title = f"<title>{escape(stage.title)}</title>"
+    begin, end = text.find("<title>"), text.find("</title>")
+    if begin < 0:
+        return text.replace("<head>", f"<head>{title}", 1)
+    return text[:begin] + title + text[end + len("</title>") :]
+
+
+def _told(stage: Stage) -> dict[str, Any]:
+    """What the script knows: numbers as little-endian floats in base64."""
+    owners = {
+        f"/{owner}": {
+            "name": told.name, "text": told.text, "anchor": [float(x) for x in told.anchor],
+            "labels": told.labels, "values": _packed(told.values),
+        }
+        for owner, told in stage.told.items()
+    }  # fmt: skip
+    return {
+        "title": stage.title, "speed": stage.speed, "times": _packed(stage.times),
+        "notes": stage.notes, "owners": owners,
+    }  # fmt: skip
+
+
+def _packed(numbers: Array) -> str:
+    return b64encode(np.ascontiguousarray(numbers, dtype="<f4").tobytes()).decode("ascii")

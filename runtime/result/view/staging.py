@@ -1,0 +1,187 @@
+"""A run put on a stage: every body, hinge, spring and trail of it, over the moments of a film."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+from mstmm.numbers.rotations import IDENTITY
+from mstmm.scene import Bushing, Hinge, Spring, split
+from mstmm.scene.rules.values import GROUND
+
+from . import bodies, flexible, hinges, shapes
+from .moments import Moments
+from .solids import Colour
+from .stage import Bent, Line, Poses, Solid, Stage, Told
+
+if TYPE_CHECKING:
+    from ..record import Record
+
+#: Colours of bodies, one after another: apart for the colour-blind too, on white and on black.
+_COLOURS: tuple[Colour, ...] = (
+    (68, 119, 170), (204, 119, 68), (68, 150, 90), (170, 90, 150), (190, 170, 60), (90, 180, 190),
+    (190, 80, 90), (120, 130, 140),
+)  # fmt: skip
+_TRAIL: Colour = (150, 160, 175)
+
+#: Hinges of a scene of more are not drawn.
+_HINGES = 300
+#: Samples by which the size of the scene is taken.
+_LOOKS = 40
+
+
+def staged(
+    run: Record,
+    title: str,
+    trails: Sequence[str] = (),
+    speed: float | None = None,
+    most: int | None = None,
+) -> Stage:
+    """The stage of a run.  `trails`: ends whose ways are drawn; `speed`: seconds of the run per
+    second of film; `most`: pictures at most.  SceneError for an end that there is not, and for a
+    run without samples."""
+    return _Staging(run, trails, speed, most).stage(title)
+
+
+class _Staging:
+    def __init__(
+        self, run: Record, trails: Sequence[str], speed: float | None, most: int | None
+    ) -> None:
+        self.run, self.scene = run, run.model.scene
+        self.skeleton = self.scene.skeleton
+        self.names = [self.skeleton.bodies.name(i) for i in range(len(self.skeleton.bodies))]
+        drawn = len(self.scene.hinges) <= _HINGES
+        self.hinges: Sequence[Hinge] = self.scene.hinges if drawn else ()
+        self.when = Moments.of(run, len(self.names) + len(self.hinges), speed, most)
+        self.trails = tuple(trails)
+        run._observed.fetch(self.names)
+        self.poses = {f"bodies/{name}": self.when.poses(run, name) for name in self.names}
+        self.size = self._size()
+        self.radius = bodies.thickness(self.size, self.size)
+        self.notes = () if drawn else (f"more than {_HINGES} hinges: they are not drawn",)
+
+    def stage(self, title: str) -> Stage:
+        solids = [*self._shapes(), *self._rigid(), *self._joints(), *self._feet()]
+        return Stage(
+            title=title, times=self.when.times, speed=self.when.speed, up=self._up(),
+            poses=self.poses, solids=tuple(solids), bent=tuple(self._bent()),
+            lines=(*self._coils(), *self._ways()), told=dict(self._told()), notes=self.notes,
+        )  # fmt: skip
+
+    # --- what is there ----------------------------------------------------------------------------
+
+    def _size(self) -> float:
+        """The diagonal (m) of the box that holds origins and ends of all bodies."""
+        some = np.unique(np.linspace(0, len(self.when.times) - 1, _LOOKS).astype(int))
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for name, body in zip(self.names, self.skeleton.bodies, strict=True):
+            pose = self.poses[f"bodies/{name}"]
+            ends = np.array([(0.0, 0.0, 0.0), *(body.end_position(end) for end in body.ends)])
+            places = Poses(pose.position[some], pose.quaternion[some]).of(ends)
+            low = np.minimum(low, places.min(axis=(0, 1)))
+            high = np.maximum(high, places.max(axis=(0, 1)))
+        for at in hinges.held_by_ground(iter(self.hinges)):
+            low, high = np.minimum(low, at), np.maximum(high, at)
+        size = float(np.linalg.norm(high - low)) if len(self.names) else 1.0
+        return size if size > 0 else 1.0
+
+    def _up(self) -> Array:
+        gravity = np.array(self.scene.gravity)
+        strength = float(np.linalg.norm(gravity))
+        return -gravity / strength if strength > 0 else np.array([0.0, 0.0, 1.0])
+
+    def _colour(self, name: str) -> Colour:
+        return _COLOURS[self.names.index(name) % len(_COLOURS)]
+
+    def _rigid(self) -> Iterator[Solid]:
+        known = self.run.model.flexible
+        drawn = {name for name, body in known.items() if body.shapes is not None}
+        drawn |= {shape.owner for shape in self.scene.shape}
+        joined = {hinge.inboard for hinge in self.scene.hinges}
+        joined |= {hinge.outboard for hinge in self.scene.hinges}
+        for i, (name, body) in enumerate(zip(self.names, self.skeleton.bodies, strict=True)):
+            if name not in drawn:
+                colour = _COLOURS[i % len(_COLOURS)]
+                yield from bodies.rigid(name, body, name in joined, self.size, colour)
+
+    def _shapes(self) -> Iterator[Solid]:
+        """Every shape of the scene: such a body is drawn by its shapes alone."""
+        for shape in self.scene.shape:
+            if shape.is_on_ground:
+                yield shapes.solid(shape, (0.0, 0.0, 0.0), IDENTITY, hinges.GROUND)
+                continue
+            number = self.skeleton.bodies.find(shape.owner)
+            assert number is not None
+            body, end = self.skeleton.bodies[number], split(shape.on)[1]
+            place, axes = body.end_position(end), body.end_rotation(end)
+            yield shapes.solid(shape, place, axes, _COLOURS[number % len(_COLOURS)])
+
+    def _bent(self) -> Iterator[Bent]:
+        for name, body in self.run.model.flexible.items():
+            if body.shapes is not None:
+                pose = self.poses[f"bodies/{name}"]
+                yield flexible.tube(self.run, name, self.when, pose, self.size, self._colour(name))
+
+    def _joints(self) -> Iterator[Solid]:
+        for hinge in self.hinges:
+            shown = hinges.glyph(hinge, 1.6 * self.radius)
+            if shown is not None:
+                owner = f"hinges/{hinge.name}"
+                self.poses[owner] = self.when.poses(self.run, hinge.outboard)
+                yield Solid(owner, "glyph", shown, hinges.HINGE)
+
+    def _feet(self) -> Iterator[Solid]:
+        places = {tuple(at): at for at in hinges.held_by_ground(iter(self.hinges))}
+        for number, at in enumerate(places.values(), 1):
+            foot = hinges.foot(at, 1.2 * self.radius)
+            yield Solid(foot.owner, f"{number}", foot.surface, foot.colour)
+
+    # --- lines ------------------------------------------------------------------------------------
+
+    def _coils(self) -> Iterator[Line]:
+        for force in self.scene.forces:
+            start, end = self._place(force, force.from_), self._place(force, force.to)
+            reach = float(np.linalg.norm(end - start, axis=1).max())
+            if isinstance(force, Spring) and reach > 0:
+                points = hinges.coil(start, end, min(0.08 * reach, 1.6 * self.radius))
+                yield Line(f"springs/{force.name}", points, hinges.SPRING)
+
+    def _place(self, force: Spring | Bushing, reference: str) -> Array:
+        """(f, 3) where an end of a force is."""
+        if split(reference)[0] == GROUND:
+            return np.tile(np.array(force.position), (len(self.when.times), 1))
+        return self.when.poses(self.run, reference).position
+
+    def _ways(self) -> Iterator[Line]:
+        for reference in self.trails:
+            if split(reference)[0] == GROUND:
+                raise SceneError(f'trail of "{reference}": the ground does not move; name an end')
+            way = self.when.poses(self.run, reference).position
+            yield Line(f"trails/{reference}", way[None], _TRAIL, 2.0)
+
+    # --- what the page says -----------------------------------------------------------------------
+
+    def _told(self) -> Iterator[tuple[str, Told]]:
+        for name, body in zip(self.names, self.skeleton.bodies, strict=True):
+            text = (f"mass {body.mass:g} kg",) if name not in self.run.model.flexible else ("flexible",)
+            pose = self.poses[f"bodies/{name}"]
+            labels = (("x", "m"), ("y", "m"), ("z", "m"))
+            yield f"bodies/{name}", Told(name, text, bodies.centre_of(body), labels, pose.position)
+        for hinge in self.hinges:
+            if f"hinges/{hinge.name}" in self.poses:
+                slots = self.run.layout(hinge.name)
+                q, u = self.run.coordinate(hinge.name), self.run.speed(hinge.name)
+                labels = tuple(zip(slots.q_names, slots.q_units, strict=True))
+                values = self._between(q[self.when.kept])
+                yield f"hinges/{hinge.name}", Told(
+                    hinge.name, (hinge.type,), np.zeros(3), labels, values
+                )
+
+    def _between(self, values: Array) -> Array:
+        """(f, k) coordinates at the moments, straight between samples."""
+        columns = [np.interp(self.when.times, self.when.t, column) for column in values.T]
+        return np.stack(columns, axis=1) if columns else np.zeros((len(self.when.times), 0))

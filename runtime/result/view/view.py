@@ -1,0 +1,80 @@
+"""A run to look at: a page, a strip, a film or frames, by the ending of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mstmm.errors import SceneError
+
+from .film import FILMS, STRIPS, film, frames, strip
+from .page import page
+from .stage import Stage
+from .staging import staged
+
+if TYPE_CHECKING:
+    from ..record import Record
+
+#: Endings of the files that a view can be.
+ENDINGS = (".html", *STRIPS, *FILMS)
+#: Height of a page in a notebook.
+_INLINE = "480px"
+
+
+class View:
+    """What a run looks like.  In a notebook it shows itself; `save` writes it.
+
+    Attributes:
+        stage: everything that is seen, as triangles and poses over time.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+
+    @cached_property
+    def html(self) -> str:
+        """One page that needs no network (extra: view)."""
+        return page(self.stage)
+
+    def save(self, path: str | Path, moments: int = 6) -> Path:
+        """Write a page (.html, extra: view), a strip of so many `moments` (.png, .svg, .pdf), a
+        film (.gif, .mp4) or, into a folder, every frame (extra: plot); returns the path.
+
+        SceneError for another ending, EnvironmentFailure for what is not installed.
+        """
+        path = Path(path)
+        ending = path.suffix.lower()
+        if ending == ".html":
+            path.write_text(self.html, encoding="utf-8")
+        elif ending in STRIPS:
+            strip(self.stage, path, moments)
+        elif ending in FILMS:
+            film(self.stage, path)
+        elif not ending:
+            frames(self.stage, path)
+        else:
+            raise SceneError(
+                f'view "{path}": expected a name ending in {", ".join(ENDINGS)}, or a folder for '
+                "frames, without an ending"
+            )
+        return path
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{escape(self.html)}" style="width:100%;height:{_INLINE};border:0">'
+            "</iframe>"
+        )
+
+
+def view(
+    run: Record,
+    title: str,
+    trails: Sequence[str],
+    speed: float | None,
+    most: int | None = None,
+) -> View:
+    """See `Result.view`."""
+    return View(staged(run, title, trails, speed, most))

@@ -1,0 +1,71 @@
+"""Strips, films and frames: there is something on them, and it moves."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from view import scenes
+
+import mstmm.runtime.result.view.film as films
+from mstmm.errors import EnvironmentFailure
+from mstmm.runtime.result.view.drawn import Flat
+from mstmm.runtime.result.view.staging import staged
+from mstmm.runtime.result.view.view import View
+
+
+@pytest.fixture(scope="module")
+def view() -> View:
+    return View(staged(scenes.run(), "a beam and a rod", speed=20.0))
+
+
+def test_a_strip(view: View, tmp_path: Path) -> None:
+    view.save(tmp_path / "strip.png", moments=3)
+    picture = np.asarray(Image.open(tmp_path / "strip.png").convert("RGB"))
+    thirds = np.array_split(picture, 3, axis=1)
+    inked = [(third < 200).any(axis=2).mean() for third in thirds]
+    assert min(inked) > 0.01
+    assert not np.array_equal(thirds[0][:, : thirds[2].shape[1]], thirds[2])
+
+
+def test_a_gif_has_every_moment(view: View, tmp_path: Path) -> None:
+    view.save(tmp_path / "film.gif")
+    rate = (len(view.stage.times) - 1) * 20.0 / 2.0
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.n_frames == len(range(0, len(view.stage.times), round(rate / 15)))
+        assert film.info["duration"] == pytest.approx(1000 / 15, abs=10)
+
+
+def test_frames(view: View, tmp_path: Path) -> None:
+    view.save(tmp_path / "frames")
+    made = sorted((tmp_path / "frames").iterdir())
+    assert [path.name for path in made] == [
+        f"frame_{k + 1:04d}.png" for k in range(len(view.stage.times))
+    ]
+
+
+def test_an_mp4_without_its_program(
+    view: View, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(films.shutil, "which", lambda _: None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(EnvironmentFailure, match=r"ffmpeg.*or take film\.gif"):
+        view.save(tmp_path / "film.mp4")
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
+def test_an_mp4(view: View, tmp_path: Path) -> None:
+    view.save(tmp_path / "film.mp4")
+    assert (tmp_path / "film.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+def test_what_is_near_hides_what_is_far(view: View) -> None:
+    corners, colours = Flat(view.stage)._triangles(0)
+    low, high = Flat(view.stage).window
+    assert len(corners) == len(colours) > 100
+    assert (corners >= low - 1e-9).all()
+    assert (corners <= high + 1e-9).all()

@@ -1,0 +1,104 @@
+"""What is on a stage is where the run says it is, in between samples too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from view import scenes
+
+import mstmm
+from mstmm.errors import SceneError
+from mstmm.runtime.result.view import bodies
+from mstmm.runtime.result.view.camera import FIELD, camera
+from mstmm.runtime.result.view.moments import natural_speed
+from mstmm.runtime.result.view.staging import staged
+
+
+def test_poses_between_samples_are_those_of_a_run_with_more() -> None:
+    run = scenes.run()
+    stage = staged(run, "between", speed=0.9)
+    assert len(stage.times) == 68
+    fine = run.model.simulate(2.0, output_times=stage.times)
+    pose = stage.poses["bodies/rod"]
+    assert pose.position == pytest.approx(fine.position("rod"), abs=2e-6)
+    same = np.abs(np.sum(pose.quaternion * fine.orientation("rod"), axis=1))
+    assert same == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_tube_ends_where_the_beam_does() -> None:
+    run = scenes.run()
+    stage = staged(run, "tube", most=21)
+    [tube] = stage.bent
+    around = 8
+    tip = tube.vertices[:, -around:].mean(axis=1)
+    fine = run.model.simulate(2.0, output_times=stage.times)
+    assert tip == pytest.approx(fine.position("blade.tip"), abs=1e-5)
+    assert np.ptp(fine.position("blade.tip"), axis=0).max() > 0.3
+
+
+def test_springs_and_trails_meet_their_ends() -> None:
+    run = scenes.run()
+    stage = staged(run, "lines", trails=("rod.tip",), most=11)
+    coil, trail = stage.lines
+    fine = run.model.simulate(2.0, output_times=stage.times)
+    assert coil.points[:, 0] == pytest.approx(np.tile([0.0, 0.0, 1.0], (11, 1)), abs=1e-12)
+    assert coil.points[:, -1] == pytest.approx(fine.position("rod.ear"), abs=1e-5)
+    assert trail.points[0] == pytest.approx(fine.position("rod.tip"), abs=1e-5)
+
+
+def test_bodies_with_shapes_are_drawn_by_them_alone() -> None:
+    stage = staged(scenes.run(), "shapes", most=2)
+    hub = [solid for solid in stage.solids if solid.owner == "bodies/hub"]
+    assert [solid.part for solid in hub] == ["case"]
+    assert hub[0].colour == (0xAA, 0x33, 0x22)
+    low, high = hub[0].surface.vertices.min(axis=0), hub[0].surface.vertices.max(axis=0)
+    assert low == pytest.approx([-0.1, -0.15, -0.1])
+    assert high == pytest.approx([0.1, 0.15, 0.3])
+
+
+def test_the_box_of_equal_inertia_has_that_inertia() -> None:
+    a, b, c, mass = 0.3, 0.5, 0.2, 2.0
+    inertia = [mass / 12 * (b * b + c * c), mass / 12 * (a * a + c * c), mass / 12 * (a * a + b * b)]
+    body = mstmm.scene.Body(name="block", mass=mass, inertia=inertia, center_of_mass=[1, 0, 0])
+    block = bodies.equal_inertia(body, 1.0)
+    assert block is not None
+    edges = np.ptp(block.vertices, axis=0)
+    assert edges == pytest.approx([a, b, c])
+    assert block.vertices.mean(axis=0) == pytest.approx([1, 0, 0])
+
+
+def test_the_camera_sees_everything() -> None:
+    stage = staged(scenes.run(), "seen", most=11)
+    look = camera(stage)
+    seen = (stage.cloud - look.position) @ look.axes.T
+    ahead = -seen[:, 2]
+    assert (ahead > 0).all()
+    assert (np.abs(seen[:, 1]) <= ahead * np.tan(FIELD / 2)).all()
+    assert look.axes[1] @ stage.up > 0
+
+
+@pytest.mark.parametrize(
+    ("lasts", "speed"), [(1e-3, 2e-4), (0.6, 0.1), (2.0, 1.0), (20.0, 1.0), (100.0, 10.0)]
+)
+def test_films_last_some_seconds(lasts: float, speed: float) -> None:
+    assert natural_speed(lasts) == pytest.approx(speed)
+
+
+def test_a_start_alone_is_one_moment() -> None:
+    still = scenes.run().model.simulate(0.0)
+    stage = staged(still, "still")
+    assert len(stage.times) == 1
+    assert stage.poses["bodies/rod"].position == pytest.approx(still.position("rod")[:1])
+
+
+def test_refusals() -> None:
+    run = scenes.run()
+    with pytest.raises(SceneError, match='"rod.top": there is no such body or end.*rod.tip'):
+        staged(run, "x", trails=("rod.top",))
+    with pytest.raises(SceneError, match="the ground does not move"):
+        staged(run, "x", trails=("ground",))
+    for speed in (0.0, -1.0, float("nan")):
+        with pytest.raises(SceneError, match="speed"):
+            run.view(speed=speed)
+    with pytest.raises(SceneError, match="expected a name ending in .html"):
+        run.view("run.avi")
