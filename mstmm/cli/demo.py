@@ -17,9 +17,11 @@ if TYPE_CHECKING:
 
 #: The scene of examples/three_bodies_on_balls, as it travels with the package.
 SCENE = "three_bodies_on_balls.toml"
+TITLE = "Three bodies on ball hinges"
 T_END, SAMPLES = 5.0, 501
 
 TABLE = ("body3.tip.x", "body3.tip.y", "body3.tip.z", "ball0.fz", "energy")
+TRAIL = "body3.tip"
 PICTURE = ("body3.tip.position", "ball0.force", "energy.kinetic", "energy.gravity", "energy")
 
 ABOUT = """\
@@ -45,10 +47,10 @@ def scene_text() -> str:
 
 
 def demo(json: Json = False) -> None:
-    """Run an example and leave a result, a picture and a table in this folder."""
+    """Run an example; leave a result, pictures, one that moves, and a table in this folder."""
     from . import output, report
 
-    scene, result_file, table_file, picture = _targets()
+    scene, result_file, table_file, picture, moving = _targets()
     kept = _write_scene(scene)
     result, seconds = _simulate(scene_text())
     verdict = result.certificate.verdict()
@@ -60,12 +62,15 @@ def demo(json: Json = False) -> None:
     result.save(result_file)
     table_file.write_text(text + "\n", encoding="utf-8")
     if picture is not None:
-        result.plot(*PICTURE, path=picture, title="Three bodies on ball hinges")
+        result.plot(*PICTURE, path=picture, title=TITLE)
+    if moving is not None:
+        result.view(moving, trails=(TRAIL,), title=TITLE)
     made = {
         result_file: f"the result: {len(result.t)} samples of every quantity",
         table_file: "this text",
         scene: "the scene" if kept is None else kept,
     } | ({} if picture is None else {picture: "a picture of it"})
+    made |= {} if moving is None else {moving: "the chain as it moves, for any browser"}
     if json:
         data = report.to_json(result, seconds, verdict)
         output.emit_json({**data, "files": [str(path) for path in made]})
@@ -80,12 +85,13 @@ def demo(json: Json = False) -> None:
     output.say(NEXT)
 
 
-def _targets() -> tuple[Path, Path, Path, Path | None]:
-    """Scene, result, table and picture; what no package can write is left out."""
+def _targets() -> tuple[Path, Path, Path, Path | None, Path | None]:
+    """Scene, result, table, picture and page; what no package can write is left out."""
     names = ["demo.toml", "demo" + result_ending(), "demo.txt"]
     scene, result, table = (output_file(name, (), "demo:") for name in names)
     picture = None if missing("plot") else output_file("demo.png", (), "demo:")
-    return scene, result, table, picture
+    moving = None if missing("view") else output_file("demo.html", (), "demo:")
+    return scene, result, table, picture, moving
 
 
 def _write_scene(path: Path) -> str | None:
@@ -119,6 +125,10 @@ def _without_extras() -> list[str]:
     lines = []
     if missing("plot"):
         lines.append(f"no picture: it needs {', '.join(missing('plot'))}: {install('plot')}")
+    if missing("view"):
+        lines.append(
+            f"no page that moves: it needs {', '.join(missing('view'))}: {install('view')}"
+        )
     if missing("io"):
         lines.append(f"no NetCDF, so CSV: it needs {', '.join(missing('io'))}: {install('io')}")
     return lines

@@ -91,10 +91,16 @@ def _result(what: str, t_end: float | None) -> Result:
 
 
 def _about(target: Path, result: Result) -> str:
-    what = {".html": "a page for any browser, without a network", ".gif": "a film", ".mp4": "a film"}
+    what = {
+        ".html": "a page for any browser, without a network",
+        ".gif": "a film",
+        ".mp4": "a film",
+    }
     kind = what.get(target.suffix.lower(), "pictures")
     moves = len(result.t) > 1
-    return f"{kind}, t = {result.t[0]:g} to {result.t[-1]:g} s" if moves else f"{kind}, at the start"
+    return (
+        f"{kind}, t = {result.t[0]:g} to {result.t[-1]:g} s" if moves else f"{kind}, at the start"
+    )
 
 
 def _title(path: Path) -> str:

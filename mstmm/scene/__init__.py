@@ -20,7 +20,7 @@ from .tables.hinge_keys import Initial
 from .tables.law import Friction, Law, LawEntry, Limits, SpringLaw
 from .tables.loads import Event, Load, Spring
 from .tables.outside.inputs import Input, Output, Signal
-from .tables.shape import Shape
+from .tables.outside.shape import Shape
 
 __all__ = [
     "Arrays", "Beam", "Body", "Box", "Bushing", "Chain", "Constraint", "Coupling", "Damping",

@@ -26,6 +26,7 @@ def test_demo_leaves_result_table_picture_and_scene(mstmm: Command, folder: Path
     result = package.load_result(folder / "demo.nc")
     assert result.t[-1] == 5.0 and np.ptp(result.energy()) < 1e-6
     assert (folder / "demo.png").read_bytes().startswith(b"\x89PNG")
+    assert "Three bodies on ball hinges</title>" in (folder / "demo.html").read_text()
     table = (folder / "demo.txt").read_text()
     assert table in done.out and "body3.tip.z" in table
     assert mstmm("check", "demo.toml").code == 0

@@ -1,4 +1,4 @@
-"""A page in headless Chromium: what it writes to its console, what its script finds, its picture."""
+"""A page in headless Chromium: what it tells its console, what its script finds, its picture."""
 
 from __future__ import annotations
 

@@ -38,7 +38,11 @@ SCENE: dict[str, Any] = {
 
 
 @cache
+def model() -> mstmm.Model:
+    return mstmm.compile(mstmm.Scene(**SCENE), engine="looped")
+
+
+@cache
 def run() -> Result:
     """Two seconds of it, sampled often enough to look between."""
-    model = mstmm.compile(mstmm.Scene(**SCENE), engine="looped")
-    return model.simulate(2.0, output_times=[0.01 * k for k in range(201)])
+    return model().simulate(2.0, output_times=[0.01 * k for k in range(201)])

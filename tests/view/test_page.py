@@ -33,7 +33,9 @@ def test_a_page(tmp_path: Path) -> None:
     with browser.opened(path) as page:
         clock = "(document.querySelector('#mstmm div') || {}).textContent"
         assert page.wait(f"/t = 0\\.[1-9]/.test({clock})"), page.console
-        assert page.value("document.querySelector('#mstmm b').textContent") == "a <b>beam</b> & a rod"
+        assert (
+            page.value("document.querySelector('#mstmm b').textContent") == "a <b>beam</b> & a rod"
+        )
         assert page.value("document.title") == "a <b>beam</b> & a rod"
         told = page.wait(POINT)
         assert told.split("\n")[0] in ("hub", "wrist"), told

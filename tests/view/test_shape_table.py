@@ -50,7 +50,7 @@ def test_refusals(shape: dict[str, Any], message: str) -> None:
 
 def test_shapes_change_no_motion() -> None:
     bare = mstmm.compile(mstmm.Scene(**{**scenes.SCENE, "shape": []}), engine="looped")
-    shaped = scenes.run().model
+    shaped = scenes.model()
     q, u = bare.initial_state()
     assert np.array_equal(bare.accelerations(q, u), shaped.accelerations(q, u))
 

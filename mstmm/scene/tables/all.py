@@ -25,8 +25,8 @@ from .loads import Event, Load, Spring
 from .members import Bodies, Hinges
 from .outside.controller import Controller
 from .outside.inputs import Input, Output, Signal
+from .outside.shape import Shape
 from .rigid import bare
-from .shape import Shape
 
 
 def _version(value: Any) -> int:

@@ -57,7 +57,7 @@ class Flat:
             )
         )  # fmt: skip
         for line in self.stage.lines:
-            points = line.points[min(k, len(line.points) - 1)] @ self.camera.axes.T
+            points = line.at(k, len(self.stage.times)) @ self.camera.axes.T
             colour = tuple(c / 255 for c in line.colour)
             axis.add_collection(LineCollection([points[:, :2]], colors=[colour], linewidths=0.9))
         low, high = self.window

@@ -53,12 +53,12 @@ def film(stage: Stage, path: Path) -> None:
 
     _, plot = _parts()
     lasts = _seconds(stage)
-    rate = (len(stage.times) - 1) / lasts if lasts else 1.0
+    rate = max(1, round((len(stage.times) - 1) / lasts)) if lasts else 1
     every = max(1, round(rate / _GIF_RATE)) if path.suffix == ".gif" else 1
     shown = range(0, len(stage.times), every)
     figure, axis, flat = _frame(stage)
     if path.suffix == ".gif":
-        writer: Any = animation.PillowWriter(fps=rate / every)
+        writer: Any = animation.PillowWriter(fps=max(1, round(rate / every)))
     else:
         plot["animation.ffmpeg_path"] = _ffmpeg(path)
         writer = animation.FFMpegWriter(fps=rate, codec="h264", extra_args=_PLAYABLE)
@@ -134,7 +134,7 @@ def _ffmpeg(path: Path) -> str:
     found = shutil.which("ffmpeg")
     if found is None:
         try:
-            import imageio_ffmpeg
+            import imageio_ffmpeg  # type: ignore[import-not-found]
         except ImportError:
             raise EnvironmentFailure(
                 f"{path}: an MP4 needs the program ffmpeg, which is not on this machine; install "

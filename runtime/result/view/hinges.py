@@ -93,7 +93,9 @@ def coil(start: Array, end: Array, radius: float) -> Array:
 def held_by_ground(scene_hinges: Iterator[Hinge]) -> Iterator[Array]:
     """Places on the ground at which hinges begin."""
     for hinge in scene_hinges:
-        if hinge.inboard_body == "ground" and not (hinge.facts is not None and hinge.facts.free_body):
+        if hinge.inboard_body == "ground" and not (
+            hinge.facts is not None and hinge.facts.free_body
+        ):
             yield np.array(hinge.position)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,8 @@ RATE, SHORTEST, LONGEST = 30.0, 1.5, 20.0
 #: Places of owners that a film may hold; beyond them it has fewer pictures.
 _MOST = 90_000
 _FEWEST = 24
+#: Places of a trail from one picture to the next.
+_FINER = 4
 _SPEED = "seconds of the run that pass in one second, above 0"
 
 
@@ -45,8 +47,11 @@ class Moments:
 
     @classmethod
     def of(cls, run: Record, owners: int, speed: float | None, most: int | None = None) -> Moments:
-        """Moments for a scene of so many bodies and hinges.  `speed` by itself is 1, or for
-        short and long runs what gives a film of some seconds.  SceneError for a run without a sample."""
+        """Moments for a scene of so many bodies and hinges.
+
+        `speed` by itself is 1, or for short and long runs what gives a film of some seconds.
+        SceneError for a run without a sample.
+        """
         finite = np.flatnonzero(np.isfinite(run.q).all(axis=1))
         if not len(finite):
             raise SceneError("there is nothing to look at: the run has no sample with numbers")
@@ -74,6 +79,16 @@ class Moments:
         from scipy.interpolate import CubicHermiteSpline
 
         return np.asarray(CubicHermiteSpline(self.t, values, rates)(self.times))
+
+    def way(self, run: Record, reference: str) -> Array:
+        """(n, 3) m, the way of a body's origin or an end, in steps of time finer than a film's."""
+        finer = replace(self, times=np.linspace(self.times[0], self.times[-1], self._fine))
+        points = run._observed.points(reference)[self.kept]
+        return finer.smooth(points[:, 0:3], points[:, 3:6])
+
+    @property
+    def _fine(self) -> int:
+        return _FINER * (len(self.times) - 1) + 1
 
     def poses(self, run: Record, reference: str) -> Poses:
         """The axes of a body or an end."""

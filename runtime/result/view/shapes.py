@@ -18,9 +18,7 @@ from .stage import Solid
 _ROUND, _MOST = 32, 200_000
 
 
-def solid(
-    shape: Shape, at: Vector, axes: Matrix, colour: Colour
-) -> Solid:
+def solid(shape: Shape, at: Vector, axes: Matrix, colour: Colour) -> Solid:
     """A shape on an end that is at `at` (m) with `axes` (end to body) in the axes of its body."""
     own = _surface(shape).placed(shape.position, np.array(shape.rotation))
     owner = "ground" if shape.is_on_ground else f"bodies/{shape.owner}"
@@ -31,7 +29,7 @@ def solid(
 def _surface(shape: Shape) -> Surface:
     if shape.type == "mesh":
         return _mesh(shape)
-    if shape.type == "box":
+    if shape.size is not None:
         return box(shape.size)
     radius, length = shape.radius or 0.0, shape.length or 0.0
     if shape.type == "sphere":

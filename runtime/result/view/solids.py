@@ -45,7 +45,7 @@ def box(size: ArrayLike) -> Surface:
     quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
     vertices = corners[[k for quad in quads for k in quad]]  # each edge twice: it stays sharp
     first = 4 * np.arange(6)[:, None]
-    faces = np.concatenate([first + (0, 1, 2), first + (0, 2, 3)])
+    faces = np.concatenate([first + np.array(corner) for corner in ((0, 1, 2), (0, 2, 3))])
     return Surface(vertices * np.asarray(size, dtype=np.float64), faces)
 
 

@@ -64,13 +64,20 @@ class Bent:
 
 @dataclass(frozen=True)
 class Line:
-    """A broken line over the moments, (f, n, 3); inertial axes.  A trail has the same points in
-    all of them and is kept as (1, n, 3)."""
+    """A broken line over the moments, (f, n, 3); inertial axes.  A trail, (1, n, 3), is the way of
+    a point from the first moment to the last, its places evenly spread in time."""
 
     name: str
     points: Array
     colour: Colour
     width: float = 1.5
+
+    def at(self, k: int, moments: int) -> Array:
+        """(m, 3) the line at moment k; of a trail, what has been gone by then."""
+        if len(self.points) > 1 or moments < 2:
+            return self.points[min(k, len(self.points) - 1)]
+        gone = (self.points.shape[1] - 1) * k // (moments - 1)
+        return self.points[0, : gone + 1]
 
 
 @dataclass(frozen=True)

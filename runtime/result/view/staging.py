@@ -160,25 +160,30 @@ class _Staging:
         for reference in self.trails:
             if split(reference)[0] == GROUND:
                 raise SceneError(f'trail of "{reference}": the ground does not move; name an end')
-            way = self.when.poses(self.run, reference).position
+            way = self.when.way(self.run, reference)
             yield Line(f"trails/{reference}", way[None], _TRAIL, 2.0)
 
     # --- what the page says -----------------------------------------------------------------------
 
     def _told(self) -> Iterator[tuple[str, Told]]:
         for name, body in zip(self.names, self.skeleton.bodies, strict=True):
-            text = (f"mass {body.mass:g} kg",) if name not in self.run.model.flexible else ("flexible",)
+            text = (
+                (f"mass {body.mass:g} kg",)
+                if name not in self.run.model.flexible
+                else ("flexible",)
+            )
             pose = self.poses[f"bodies/{name}"]
             labels = (("x", "m"), ("y", "m"), ("z", "m"))
             yield f"bodies/{name}", Told(name, text, bodies.centre_of(body), labels, pose.position)
         for hinge in self.hinges:
             if f"hinges/{hinge.name}" in self.poses:
                 slots = self.run.layout(hinge.name)
-                q, u = self.run.coordinate(hinge.name), self.run.speed(hinge.name)
-                labels = tuple(zip(slots.q_names, slots.q_units, strict=True))
+                q = self.run.coordinate(hinge.name)
+                named = tuple(zip(slots.q_names, slots.q_units, strict=True))
                 values = self._between(q[self.when.kept])
-                yield f"hinges/{hinge.name}", Told(
-                    hinge.name, (hinge.type,), np.zeros(3), labels, values
+                yield (
+                    f"hinges/{hinge.name}",
+                    Told(hinge.name, (hinge.type,), np.zeros(3), named, values),
                 )
 
     def _between(self, values: Array) -> Array:

@@ -8,10 +8,10 @@ from typing import Annotated, Any
 
 from pydantic import model_validator
 
-from ...numbers.rotations import Matrix, Vector, from_orientation
-from ..rules import text as texts
-from ..rules import values as rules
-from ..rules.values import (
+from ....numbers.rotations import Matrix, Vector, from_orientation
+from ...rules import text as texts
+from ...rules import values as rules
+from ...rules.values import (
     GROUND,
     Location,
     Orientation,
@@ -22,7 +22,7 @@ from ..rules.values import (
     refuse,
     split,
 )
-from .elastic_keys import path
+from ..elastic_keys import path
 
 #: What each type is made of.
 _KEYS = {
