@@ -93,3 +93,54 @@ def spinning_top(kind: str, spin: Sequence[float] = (0.0, 0.0, 0.0)) -> Model:
     foot = {"name": "foot", "type": kind, "inboard": "ground", "outboard": "top"}
     initial = {} if not any(spin) else {"initial": {"u": list(spin)}}
     return model({"gravity": [0, 0, 0], "body": [top], "hinge": [foot | initial]})
+
+
+def four_bar(speed: float = 0.0, askew: float = 0.0, closed: bool = True) -> dict[str, Any]:
+    """A crank of 0.5 m that turns at a speed (rad/s), a coupler of 1.1 m, a rocker of 0.8 m, feet
+    1.2 m apart, or these rods without the pin that closes the loop; the frames of their tips stand
+    `askew`, rad."""
+
+    def link(name: str, length: float) -> dict[str, Any]:
+        across = length**3 / 12
+        tip = {"position": [length, 0, 0], "orientation": [0.7 * askew, askew, 0]}
+        return {
+            "name": name, "mass": length, "center_of_mass": [length / 2, 0, 0],
+            "inertia": [1e-3 * length, across, across], "ends": {"tip": tip},
+        }  # fmt: skip
+
+    def pin(name: str, inboard: str, outboard: str, angle: float) -> dict[str, Any]:
+        return {
+            "name": name, "type": "pin", "inboard": inboard, "outboard": outboard,
+            "initial": {"q": [angle]},
+        }  # fmt: skip
+
+    foot = pin("foot", "ground", "crank", 1.0) | {"initial": {"q": [1.0], "u": [speed]}}
+    hinges = [
+        foot | {"hold": closed}, pin("knee", "crank.tip", "coupler", -0.6),
+        pin("heel", "ground", "rocker", 1.7) | {"position": [1.2, 0, 0]},
+    ]  # fmt: skip
+    return {
+        "gravity": [0, -9.81, 0],
+        "body": [link("crank", 0.5), link("coupler", 1.1), link("rocker", 0.8)],
+        "hinge": hinges + [pin("top", "coupler.tip", "rocker.tip", 0.0)] * closed,
+    }  # fmt: skip
+
+
+def held_row(masses: Sequence[float]) -> dict[str, Any]:
+    """Rods of 1 m in a row by pins, on an arch between two points of the ground."""
+    names, bend = [f"rod{i}" for i in range(len(masses))], 0.4
+    angles = [bend * (len(masses) / 2 - i - 0.4) for i in range(len(masses))]
+    hinges: list[dict[str, Any]] = [
+        {"name": f"pin{i}", "type": "pin", "outboard": name, "cut": False,
+         "inboard": f"{names[i - 1]}.tip" if i else "ground",
+         "initial": {"q": [-bend if i else angles[0]]}}
+        for i, name in enumerate(names)
+    ]  # fmt: skip
+    far = np.sum(np.exp(1j * np.array(angles)))
+    hinges.append({
+        "name": "far", "type": "pin", "inboard": "ground", "outboard": f"{names[-1]}.tip",
+        "position": [float(far.real), float(far.imag), 0.0], "cut": True,
+        "initial": {"q": [angles[-1]]},
+    })  # fmt: skip
+    bodies = [rod(name, mass=mass) for name, mass in zip(names, masses, strict=True)]
+    return {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import mpmath
@@ -10,6 +10,9 @@ import mpmath
 from ..arrays import Array
 from ..derive.audit.evaluate import evaluate
 from ..derive.fuse.scene import fuse
+from ..ir import KernelIR
+from ..ir.spec import ElementSpec
+from ..ir.structure import Key, Structure
 from ..runtime.engine.compiled import Compiled
 from ..runtime.kernels import store
 from ..runtime.pack.structure import structure_of
@@ -24,7 +27,7 @@ def precise(model: Compiled, t: float = 0.0) -> Callable[[Array, Array], list[An
     one kernel, replayed.  The scene's numbers are the doubles that the engines have."""
     elements, definitions = store.known(store.needed(model.scene))
     structure, numbers = structure_of(model.packed.system, elements, False)
-    kernel = fuse(structure, kernels_of(definitions)).kernels["accelerations"]
+    kernel = _fused(structure, definitions)
     still = {"memory": [0.0] * structure.n_memory, "efforts": [0.0] * structure.nu}
     given = {"p": _floats(numbers), "t": [t], **still}
 
@@ -33,6 +36,18 @@ def precise(model: Compiled, t: float = 0.0) -> Callable[[Array, Array], list[An
         return list(found["udot"])
 
     return accelerations
+
+
+#: The kernel of the last structure: who asks again mostly asks for other numbers of the same scene.
+_last: dict[str, KernelIR] = {}
+
+
+def _fused(structure: Structure, definitions: Mapping[Key, ElementSpec]) -> KernelIR:
+    key = structure.identity()
+    if key not in _last:
+        _last.clear()
+        _last[key] = fuse(structure, kernels_of(definitions)).kernels["accelerations"]
+    return _last[key]
 
 
 def relative_error(found: Array, exact: Sequence[Any]) -> float:

@@ -69,6 +69,10 @@ EXPECTED = {
     "plain-turns": ((8e-3, 3e-2), 0.1),
     # -alpha twice is an eigenvalue: nothing of rk4 holds from h alpha = 2.785 on
     "baumgarte": ((1.0, 2.8), 10.0),
+    # G M^-1 G' of rows that repeat others is some d^2: rounding up to d = 1e-8, and times 5 rows
+    "repeated-rows": ((1e-8, 2e-7), 5e-4),
+    # errors of (0.3 to 1) 1e-16 times the ratio; refined, of its square times (0.3 to 1) 1e-32
+    "heavy-link": ((1e6, 1e9), 1e11),
     "friction-steps": ((1e-5, 3e-4), 5e-6),
     "gimbal-passage": ((1e-3, 3e-2), 1e-8),
     "narrow-pulse": ((3e-3, 0.3), 1e-8),

@@ -16,11 +16,13 @@ from mstmm.atlas.scenes import (
     chain,
     double_pendulum,
     drawn_pins,
+    four_bar,
     model,
     rod,
     spinning_top,
 )
 from mstmm.atlas.variants import (
+    all_rows,
     baumgarte,
     held_places,
     inertial_axes,
@@ -192,3 +194,15 @@ def test_baumgarte_closes_a_gap_that_is_left_to_itself_otherwise() -> None:
     assert held < 0.3 * left < 1e-3
     assert baumgarte.gap_of(linkage, 0.005, 200, 0.0) == pytest.approx(left / 16, rel=0.5)
     assert math.isnan(baumgarte.gap_of(linkage, 0.01, 100, 400.0))
+
+
+def test_all_rows_of_parallel_axes_give_the_motion_of_the_plane() -> None:
+    """Three of five rows repeat others to the last digit, and count for nothing; a hair askew they
+    hold the linkage where it is."""
+    straight, tree = model(four_bar()), model(four_bar(closed=False))
+    q, u = straight.initial_state()
+    found = all_rows.accelerations_at_rest(straight, tree, q)
+    np.testing.assert_allclose(found, straight.accelerations(q, u)[:3], rtol=1e-12)
+    askew, tree = (model(four_bar(askew=1e-5, closed=closed)) for closed in (True, False))
+    held = all_rows.accelerations_at_rest(askew, tree, askew.initial_state()[0])
+    assert np.abs(held).max() < 1e-3 * np.abs(found).max()

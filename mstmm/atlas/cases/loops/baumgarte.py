@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -12,48 +11,24 @@ from ....runtime.model.model import Model
 from ...definition import Definition, Method
 from ...measures import simulated
 from ...scale import LOG
-from ...scenes import model
+from ...scenes import four_bar, model
 from ...variants import baumgarte
 
 STEP, STEPS = 5e-3, 300
 
 
 @cache
-def _four_bar() -> Model:
-    """A crank of 0.5 m at 6 rad/s, a coupler of 1.1 m, a rocker of 0.8 m, feet 1.2 m apart."""
-
-    def rod(name: str, length: float) -> dict[str, Any]:
-        across = length**3 / 12
-        return {
-            "name": name, "mass": length, "center_of_mass": [length / 2, 0, 0],
-            "inertia": [1e-3 * length, across, across], "ends": {"tip": [length, 0, 0]},
-        }  # fmt: skip
-
-    def pin(name: str, inboard: str, outboard: str, angle: float) -> dict[str, Any]:
-        return {
-            "name": name, "type": "pin", "inboard": inboard, "outboard": outboard,
-            "initial": {"q": [angle]},
-        }  # fmt: skip
-
-    foot = pin("foot", "ground", "crank", 1.0) | {"initial": {"q": [1.0], "u": [6.0]}, "hold": True}
-    return model({
-        "gravity": [0, -9.81, 0],
-        "body": [rod("crank", 0.5), rod("coupler", 1.1), rod("rocker", 0.8)],
-        "hinge": [
-            foot, pin("knee", "crank.tip", "coupler", -0.6),
-            pin("heel", "ground", "rocker", 1.7) | {"position": [1.2, 0, 0]},
-            pin("top", "coupler.tip", "rocker.tip", 0.0),
-        ],
-    })  # fmt: skip
+def _turning() -> Model:
+    return model(four_bar(speed=6.0))
 
 
 def _stabilised(rate: float) -> float:
-    return baumgarte.gap_of(_four_bar(), STEP, STEPS, rate / STEP)
+    return baumgarte.gap_of(_turning(), STEP, STEPS, rate / STEP)
 
 
 @cache
 def _projected() -> float:
-    linkage = _four_bar()
+    linkage = _turning()
     times = STEP * np.arange(STEPS + 1)
     run = simulated(linkage, times[-1], "rk4", STEP, output_times=times)
     calls, still = LoopCalls(linkage.looped, run.q[0]), np.zeros(linkage.nu)
