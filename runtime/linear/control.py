@@ -11,7 +11,7 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.extras import missing
 
-from .channels import Channel
+from .channels import Channel, some_names
 from .output.outputs import outputs_of, rows_of
 from .state_space import StateSpace
 
@@ -21,7 +21,8 @@ def output_matrices(
 ) -> tuple[tuple[str, ...], Array, Array]:
     """(names, C (outputs, states), D (outputs, pushes)) of y = C z + D v, where `b` (states,
     pushes) is what v adds to d/dt z."""
-    shown, speeds = outputs_of(linear, outputs), [*linear.free, *linear.drives]
+    named = None if outputs is None else some_names("outputs", outputs)
+    shown, speeds = outputs_of(linear, named), [*linear.free, *linear.drives]
     rows = rows_of(linear, shown, pushes)
     c, d = np.zeros((len(shown), len(linear.states))), rows.through
     for order, wide in rows.orders.items():

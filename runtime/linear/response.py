@@ -55,6 +55,8 @@ _CIRCLES, _POINTS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7), 8
 #: Parts of a response that may be unknown: good enough, and no answer any more.
 _GOOD, _LOST = 1e-11, 1e-3
 _ROUNDING = 2.0**-52
+#: Frequencies whose squares, times masses, are numbers.
+_FASTEST = 1e100
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,11 +212,11 @@ def _frequencies(omega: ArrayLike) -> Array:
         raise SceneError(f"omega = {omega!r}: expected angular frequencies in rad/s") from None
     if not found.size:
         raise SceneError("omega is empty: give angular frequencies in rad/s")
-    wrong = found[~(np.isfinite(found) & (found > 0))]
+    wrong = found[~((found > 0) & (found < _FASTEST))]
     if wrong.size:
         raise SceneError(
-            f"omega = {wrong[0]:.9g}: expected angular frequencies above 0 in rad/s (of Hz 2 pi "
-            "times as many)"
+            f"omega = {wrong[0]:.9g}: expected angular frequencies above 0 and below "
+            f"{_FASTEST:g} in rad/s (of Hz 2 pi times as many)"
         )
     return found
 

@@ -41,8 +41,8 @@ class Waterfall:
         """
         from .pictures.curves import waterfall
 
-        frequency = self.omega / (2 * np.pi)
-        return waterfall(frequency, self.points, self.values, self.parameter, path)
+        frequency, up = self.omega / (2 * np.pi), np.argsort(self.points)
+        return waterfall(frequency, self.points[up], self.values[up], self.parameter, path)
 
     def to_dataset(self) -> Any:
         """`xarray.Dataset`, complex numbers in two parts.  EnvironmentFailure without the extra."""

@@ -29,7 +29,8 @@ class Controllers:
         place = engine.packed.system.held.first
         for record, one in zip(self.records, scene.controller, strict=True):
             try:
-                measured = Measured(engine, [expression_of(scene, name) for name in one.inputs])
+                shown = [expression_of(scene, name) for name in one.inputs]
+                measured = Measured(engine, shown, [output.name for output in scene.output])
             except SceneError as error:
                 raise SceneError(f'controller "{one.name}": inputs: {error}') from None
             record.sample_time, record.memory, record.measure = (

@@ -15,6 +15,7 @@ from mstmm.ir import Port
 from mstmm.ir.graph import Graph, Node
 from mstmm.ir.tape import compile_tape
 from mstmm.scene import Output
+from mstmm.scene.rules.messages import near
 
 from ..engine.calls import Probe
 from ..engine.engine import Engine
@@ -33,11 +34,15 @@ _SHOWN = ("points", "loads", "efforts", "udot", "sums")
 class Measured:
     """`record` is `mstmm_measure *` of expressions; `numbers` are how many they are.
 
+    `others` are names that could have been given, too.
+
     Raises SceneError for a name of what a run cannot look at.
     """
 
-    def __init__(self, engine: Engine, expressions: Sequence[Expression]) -> None:
-        self._engine, self._graph = engine, Graph()
+    def __init__(
+        self, engine: Engine, expressions: Sequence[Expression], others: Sequence[str] = ()
+    ) -> None:
+        self._engine, self._graph, self._others = engine, Graph(), others
         self._references = References(engine.packed.described.skeleton)
         self._probes: dict[str, int] = {}
         self._read = set[str]()
@@ -81,12 +86,20 @@ class Measured:
         place = self._of_scene(name.text) or self._of_owner(name.text)
         if place is None:
             raise SceneError(
-                f'"{name.text}": this cannot be looked at within a run; of hinges there are '
-                "coordinates, speeds, accelerations, efforts, components of force and moment, of "
-                "bodies and ends components of position, velocity, acceleration and of their "
-                "turning (no quaternions), of the scene energies, power and momenta"
+                f'"{name.text}": this cannot be looked at within a run{self._meant(name.text)}; '
+                "of hinges there are coordinates, speeds, accelerations, efforts, components of "
+                "force and moment, of bodies and ends components of position, velocity, "
+                "acceleration and of their turning (no quaternions), of the scene energies, power "
+                "and momenta"
             )
         return self._element(place)
+
+    def _meant(self, text: str) -> str:
+        """The nearest of the names of coordinates, speeds and others, if one is near."""
+        hinges = self._engine.packed.layout.hinges.items()
+        known = [f"{owner}.{x}" for owner, one in hinges for x in (*one.q_names, *one.u_names)]
+        found = near(text, [*self._others, *known])
+        return found if "did you mean" in found else ""
 
     def _element(self, place: Place) -> Node:
         if place[0] in _SHOWN:

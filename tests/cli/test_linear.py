@@ -127,6 +127,10 @@ def test_netcdf_of_both(mstmm: Command) -> None:
         (["frf", "pendulum.toml", "--from", "5", "--to", "1"], "expected a range that rises"),
         (["frf", "pendulum.toml", "-q", "pivot.angel"], 'did you mean "pivot.angle"'),
         (["frf", "pendulum.toml", "--structural", "pivot"], "expected NAME=VALUE"),
+        (
+            ["frf", "pendulum.toml", "--structural", "pivot=0.1", "--structural", "pivot=0.2"],
+            "--structural pivot=0.2: pivot is set to 0.1 already",
+        ),
         (["frf", "pendulum.toml", "--exact", "rod"], '"rod": expected a flexible beam'),
         (["frf", "pendulum.toml", "--exact", "all"], "no flexible beam"),
         (["frf", "pendulum.toml", "--modal", "-1"], "parts of the critical damping"),

@@ -55,3 +55,5 @@ def test_what_makes_no_sense() -> None:
         linear.to_control()
     with pytest.raises(SceneError, match=r"pin\.angel.*did you mean"):
         beam().linearize(inputs=["pin.effort"]).to_control(["pin.angel"])
+    with pytest.raises(SceneError, match="outputs is empty"):
+        beam().linearize(inputs=["pin.effort"]).to_control([])

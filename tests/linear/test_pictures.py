@@ -59,6 +59,9 @@ def test_a_waterfall_is_a_row_of_answers(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.values, expected, rtol=1e-9)
     with pytest.raises(SceneError, match=r"output = \['pivot.angle'\]: expected one name"):
         model.waterfall("pivot.law.stiffness[0]", stiffness, OMEGA, names[0], [names[1]])  # type: ignore[arg-type]
+    mixed = model.waterfall("pivot.law.stiffness[0]", [4.0, 9.0, 1.0], OMEGA, *names)
+    shown = [one.plot().axes[0].collections[0].get_array() for one in (found, mixed)]
+    np.testing.assert_array_equal(*shown)  # a picture goes up, whatever the order of the rows
     rows = list(csv.reader(found.save(tmp_path / "waterfall.csv").read_text().splitlines()))
     assert rows[0][:2] == ["pivot.law.stiffness[0]", "omega [rad/s]"] and len(rows) == 1 + 3 * 60
     numbers = np.array(rows[1:], float).reshape(3, 60, 5)

@@ -212,6 +212,7 @@ def test_a_resonance_without_damping_is_named() -> None:
     [
         (([],), "omega is empty"),
         (([1.0, 0.0],), "omega = 0: expected angular frequencies above 0"),
+        (([1e154],), r"omega = 1e\+154: expected angular frequencies above 0 and below 1e\+100"),
         (([np.nan],), "omega = nan"),
         ((["fast"],), "expected angular frequencies"),
         (([1.0], ["s0.efort"]), '"s0.efort": expected an effort'),

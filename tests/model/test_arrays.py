@@ -158,3 +158,13 @@ def test_numbers_of_other_libraries_are_numbers(model: Any) -> None:
 def test_a_number_beyond_all_floats_is_refused(model: Any, name: str) -> None:
     with pytest.raises(mstmm.SceneError, match=f"{name} is beyond 1.8e308: expected"):
         model.simulate(**{"t_end": 0.1, name: 10**5000})
+
+
+@pytest.mark.filterwarnings("error")
+def test_numbers_whose_squares_are_none_raise_no_warning(model: mstmm.Model) -> None:
+    """They are finite; what becomes of them the run says."""
+    far = np.full((3, model.nq), 1e300)
+    ended = model.simulate_batch((far, np.zeros((3, model.nu))), t_end=0.1)
+    assert ended.q.shape[0] == 3
+    with pytest.raises(mstmm.SceneError, match=r"initial u\[0, 0\] = inf"):
+        model.simulate_batch((far, np.full((3, model.nu), np.inf)), t_end=0.1)

@@ -3,6 +3,7 @@ linear, and what becomes of the answer."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -107,23 +108,23 @@ def _changed(scene: str, changes: list[str]) -> Model:
     """The scene compiled, with other numbers."""
     import mstmm
 
-    numbers: dict[str, float] = {}
-    for text in changes:
-        name, number = assigned("--set", text, "rod1.mass=2")
-        if name in numbers:
-            raise MstmmError(
-                f"--set {text}: {name} is set to {numbers[name]:g} already; set each number once"
-            )
-        numbers[name] = number
+    numbers = assigned("--set", changes, "rod1.mass=2")
     model = compiled(scene, mstmm.load_scene(scene), engine="looped")
     return model.with_parameters(numbers) if numbers else model
 
 
-def assigned(option: str, text: str, example: str) -> tuple[str, float]:
-    """The name and the number of NAME=VALUE."""
-    name, _, value = text.partition("=")
-    try:
-        return name.strip(), float(value)
-    except ValueError:
-        message = f'{option} {text}: expected NAME=VALUE, such as "{example}"'
-        raise MstmmError(message) from None
+def assigned(option: str, texts: Sequence[str], example: str) -> dict[str, float]:
+    """The numbers of each NAME=VALUE by their names, each of which may come once."""
+    found: dict[str, float] = {}
+    for text in texts:
+        name, _, value = (part.strip() for part in text.partition("="))
+        if name in found:
+            raise MstmmError(
+                f"{option} {text}: {name} is set to {found[name]:g} already; set each number once"
+            )
+        try:
+            found[name] = float(value)
+        except ValueError:
+            message = f'{option} {text}: expected NAME=VALUE, such as "{example}"'
+            raise MstmmError(message) from None
+    return found

@@ -192,7 +192,7 @@ def _losses(texts: list[str]) -> Losses:
             return float(texts[0])
         except ValueError:
             pass
-    return dict(assigned("--structural", text, "boom=0.02") for text in texts) or 0.0
+    return assigned("--structural", texts, "boom=0.02") or 0.0
 
 
 def _tell_of(linear: Linear) -> None:
