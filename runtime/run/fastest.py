@@ -20,7 +20,9 @@ from mstmm.scene import Scene
 
 from ..engine.engine import Engine
 from ..engine.motions import motions
-from ..engine.tangent import Tangent, tangent_of
+from ..engine.tangent import Tangent
+from ..pack.loops.refusal import refuse_bending
+from ..pack.qr import refuse_steps
 
 #: Power iterations; the first one is in the choice of their start.
 _ITERATIONS = 4
@@ -63,10 +65,11 @@ def fastest_at_start(engine: Engine, t: float, q: Array, u: Array) -> float:
     """|lambda| (1/s) at a state (nq,), (nu,) with nothing released: of few components by all
     motions, which costs less than to look for one.
 
-    Raises SceneError for scenes without tangent, NumericalFailure where the state cannot be
-    evaluated.
+    Raises SceneError for scenes that implicit steps cannot follow, NumericalFailure where the state
+    cannot be evaluated.
     """
-    tangent_of(engine)
+    refuse_bending(engine.packed, "an implicit step")
+    refuse_steps(engine.packed)
     memory, y = engine.start_memory(), np.concatenate([q, u])
     if len(y) > _FEW:
         return Fastest(engine, memory).rate(t, q, u)
