@@ -1438,6 +1438,15 @@ static int mstmm_at_answered(mstmm_state *state, int index)
                 .e = block + MSTMM_BLOCK_E);
         }
     }
+    mstmm_generic_answer(speeds,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
+        .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN),
+        .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET),
+        .delta_I = parent + MSTMM_BLOCK_DELTA,
+        .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_RATES),
+        .delta = block + MSTMM_BLOCK_DELTA);
     if ((state->observed || state->balance)) {
         for (int c = 0; c < looped->n_pending; c++) {
             const mstmm_pending *pending = &looped->pending[c];
@@ -1449,15 +1458,6 @@ static int mstmm_at_answered(mstmm_state *state, int index)
             }
         }
     }
-    mstmm_generic_answer(speeds,
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
-        .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
-        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN),
-        .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET),
-        .delta_I = parent + MSTMM_BLOCK_DELTA,
-        .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_RATES),
-        .delta = block + MSTMM_BLOCK_DELTA);
     if (!state->refined) {
         for (int j = 0, k = 0; j < nu; j++)
             (state->udot + body->u)[j] = k < speeds && columns[k] == j ? (mstmm_of_speeds(block, nu, MSTMM_SPEED_RATES))[k++]

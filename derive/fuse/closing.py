@@ -16,6 +16,7 @@ from ..schedule.motion import HINGE_MOTION
 from ..schedule.steps import Run, Sweep
 from ..schedule.sweeps import CORRECTION
 from .replay import Replay
+from .rows import row_subject
 from .state import FusionState
 
 #: Coordinates follow a change along the speeds as they follow speeds.
@@ -33,12 +34,15 @@ def slips(state: FusionState, inputs: list[Port]) -> KernelIR:
 def gaps(state: FusionState, inputs: list[Port]) -> KernelIR:
     """Kernel "gaps": the change of the coordinates, dq (nq), that closes gaps to first order.
 
-    By closure and direction (6 each) follow the gap of what is met and that of what repeats others
-    (m, rad); of each the other number is zero.
+    By closure and direction (6 each), and of couplings the first of 6 each, follow the gap of what
+    is met and that of what repeats others (m, rad); of each the other number is zero.
     """
     replay, closures = Replay(state, level="gaping"), state.structure.closures
     replay.sweep(CORRECTION)
     told = [pair for one in closures for pair in _told(replay, one)]
+    for one, lack in replay.lacks:
+        replay.enter(row_subject(state.structure.rows, one.row))
+        told += [_met_or_apart(replay, one.row, lack), *[(state.zero, state.zero)] * 5]
     state.u = replay.gathered("udot")
     moved = Replay(state)
     moved.sweep(_MOVED)
@@ -53,7 +57,7 @@ def gaps(state: FusionState, inputs: list[Port]) -> KernelIR:
 
 def _told(replay: Replay, closure: ClosureStructure) -> list[tuple[Node, Node]]:
     """(gap of what is met, gap of what repeats others) of the six directions of a closure."""
-    graph, zero, found = replay.state.graph, replay.state.zero, list[tuple[Node, Node]]()
+    zero, found = replay.state.zero, list[tuple[Node, Node]]()
     subject = replay.body_subject(closure.frame)
     replay.enter(subject)
     own = replay.body.nu
@@ -63,11 +67,16 @@ def _told(replay: Replay, closure: ClosureStructure) -> list[tuple[Node, Node]]:
             found.append((zero, zero))
             continue
         replay.enter(replace(subject, row=row))
-        inverse = replay.get("row.inverse", 1)[0] if row >= 0 else zero
-        if inverse.value is not None:
-            met = row < 0 and direction < own
-            found.append((known, zero) if met else (zero, known))
-        else:
-            counts = graph.call("lt", zero, inverse)
-            found.append((graph.select(counts, known, zero), graph.select(counts, zero, known)))
+        met = row < 0 and direction < own
+        found.append((known, zero) if met else _met_or_apart(replay, row, known))
     return found
+
+
+def _met_or_apart(replay: Replay, row: int, lack: Node) -> tuple[Node, Node]:
+    """What the row at hand lacks: in the first place where it counts, else in the second."""
+    graph, zero = replay.state.graph, replay.state.zero
+    inverse = replay.get("row.inverse", 1)[0] if row >= 0 else zero
+    if inverse.value is not None:
+        return zero, lack
+    counts = graph.call("lt", zero, inverse)
+    return graph.select(counts, lack, zero), graph.select(counts, zero, lack)

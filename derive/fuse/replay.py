@@ -11,7 +11,7 @@ from mstmm.errors import ElementError
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.graph import Node
 from mstmm.ir.inline import Nodes
-from mstmm.ir.structure import BodyStructure, ExpressionStructure, Key
+from mstmm.ir.structure import BodyStructure, CouplingStructure, ExpressionStructure, Key
 
 from ..schedule.motion import POSES
 from ..schedule.steps import (
@@ -36,7 +36,7 @@ from ..schedule.steps import (
 )
 from ..schedule.words import SLOTS
 from .known import along_a_screw, screw_axis, unit_row
-from .rows import RowSlots, closure_at, row_subject
+from .rows import RowSlots, closure_at, coupled, row_subject
 from .slots import GROUND, Subject
 from .state import FusionState
 
@@ -59,6 +59,8 @@ class Replay(RowSlots):
         #: Conditions of guards, which code without failure codes asks for as a whole.
         self.conditions: list[Node] = []
         self._values: Nodes = []
+        #: What couplings lack.
+        self.lacks: list[tuple[CouplingStructure, Node]] = []
         self._posed = self._bodies_with_poses()
 
     # --- passes ---------------------------------------------------------------------------------
@@ -90,6 +92,8 @@ class Replay(RowSlots):
             ]
         if whole.subject == "row":
             return [row_subject(s.rows, i) for i, row in enumerate(s.rows) if row.body == GROUND]
+        if whole.subject == "coupling":
+            return [Subject({"body": GROUND}, row=one.row) for one in s.couplings]
         if whole.subject == "law":
             return [Subject({"body": x.body}, law=x, index=i) for i, x in enumerate(s.laws)]
         if whole.subject == "load":
@@ -153,9 +157,8 @@ class Replay(RowSlots):
         s = self.state.structure
         known = {
             "linked": False, "product": False, "qr": False, "refined": False, "residual": False,
-            "couplings": False,
-            "looped": bool(s.closures), "balance": not self.level, "efforts": True,
-            "inverse": self.inverse,
+            "couplings": bool(s.couplings), "looped": s.closes, "balance": not self.level,
+            "efforts": True, "inverse": self.inverse,
             "driving": not self.level,
             "laws": bool(s.laws), "driven": s.drives is not None,
             "valued": s.values is not None, "posed": bool(self._posed),
@@ -171,6 +174,8 @@ class Replay(RowSlots):
             return self.level == trait
         if trait == "coordinate":
             return self.at.law is not None and not self.at.law.axes
+        if trait == "unmet":
+            return self.at.row < 0
         if trait == "effort":
             return self.at.force is not None and self.at.force.effort is not None
         return _TRAITS[trait](self, self.body)
@@ -209,7 +214,8 @@ class Replay(RowSlots):
         self.at, self.local = at, local
 
     def _rows_begun(self) -> None:
-        """Slots of rows begin with what `RowSlots` gives."""
+        """Slots of rows begin with what `RowSlots` gives, and those of couplings with numbers."""
+        self.lacks = list(coupled(self))
 
     def _struck(self) -> None:
         """Nothing: events strike in the looped engine alone."""
@@ -220,7 +226,8 @@ class Replay(RowSlots):
     def _call(self, step: Call) -> None:
         kernel, ports = self._kernel(step.kernel), dict(step.ports)
         n = self.modal.n if kernel.size_symbol else 0
-        given = {port.name: self.get(ports[port.name], port.length(n)) for port in kernel.inputs}
+        sizes = {port.name: port.length(n) for port in kernel.inputs}
+        given = {name: self.get(ports[name], size)[:size] for name, size in sizes.items()}
         found = self.state.inline.run(kernel, given, self._guard(step.fails), n=n)
         for port in kernel.outputs:
             if port.name in ports:
@@ -420,6 +427,7 @@ _TRAITS: dict[str, Callable[[Replay, BodyStructure], bool]] = {
     "cut": lambda replay, body: replay.closure() is not None,
     "aside": lambda replay, body: body.idle or replay.closure() is not None,
     "refined": lambda replay, body: False,
+    "coupled": lambda replay, body: replay.is_coupled(),
     "hinged": lambda replay, body: replay.closed_by("hinge"),
     "distance": lambda replay, body: replay.closed_by("distance"),
     "plane": lambda replay, body: replay.closed_by("plane"),

@@ -8,8 +8,15 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator
 from dataclasses import replace
 
+from mstmm.ir.graph import Node
 from mstmm.ir.inline import Nodes
-from mstmm.ir.structure import ClosureStructure, RowStructure, Structure
+from mstmm.ir.structure import (
+    COUPLING,
+    ClosureStructure,
+    CouplingStructure,
+    RowStructure,
+    Structure,
+)
 
 from .slots import Slots, Subject
 
@@ -22,10 +29,14 @@ _PAIRS = {
 _COLUMNS = {
     "row.K": ("meeting", "row"), "other.K": ("meeting", "other"), "pending.K": ("body", "row"),
     "pending.onward": ("parent", "row"), "side.inner": ("parent", "row"),
-    "side.outer": ("outboard", "row"),
+    "side.outer": ("outboard", "row"), "own.inner": ("parent", "row"),
+    "own.outer": ("outboard", "row"),
 }  # fmt: skip
 #: Numbers of one row, by the owner that tells which.
-_OF_ROW = {"row": "row", "line": "row", "pending": "row", "other": "other", "before": "other"}
+_OF_ROW = {
+    "row": "row", "line": "row", "pending": "row", "own": "row", "coupling": "row",
+    "other": "other", "before": "other",
+}  # fmt: skip
 
 
 class RowSlots(Slots):
@@ -52,6 +63,13 @@ class RowSlots(Slots):
             return True
         return self.get("row.pivot", 1)[0].value == 0
 
+    def is_coupled(self) -> bool:
+        """Whether the row at hand is a coupling of the speeds of the hinge at hand."""
+        return any(
+            one.row == self.at.row and self.index in dict(one.columns)
+            for one in self.state.structure.couplings
+        )
+
     def met(self, of: str) -> Iterator[Subject]:
         """The subjects of `Each`."""
         at, rows = self.at, self.state.structure.rows
@@ -66,6 +84,10 @@ class RowSlots(Slots):
             yield from (replace(at, other=number) for number in self.body.pending[:up_to])
         elif of == "others":
             yield from (replace(at, other=number) for number in self.row().others)
+        elif of == "own":
+            named = (one.row for one in self.state.structure.couplings for body, _ in one.columns
+                     if body == self.index)  # fmt: skip
+            yield from (replace(at, row=number) for number in named if number >= 0)
         elif of == "seconds":
             up_to = self.row().others.index(at.other) + 1
             yield from (replace(at, second=number) for number in self.row().others[:up_to])
@@ -85,7 +107,7 @@ class RowSlots(Slots):
             return "K", at.roles[role], getattr(at, whose)
         owner, _, name = slot.partition(".")
         if owner in _OF_ROW:
-            body = self.index if name in ("y", "z") else None
+            body = self.index if name in ("y", "z", "tau") else None
             return name, body, getattr(at, _OF_ROW[owner])
         return super()._key(slot)
 
@@ -124,3 +146,25 @@ def row_subject(rows: tuple[RowStructure, ...], number: int) -> Subject:
     """A row, on the body where it closes."""
     body = rows[number].body
     return Subject({"body": body, "meeting": body}, row=number)
+
+
+def coupled(slots: RowSlots) -> Iterator[tuple[CouplingStructure, Node]]:
+    """Couplings, with what each lacks at the level at hand; their numbers are put where rows read
+    them."""
+    state, level = slots.state, {"gaping": "gap", "slipping": "slip"}.get(slots.level, "drift")
+    if state.structure.coupled is None:
+        return
+    numbers = state.expression(state.structure.coupled)
+    for one in state.structure.couplings:
+        found = dict(zip(COUPLING, numbers[one.first :], strict=False))
+        lack = found[level]
+        if level == "gap":
+            lack = state.zero if one.of_speeds else lack - sum(state.entries(one.kept), state.zero)
+        if one.row >= 0:
+            for body, at in one.columns:
+                slots.enter(Subject({"body": body}, row=one.row))
+                nu = state.structure.bodies[body].nu
+                slots.fill("pending.tau", numbers[at : at + nu])
+            slots.fill("row.known", [lack])
+            slots.fill("coupling.still", [found["still"]])
+        yield one, lack

@@ -56,14 +56,14 @@ def fuse(structure: Structure, kernels: Kernels, numbers: Sequence[float] | None
     power: dict[str, object] = {port.name: replay.get(f"sums.{port.name}", 1) for port in sums}
     found = [state.graph.kernel("accelerations", inputs_of(s), outputs, values, as_made=True)]
     flexible = any(body.modal is not None for body in s.bodies)
-    if s.laws or s.driven or s.loads or s.forces or flexible:
+    if s.laws or s.driven or s.loads or s.forces or s.couplings or flexible:
         found.append(
             state.graph.kernel(
                 "accelerations_power", inputs_of(s), [*outputs, *sums], values | power,
                 as_made=True,
             )
         )  # fmt: skip
-    for close in (gaps, slips) if s.closures else ():
+    for close in (gaps, slips) if s.closes else ():
         found.append(close(FusionState(s, kernels, numbers, state.failures), inputs_of(s)))
     return Fused({kernel.name: balance(kernel) for kernel in found}, tuple(state.failures))
 

@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from mstmm.ir import structure
+
 from ..schedule.slope import D
 from ..schedule.words import ROLES, SLOTS
 
@@ -67,8 +69,7 @@ CLOSURE = {
     "closure.W": 36, "closure.J_A": 36, "closure.J_B": 36, "closure.l": 6, "closure.R_C": 9,
     "closure.d": 3, "closure.lever": 3, "closure.gap": 6, "closure.slip": 6,
 }  # fmt: skip
-#: Numbers of a coupling, in their order; behind them stands -C of each of its hinges.
-COUPLING = {"coupling.drift": 1, "coupling.gap": 1, "coupling.slip": 1, "coupling.still": 1}
+COUPLING = {f"coupling.{name}": 1 for name in structure.COUPLING}
 #: Numbers of a row: slot -> how many.
 ROW = {"row.K": 6, "row.known": 1, "row.pivot": 1, "row.inverse": 1, "row.x": 1,
        "row.told": 1}  # fmt: skip

@@ -8,10 +8,16 @@ See docs/theory/loops.md.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from .steps import Add, Each, EachSpeed, Pass, Step, call, only
 
 #: What the accelerations of a hinge in the tree tell the rows that name it.
 TOLD = call("generic{nu}.answered", when="coupled", y="body.s", z="pending.tau", l="pending.known")
+#: The same of those that were chosen for the bias motion.
+TOLD_OF_BIAS = replace(
+    TOLD, ports=(("y", "body.chosen"), ("z", "pending.tau"), ("l", "pending.known"))
+)
 #: The same of a hinge that closes a loop: those along its rows, and those that are given.
 _TOLD_BY_OWN = (
     call("generic{nu}.answered", y="closure.l", z="own.tau", l="own.known"),
@@ -20,7 +26,6 @@ _TOLD_BY_OWN = (
 #: Rows that name a hinge's own speeds begin on both sides of it.
 OF_OWN = Each(
     of="own",
-    when="!staged",
     steps=(
         EachSpeed(
             steps=(
@@ -31,6 +36,12 @@ OF_OWN = Each(
         *_TOLD_BY_OWN,
     ),
 )  # fmt: skip
+#: What else they are told where the bias motion chooses accelerations.
+OF_OWN_BIAS = Each(
+    of="own",
+    when="staged !corrected",
+    steps=(call("generic{nu}.answered", y="body.chosen", z="own.tau", l="own.known"),),
+)
 #: The same where multipliers are known.
 OWN_TOLD = Each(of="own", steps=_TOLD_BY_OWN)
 

@@ -9,7 +9,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from .couplings import OF_OWN, OWN_TOLD, TOLD, efforts_of, efforts_of_own
+from .couplings import (
+    OF_OWN,
+    OF_OWN_BIAS,
+    OWN_TOLD,
+    TOLD,
+    TOLD_OF_BIAS,
+    efforts_of,
+    efforts_of_own,
+)
 from .flexible import ABSORBED, DISPLACED, MODAL_CONDENSE
 from .motion import HINGE_MOTION
 from .riccati import (
@@ -95,7 +103,7 @@ CLOSURES = Pass(
         *_CONSTRAINED,
         _known("closure.gap", "gaping"),
         _known("closure.slip", "slipping"),
-        efforts_of_own("own.told", "!staged refined"),
+        efforts_of_own("own.told", "refined"),
         *only("!corrected", _DRIFT, *_BENT, _known("local.drift", "")),
         _EFFORTS,
         Each(
@@ -117,6 +125,7 @@ CLOSURES = Pass(
             ),
         ),
         OF_OWN,
+        OF_OWN_BIAS,
     ),
     skip="!cut",
 )  # fmt: skip
@@ -309,8 +318,17 @@ _BY_STAGES = only(
         of="pending",
         steps=(
             *reached("pending.K"),
-            _felt("local.e", "zero", "pending.y"),
-            *eliminated("zero", "pending.z"),
+            *only(
+                "!coupled", _felt("local.e", "zero", "pending.y"), *eliminated("zero", "pending.z")
+            ),
+            *only(
+                "coupled",
+                Pick(to="local.tau", source="pending.tau"),
+                _felt("local.e", "local.tau", "pending.y"),
+                *eliminated("local.tau", "pending.z"),
+                replace(TOLD, when=""),
+                replace(TOLD_OF_BIAS, when="!corrected"),
+            ),
             *ONWARD,
             Add(to="pending.onward", source="local.e", when="hung"),
             *_COUPLED,
@@ -326,7 +344,7 @@ CARRIED = Pass(
         Each(of="closings", steps=(Do(whole=ROW_CLOSED),)),
         *only("outward", ABSORBED),
         *FREE,
-        efforts_of("pending.told", "!staged refined"),
+        efforts_of("pending.told", "refined"),
         FREE_EFFORTS,
         *_ALONE,
         *_BY_STAGES,
@@ -352,11 +370,11 @@ ANSWERED = Pass(
         *only(
             "!staged",
             _pulled("pending.y", "hinge.g"),
-            efforts_of("pending.x", "kept"),
             call("generic{free}.answer", **BODY, **_ACROSS, F="hinge.F", y="hinge.g",
                  delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
         ),
         *only("staged", _pulled("pending.z", "hinge.z"), *RECOVERED),
+        efforts_of("pending.x", "kept"),
         Spread(to="body.udot", free="hinge.rates", imposed="body.s", when="!refined"),
         *only(
             "refined",
@@ -389,7 +407,7 @@ CLOSURES_ANSWERED = Pass(
         Each(of="rows", when="refined", steps=(Add(to="line.x", source="line.told"),)),
         *only(
             "kept",
-            efforts_of_own("own.x", "!staged"),
+            efforts_of_own("own.x", ""),
             Copy(to="body.e"),
             Copy(to="body.delta", when="staged"),  # what has no mass asks for none
             EachSpeed(

@@ -167,7 +167,7 @@ class Fusion:
         return self._of_small("linear", pays)
 
     def _of_small(self, part: str, pays: bool) -> FusedLibrary | None:
-        if self.obstacle or not 0 < self.structure.nu <= _MOST_UNKNOWNS or self.structure.closures:
+        if self.obstacle or not 0 < self.structure.nu <= _MOST_UNKNOWNS or self.structure.closes:
             return None
         try:
             return self._get(part, build=self._insisted or pays)
@@ -250,7 +250,7 @@ class Fusion:
     def solution(self, build: bool) -> ColumnsLibrary | None:
         """The library that solves with the scene's mass matrix, which is that of a tree; errors as
         for `columns`."""
-        if self.obstacle or self.structure.closures:
+        if self.obstacle or self.structure.closes:
             return None
 
         def kernels() -> Sequence[KernelIR]:
@@ -328,13 +328,9 @@ def _obstacle(packed: Packed, most: int) -> str:
         return "the product of classical matrices is looped"
     if packed.qr:
         return "the sweep as least squares is looped"
-    if closed := _looped_closure(packed):
-        return closed
     if packed.model.refines:
         return "heavy bodies behind light ones cost digits, which refinement mends: it is looped"
-    if packed.system.couplings:
-        return "couplings of coordinates are looped"
-    if packed.system.closures and packed.flexible:
+    if packed.system.closes and packed.flexible:
         return "loops through flexible bodies are looped"
     hinges = (packed.elements[body.hinge] for body in packed.system.distinct)
     if any(hinge.tape is not None and hinge.spec is None for hinge in hinges):
@@ -349,16 +345,6 @@ def _too_wide(structure: Structure, most: int) -> str:
     if size <= most:
         return ""
     return f"with its closed loops it is like {size} bodies; fused code is for {most} at most"
-
-
-def _looped_closure(packed: Packed) -> str:
-    """What closes a scene that code for one scene cannot: empty if it can."""
-    loops, of_hinges = packed.written.loops, packed.system.closures
-    if loops is not None and loops.count != sum(len(one.directions) for one in of_hinges):
-        return "rows that belong to no hinge are looped"
-    if of_hinges and packed.flexible:
-        return "closed loops of flexible bodies are looped"
-    return ""
 
 
 def printers() -> list[Path]:

@@ -162,11 +162,29 @@ class RowStructure:
     of_speeds: bool = False
 
 
+#: Numbers of a coupling, in their order; behind them stands -C of each of its hinges.
+COUPLING = ("drift", "gap", "slip", "still")
+
+
+@dataclass(frozen=True)
+class CouplingStructure:
+    """A coupling of coordinates: its row (-1: others do what it asks), where its numbers begin
+    among those of `Structure.coupled`, the value that it keeps, and (body, where -C begins) of
+    every hinge that it names."""
+
+    row: int
+    first: int
+    of_speeds: bool
+    kept: Entries
+    columns: tuple[tuple[int, int], ...]
+
+
 @dataclass(frozen=True)
 class Structure:
     """A scene without its numbers.  `values` gives efforts and load components, `drives` each
     drive's value, rate and acceleration (three in a row; `driven` says whose: body, coordinate).
-    `closures` stand in the order of their frames, `rows` in that in which they are closed."""
+    `closures` stand in the order of their frames, `rows` in that in which they are closed;
+    `coupled` gives the numbers of all `couplings`."""
 
     nq: int
     nu: int
@@ -182,9 +200,16 @@ class Structure:
     driven: tuple[tuple[int, int], ...] = ()
     closures: tuple[ClosureStructure, ...] = ()
     rows: tuple[RowStructure, ...] = ()
+    couplings: tuple[CouplingStructure, ...] = ()
+    coupled: ExpressionStructure | None = None
     elements: Mapping[Key, str] = field(default_factory=dict)  #: hashes of users' elements
     #: (place among the numbers of inputs, place in p) of those that are read: they change with time
     inputs: tuple[tuple[int, int], ...] = field(default=(), repr=False, compare=False)
+
+    @property
+    def closes(self) -> bool:
+        """Whether anything closes but the tree."""
+        return bool(self.closures or self.couplings)
 
     def identity(self) -> str:
         """SHA-256 over everything that decides the fused code, kernels of mstmm itself aside."""

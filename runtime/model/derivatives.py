@@ -23,7 +23,7 @@ from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.live import LiveInputs
 from ..engine.tangents import Tangents
-from ..pack.loops.refusal import refuse_bending, refuse_couplings
+from ..pack.loops.refusal import refuse_bending
 from ..pack.slopes import slopes
 from ..pack.structure import structure_of
 
@@ -74,7 +74,6 @@ class Differentiation:
         self._model = model
         self.names = tuple(names)
         known = model.known or {}
-        refuse_couplings(model.packed, "exact derivatives")
         refuse_bending(model.packed, "exact derivatives")
         _refuse(model)
         if names:

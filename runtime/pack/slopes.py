@@ -76,7 +76,7 @@ def _with_rows(system: System, judged: System) -> System:
     """With the rows of closed loops that another one has."""
     both = zip(system.closures, judged.closures, strict=True)
     closures = tuple(replace(one, directions=kept.directions) for one, kept in both)
-    return replace(system, closures=closures)
+    return replace(system, closures=closures, couplings=judged.couplings)
 
 
 def seeded(scene: Scene, known: Known, names: Sequence[str], seed: Seed) -> tuple[System, Frames]:

@@ -45,18 +45,19 @@ def structure_and_numbers(
     sorting, elements = _Sorting(system, bake), Elements(known)
     gravity = sorting.entries(system.gravity)
     bodies = tuple(body for run in system.bodies for body in sorting.bodies(run))
-    bodies, closures, rows = with_loops(bodies, system, sorting.entries, floors)
+    bodies, closures, rows, couplings = with_loops(bodies, system, sorting.entries, floors)
     laws = tuple(law for run in system.laws for law in sorting.laws(run))
     loads = tuple(map(sorting.load, system.loads))
     forces = tuple(map(sorting.force, system.forces))
     used = {key for body in bodies for key in (body.hinge, body.body)}
     used |= {force.element for force in forces}
     values, prescribed = sorting.expression(system.values), sorting.expression(system.drives)
+    coupled = sorting.expression(system.coupled)
     read = tuple(sorted(sorting.inputs.items()))
     structure = Structure(
         system.nq, system.nu, len(sorting.numbers), system.held.first, gravity, bodies, laws, loads,
-        forces, values, prescribed, system.driven, closures, rows,
-        {key: elements[key].hash for key in sorted(used)}, read,
+        forces, values, prescribed, system.driven, closures, rows, couplings,
+        coupled, {key: elements[key].hash for key in sorted(used)}, read,
     )  # fmt: skip
     return structure, sorting.numbers
 

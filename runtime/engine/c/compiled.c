@@ -114,13 +114,12 @@ typedef struct {
     double t, *y;
 } compiled_state;
 
-/* Where an open loop is named: the frame of closure number k. */
+/* Where an open loop is named: the frame of closure number k; behind all bodies the coupling. */
 static int frame_of(const mstmm_model *model, int k)
 {
-    int i = 0;
-    for (; i < model->n_bodies; i++)
-        if (model->looped[i].closure && k-- == 0) break;
-    return i;
+    for (int i = 0; i < model->n_bodies; i++)
+        if (model->looped[i].closure && k-- == 0) return i;
+    return model->n_bodies + k;
 }
 
 static real largest(const mstmm_scene_run *run, const real *gaps, int *where)

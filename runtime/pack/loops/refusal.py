@@ -28,15 +28,6 @@ def refuse(packed: Packed, what: str, instead: str) -> None:
     )
 
 
-def refuse_couplings(packed: Packed, what: str) -> None:
-    """SceneError where coordinates are coupled, which `what` cannot follow."""
-    for one in packed.system.couplings[:1]:
-        raise SceneError(
-            f'scene: loop of coupling "{one.name}" is closed, and {what} cannot follow that yet; '
-            f"{INSTEAD}"
-        )
-
-
 def refuse_bending(packed: Packed, what: str) -> None:
     """SceneError where loops are closed in a scene with flexible bodies, which `what` cannot follow
     yet."""
@@ -47,12 +38,13 @@ def refuse_bending(packed: Packed, what: str) -> None:
 def refuse_beyond_hinges(packed: Packed, what: str) -> None:
     """SceneError where more than hinges of rigid bodies closes loops, which `what` cannot follow
     yet."""
-    refuse_couplings(packed, what)
     refuse_bending(packed, what)
-    for one in packed.described.constraint[:1]:
+    scene = packed.described
+    names = [f'coupling "{one.name}"' for one in scene.coupling]
+    names += [f'constraint "{one.name}"' for one in scene.constraint]
+    if names:
         raise SceneError(
-            f'scene: constraint "{one.name}" closes a loop, and {what} cannot follow that yet; '
-            f"{INSTEAD}"
+            f"scene: {names[0]} closes a loop, and {what} cannot follow that yet; {INSTEAD}"
         )
 
 

@@ -13,6 +13,8 @@ from functools import cached_property
 from mstmm.graph.mechanism import Edge, Mechanism, Rows
 from mstmm.graph.plan import Closing, Plan, closed_along
 
+from ..system import System
+
 
 @dataclass(frozen=True, slots=True)
 class Row:
@@ -57,3 +59,15 @@ def planned(parents: Sequence[int], groups: Sequence[Rows]) -> RowPlan:
     hinges = tuple(Edge(parent, body, 0) for body, parent in enumerate(parents))
     mechanism = Mechanism(len(parents), hinges, tuple(groups))
     return RowPlan(closed_along(mechanism, tuple(range(len(parents)))))
+
+
+def row_groups(parents: Sequence[int], system: System) -> list[Rows]:
+    """The groups of rows of a system: of its closures, then of the couplings that have one."""
+    groups = [
+        Rows((parents[one.frame], one.outboard), len(one.directions)) for one in system.closures
+    ]
+    ends = (
+        tuple(end for hinge in one.hinges for end in (hinge.inboard, hinge.outboard))
+        for one in system.couplings if not one.repeats
+    )  # fmt: skip
+    return groups + [Rows(pair, 1) for pair in ends]

@@ -6,11 +6,17 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from mstmm.graph.mechanism import Rows
-from mstmm.ir.structure import BodyStructure, ClosureStructure, Entries, RowStructure
+from mstmm.ir.structure import (
+    COUPLING,
+    BodyStructure,
+    ClosureStructure,
+    CouplingStructure,
+    Entries,
+    RowStructure,
+)
 
-from ..system import ClosureNumbers, System
-from .rows import RowPlan, planned
+from ..system import ClosureNumbers, CouplingNumbers, System
+from .rows import RowPlan, planned, row_groups
 
 
 class Sort(Protocol):
@@ -21,27 +27,31 @@ class Sort(Protocol):
 
 def with_loops(
     bodies: Sequence[BodyStructure], system: System, sort: Sort, floors: Sequence[float]
-) -> tuple[tuple[BodyStructure, ...], tuple[ClosureStructure, ...], tuple[RowStructure, ...]]:
+) -> tuple[
+    tuple[BodyStructure, ...], tuple[ClosureStructure, ...], tuple[RowStructure, ...],
+    tuple[CouplingStructure, ...],
+]:  # fmt: skip
     """The bodies with the rows that are open across their hinges, closures in the order of their
-    frames, and rows.  `floors` go by row; without them a pivot counts that is more than zero."""
-    plan = planned(
-        [body.parent for body in bodies],
-        [
-            Rows((bodies[one.frame].parent, one.outboard), len(one.directions))
-            for one in system.closures
-        ],
-    )
+    frames, rows, and couplings.  `floors` go by row; without them a pivot counts that is more than
+    zero."""
+    groups = row_groups([body.parent for body in bodies], system)
+    plan = planned([body.parent for body in bodies], groups)
     soft: dict[int, Entries] = {}
     closures = [
         _closure(one, plan.of[group], bodies[one.frame], sort, soft)
         for group, one in enumerate(system.closures)
     ]
+    left = (of[0] for of in plan.of[len(closures) :])
+    couplings = tuple(
+        _coupling(one, -1 if one.repeats else next(left), bodies, sort) for one in system.couplings
+    )
     of_speeds = {
         row
         for group, one in enumerate(system.closures)
         for row, direction in zip(plan.of[group], one.directions, strict=True)
         if direction in one.of_speeds
     }
+    of_speeds |= {one.row for one in couplings if one.of_speeds}
     rows = tuple(
         RowStructure(
             row.body, row.others, sort(floors[number : number + 1]), soft.get(number, ()),
@@ -49,8 +59,20 @@ def with_loops(
         )
         for number, row in enumerate(plan.rows)
     )  # fmt: skip
-    open_rows = _pending(bodies, plan)
-    return open_rows, tuple(sorted(closures, key=lambda one: one.frame)), rows
+    closures.sort(key=lambda one: one.frame)
+    return _pending(bodies, plan), tuple(closures), rows, couplings
+
+
+def _coupling(
+    one: CouplingNumbers, row: int, bodies: Sequence[BodyStructure], sort: Sort
+) -> CouplingStructure:
+    columns, at = list[tuple[int, int]](), one.first + len(COUPLING)
+    for hinge in one.hinges:
+        columns.append((hinge.place, at))
+        at += bodies[hinge.place].nu
+    kept = sort(() if one.kept is None else (one.kept,))
+    unasked = one.of_speeds or one.kept is None
+    return CouplingStructure(row, one.first, unasked, kept, tuple(columns))
 
 
 def _pending(bodies: Sequence[BodyStructure], plan: RowPlan) -> tuple[BodyStructure, ...]:

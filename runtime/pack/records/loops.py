@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from mstmm.graph.mechanism import GROUND, Rows
+from mstmm.graph.mechanism import GROUND
 
 from ..loops.bent import BentPlan
+from ..loops.rows import row_groups
 from ..loops.variants import LOCKED, length_of
 from ..system import ClosureNumbers, System
 from .couplings import WrittenCoupling, attach_couplings, placed
@@ -104,15 +105,7 @@ class _Loops:
     def __init__(self, model: Any, system: System, memory: Memory, lib: Any) -> None:
         self.model, self.system, self.memory, self.lib = model, system, memory, lib
         self.parents = [int(parent) for parent in system.parents]
-        groups = [
-            Rows((self.parents[one.frame], one.outboard), len(one.directions))
-            for one in system.closures
-        ]
-        groups += [
-            Rows(tuple(end for hinge in one.hinges for end in (hinge.inboard, hinge.outboard)), 1)
-            for one in system.couplings if not one.repeats
-        ]  # fmt: skip
-        self.plan = BentPlan(system, groups)
+        self.plan = BentPlan(system, row_groups(self.parents, system))
         self.row_numbers = int(lib.MSTMM_ROW)
         count = len(self.plan.rows)
         self.dump = count * self.row_numbers
