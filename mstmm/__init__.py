@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from .bridge.charting import chart
     from .bridge.compilation import compile_scene as compile
     from .bridge.compilation import generate_file, register
+    from .bridge.reporting.report import report
     from .runtime.advice.record import Advice
     from .runtime.chart.chart import Chart
     from .runtime.model.loading import load_result
@@ -51,6 +52,7 @@ _LAZY = {
     "chart": (".bridge.charting", "chart"),
     "compile": (".bridge.compilation", "compile_scene"),
     "register": (".bridge.compilation", "register"),
+    "report": (".bridge.reporting.report", "report"),
     "generate_file": (".bridge.compilation", "generate_file"),
     "Advice": (".runtime.advice.record", "Advice"),
     "Chart": (".runtime.chart.chart", "Chart"),
@@ -64,7 +66,8 @@ _LAZY = {
 __all__ = [
     "Advice", "Atlas", "Chart", "ElementError", "EnvironmentFailure", "ExpressionError", "Model",
     "MstmmError", "NumericalFailure", "Result", "RiskRefused", "Scene", "SceneError", "advise",
-    "chart", "compile", "generate_file", "load_result", "load_scene", "register", "stability",
+    "chart", "compile", "generate_file", "load_result", "load_scene", "register", "report",
+    "stability",
 ]  # fmt: skip
 
 

@@ -22,6 +22,7 @@ from .studies.chart import chart
 from .studies.linear import frf, linearize, modes
 from .studies.stability import stability
 from .view import view
+from .write_report import report
 
 
 class Commands(TyperGroup):
@@ -74,6 +75,7 @@ def mstmm(
 app.command("demo")(demo)
 app.command("simulate")(simulate)
 app.command("view")(view)
+app.command("report")(report)
 app.command("chart")(chart)
 app.command("advise")(advise)
 app.command("linearize")(linearize)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -117,6 +118,20 @@ class Result(Record):
         made = view(self, named or "A run", trails, speed)
         if path is not None:
             made.save(path)
+        return made
+
+    def report(
+        self,
+        path: str | Path,
+        *,
+        title: str | None = None,
+        quantities: Sequence[str] = (),
+        trails: Sequence[str] = (),
+    ) -> Path:
+        """One page for somebody who was not there; see `mstmm.report`, which this calls."""
+        # by name: the equations come from derive, which this room does not know
+        report = import_module("mstmm").report
+        made: Path = report(self, path, title=title, quantities=quantities, trails=trails)
         return made
 
     def __repr__(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -24,8 +24,8 @@ _STRIP, _FRAME, _LINE, _DOTS = 7.2, 6.4, 0.28, 100
 _GIF_RATE, _ROW = 15.0, 6
 
 
-def strip(stage: Stage, path: Path, count: int = 6) -> None:
-    """A picture of `count` moments side by side, for papers."""
+def strip(stage: Stage, path: Path | IO[str], count: int = 6) -> None:
+    """A picture of `count` moments side by side, for papers; SVG into an open file."""
     flat = Flat(stage)
     some = np.unique(np.linspace(0, len(stage.times) - 1, max(1, count)).round().astype(int))
     columns = _columns(len(some), flat.shape)
@@ -37,7 +37,7 @@ def strip(stage: Stage, path: Path, count: int = 6) -> None:
         flat.draw(axis, int(k))
         axis.set_title(f"t = {stage.times[k]:.3g} s", fontsize=8.5, pad=2)
     figure.subplots_adjust(0.01, 0.01, 0.99, 1 - 0.8 * _LINE / figure.get_figheight(), 0.04, 0.14)
-    figure.savefig(path, dpi=200)
+    figure.savefig(path, dpi=200, format=None if isinstance(path, Path) else "svg")
 
 
 def _columns(count: int, shape: float) -> int:

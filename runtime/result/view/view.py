@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from mstmm.errors import SceneError
 
@@ -61,6 +61,10 @@ class View:
                 "frames, without an ending"
             )
         return path
+
+    def draw_strip(self, file: IO[str], moments: int = 6) -> None:
+        """The same strip as SVG into an open file."""
+        strip(self.stage, file, moments)
 
     def _repr_html_(self) -> str:
         return (

@@ -1,0 +1,79 @@
+"""The page around a report: one file, whose rules let nothing in from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+from ...printable import printable
+
+#: Nothing is fetched from anywhere; scripts and pictures are those of the page itself, and what
+#: moves makes functions of its own (viser's decoder, compiled to WebAssembly).
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob: data:; "
+    "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; worker-src blob:; "
+    "connect-src data: blob:; frame-src 'self'"
+)
+
+STYLE = """
+.verdict { border-left: .45rem solid var(--mark); background: var(--block); padding: .7rem 1rem;
+  border-radius: 4px; margin: 1rem 0; } .verdict b { color: var(--mark); }
+.good { --mark: #2d7d46; } .open { --mark: #a06a00; } .bad { --mark: #b3261e; }
+.wide { overflow-x: auto; } nav { font-size: .92rem; } nav a { margin-right: 1.1em; }
+table.rows { border-collapse: collapse; font-size: .93rem; }
+table.rows th { text-align: left; font-weight: 600; color: var(--soft); white-space: nowrap; }
+table.rows th, table.rows td { padding: .28rem 1rem .28rem 0; vertical-align: baseline;
+  border-bottom: 1px solid var(--line); }
+iframe { width: 100%; height: 30rem; border: 1px solid var(--line); border-radius: 6px; }
+.strip svg { width: 100%; height: auto; } .curves { min-height: 10rem; }
+ul { padding-left: 1.2rem; margin: .4rem 0; } li { margin: .2rem 0; }
+details { margin: .6rem 0; } summary { cursor: pointer; color: var(--accent); }
+details > h1 { font-size: 1.2rem; margin-top: .8rem; }
+a { color: var(--accent); }
+"""
+
+
+def text(words: object) -> str:
+    """Anything as text that a page can hold."""
+    return escape(printable(str(words)))
+
+
+def table(rows: Iterable[Sequence[object]], head: Sequence[str] = ()) -> str:
+    """Rows of text; without a head the first of each row names it."""
+    first = "".join(f"<th>{text(one)}</th>" for one in head)
+    lines = [f"<tr>{first}</tr>"] if head else []
+    for row in rows:
+        cells = [f"<td>{text(one)}</td>" for one in row]
+        if not head:
+            cells[0] = f"<th>{text(row[0])}</th>"
+        lines.append(f"<tr>{''.join(cells)}</tr>")
+    return f'<div class="wide"><table class="rows">{"".join(lines)}</table></div>'
+
+
+def bullets(sentences: Iterable[object]) -> str:
+    """A list of sentences."""
+    return f"<ul>{''.join(f'<li>{text(one)}</li>' for one in sentences)}</ul>"
+
+
+def folded(summary: str, body: str) -> str:
+    """What is read by those who ask for it."""
+    return f"<details><summary>{text(summary)}</summary>{body}</details>"
+
+
+def section(name: str, title: str, body: str) -> str:
+    """A part of the page with its heading; `name` is where links lead."""
+    return f'<section id="{name}"><h2>{text(title)}</h2>\n{body}</section>'
+
+
+def document(title: str, style: str, sections: Sequence[tuple[str, str, str]], head: str) -> str:
+    """The whole page of (name, title, body); empty bodies are left out."""
+    there = [one for one in sections if one[2]]
+    links = "".join(f'<a href="#{name}">{text(heading)}</a>' for name, heading, _ in there)
+    body = "\n".join(section(*one) for one in there)
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8"/>\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}"/>\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1"/>\n'
+        f"<title>{text(title)}</title>\n<style>{style}{STYLE}</style>\n</head>\n<body>\n<main>\n"
+        f"<h1>{text(title)}</h1>\n{head}\n<nav>{links}</nav>\n{body}\n</main>\n</body>\n</html>\n"
+    )

@@ -1,0 +1,31 @@
+"""Equations of the elements that a scene is made of, as their definitions state them."""
+
+from __future__ import annotations
+
+import re
+
+from ...errors import ElementError
+from ...scene import Scene
+from ...scene.checks.types import types
+from .document import folded, text
+
+
+def equations(scene: Scene) -> tuple[str, str]:
+    """(style, body): the equations of every type of element that is built in, folded, and where
+    those of others stand."""
+    from ...derive.show.html import STYLE
+    from ...derive.show.page import show_view
+    from ...derive.show.subjects import view
+
+    parts = []
+    for kind, name in sorted(types(scene)):
+        try:
+            shown = view(f"{kind}_{name}")
+        except ElementError:
+            missing = f"{kind} {name}: its equations stand in the file of its definition"
+            parts.append(f"<p>{text(missing)}</p>")
+            continue
+        page = show_view(shown, "equations", "html")
+        found = re.search(r"<main>\n(.*)\n</main>", page, re.S)
+        parts.append(folded(shown.title, found[1] if found else ""))
+    return STYLE, "".join(parts)

@@ -1,0 +1,74 @@
+"""`mstmm.report`: one page that tells a run to somebody who was not there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...errors import SceneError
+from . import words
+from .curves import curves
+from .document import document
+from .equations import equations
+
+if TYPE_CHECKING:
+    from ...runtime.result.result import Result
+    from ...runtime.result.view.view import View
+
+#: Moments of the strip.
+_MOMENTS = 6
+
+
+def report(
+    result: Result,
+    path: str | Path,
+    *,
+    title: str | None = None,
+    quantities: Sequence[str] = (),
+    trails: Sequence[str] = (),
+) -> Path:
+    """Write one page that needs no network: what the run is and whether it can be trusted, how it
+    moves, curves, certificate, equations of its elements, provenance; returns the path.
+
+    Extras: plot, and view for what moves.  `quantities` are those of the curves, by default the
+    hinge coordinates and the energy; `trails` as in `Result.view`.  SceneError for a path that does
+    not end in .html and for names that there are not; EnvironmentFailure without the extras.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise SceneError(f'report "{path}": expected a name ending in .html')
+    title = title or path.stem
+    seen = result.view(title=title, trails=trails) if len(result.t) else None
+    style, formulas = equations(result.model.scene)
+    sections = (
+        ("mechanism", "The mechanism", _seen(seen) + words.mechanism(result)),
+        ("run", "The run", words.made(result)),
+        ("curves", "Curves", curves(result, list(quantities) or _usual(result))),
+        ("certificate", "The certificate", words.certificate(result)),
+        ("equations", "The equations", formulas),
+        ("provenance", "Where it comes from", words.provenance(result)),
+    )
+    page = document(title, style, sections, words.verdict(result))
+    path.write_text(page, encoding="utf-8")
+    return path
+
+
+def _usual(result: Result) -> list[str]:
+    from ...runtime.result.output.table import default_names
+
+    return [*default_names(result), "energy"]
+
+
+def _seen(view: View | None) -> str:
+    """A strip of moments, and the page that moves inside this one."""
+    if view is None:
+        return ""
+    drawing = StringIO()
+    view.draw_strip(drawing, _MOMENTS)
+    strip = drawing.getvalue()
+    strip = strip[strip.index("<svg") :]
+    moving = f'<iframe title="the run as it moves" srcdoc="{escape(view.html)}"></iframe>'
+    return f'<div class="strip">{strip}</div>{moving}'

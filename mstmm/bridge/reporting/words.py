@@ -1,0 +1,131 @@
+"""What a run says of itself, in plain words and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from .document import bullets, folded, table, text
+
+if TYPE_CHECKING:
+    from ...runtime.result.result import Result
+
+#: Bodies and hinges that are listed one by one.
+_LISTED = 200
+#: Rows of loops that are listed.
+_REPEATED = 12
+
+
+def verdict(result: Result) -> str:
+    """May the numbers be used, to how many digits, and until when?"""
+    found = result.certificate.verdict()
+    kind = "bad" if found.against else "good" if found.trusted else "open"
+    words, _, reason = str(found).partition(": ")
+    lines = [f"<p><b>{text(words[0].upper() + words[1:])}</b>: {text(reason)}.</p>"]
+    lines += [f"<p>{text(sentence)}</p>" for sentence in _how_far(result)]
+    reasons = bullets(found.against) if len(found.against) > 1 else ""
+    return f'<div class="verdict {kind}">{"".join(lines)}{reasons}</div>'
+
+
+def _how_far(result: Result) -> Iterator[str]:
+    """To what error, and until when."""
+    certificate, reached = result.certificate, result.error_estimate
+    if reached is not None:
+        yield f"Asked for an error: {reached}"
+    if certificate.error is not None:
+        units = ", ".join(f"{v:.1e} {u}" for u, v in certificate.error.largest("q").items())
+        yield f"A second, more accurate run differs by at most {units}."
+    if certificate.predictable_until is not None:
+        yield (
+            f"From t = {certificate.predictable_until:.3g} s on accurate runs part: what comes "
+            "later can be trusted as one possible motion, not as the one."
+        )
+
+
+def made(result: Result) -> str:
+    """How the run was made and what was chosen for it."""
+    settings, counted, model = result.settings, result.statistics, result.model
+    by = f"step {settings.step:g} s" if settings.step is not None else (
+        f"rtol {settings.rtol:g}, atol {settings.atol:g}"
+    )  # fmt: skip
+    rows = [
+        ("time", f"{settings.t_start:g} to {settings.t_end:g} s, {len(result.t)} samples"),
+        ("outcome", result.message), ("method", f"{settings.method}, {by}"),
+        ("engine", model.engine_choice or model.engine),
+    ]  # fmt: skip
+    if counted is not None:
+        rows.append(("steps", f"{counted.steps}, {counted.rejected} rejected"))
+        rows.append(("evaluations", f"{counted.evaluations}"))
+    stretches = [str(stretch) for stretch in result.methods]
+    chosen = folded("What was chosen, when and why", bullets(stretches)) if stretches else ""
+    return table(rows) + chosen + _models(result)
+
+
+def _models(result: Result) -> str:
+    """Levels of model of flexible bodies, and what they leave out."""
+    rows = [
+        (name, body.n, body.frame, "; ".join(body.notes) or "nothing")
+        for name, body in result.model.flexible.items()
+    ]
+    if not rows:
+        return ""
+    head = ("flexible body", "shapes", "floating frame", "worth knowing")
+    return "<h3>What is simplified</h3>" + table(rows, head)
+
+
+def mechanism(result: Result) -> str:
+    """Bodies and hinges as lists."""
+    scene = result.model.scene
+    joined = [
+        (hinge.name, hinge.type, hinge.inboard, hinge.outboard)
+        for hinge in list(scene.hinges[:_LISTED])
+    ]
+    bodies = [
+        (body.name, "flexible" if body.name in result.model.flexible else f"{body.mass:g} kg",
+         ", ".join(body.ends) or "none")
+        for body in list(scene.skeleton.bodies[:_LISTED])
+    ]  # fmt: skip
+    count = f"{len(scene.skeleton.bodies)} bodies, {len(scene.hinges)} hinges"
+    lists = table(joined, ("hinge", "type", "inboard", "outboard"))
+    lists += "<p></p>" + table(bodies, ("body", "mass", "ends"))
+    return folded(count, lists) + _loops(result)
+
+
+def _loops(result: Result) -> str:
+    """Where loops are cut, what they leave free, and which loads they leave open."""
+    if result.model.closed is None:
+        return ""
+    loops = result.model.closed.loops
+    repeated = ", ".join(f"{word} of {name}" for name, word in loops.redundant[:_REPEATED])
+    more = " ..." if len(loops.redundant) > _REPEATED else ""
+    rows = [
+        ("loops closed by", ", ".join(loops.cut[:_REPEATED]) or "constraints and couplings"),
+        ("rows that count", f"{loops.rank} of {len(loops.rows)}"),
+        ("speeds left free", loops.mobility),
+        ("rows that repeat others", repeated + more or "none"),
+        ("loads that are not determined", loops.open_loads or "none"),
+    ]
+    if loops.singular:
+        rows.append(("the start", "a singular pose: fewer rows count there than nearby"))
+    return "<h3>Closed loops</h3>" + table(rows)
+
+
+def certificate(result: Result) -> str:
+    """Every line of the certificate, and the risks with their remedies."""
+    lines = result.certificate.text(verdict=False, warnings=False).splitlines()
+    body = f"<pre>{text(chr(10).join(lines))}</pre>"
+    risks = [(risk.element, risk.means, risk.remedy) for risk in result.risks]
+    if risks:
+        body += "<h3>What asks for attention</h3>" + table(risks, ("of", "what", "remedy"))
+    return body
+
+
+def provenance(result: Result) -> str:
+    """Versions, hashes, and the scene with every default filled in."""
+    from ...runtime.engine.identity import kernels_hash
+    from ...runtime.result.output.provenance import scene_hash, versions
+
+    rows = [*versions().items(), ("scene, SHA-256", scene_hash(result)),
+            ("kernels, SHA-256", kernels_hash(result.model))]  # fmt: skip
+    scene = result.model.scene.to_toml()
+    return table(rows) + folded("The scene", f"<pre>{text(scene)}</pre>")

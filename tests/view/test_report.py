@@ -1,0 +1,77 @@
+"""The report: opened without a network its console is silent, and it says what the run says."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli.commands import Command, folder, mstmm  # noqa: F401  (fixtures)
+from PIL import Image
+from view import browser, scenes
+
+from mstmm.bridge.reporting import document
+from mstmm.errors import SceneError
+
+#: Nothing may be fetched: the page names no other place but in what readers may follow themselves.
+_FETCHED = ("<link", '<img src="http', "<script src", "@import")
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    return scenes.run().report(
+        path, title="a <b>beam</b>", quantities=["rod.tip.position", "root.angle"]
+    )
+
+
+def test_what_it_says(page: Path) -> None:
+    words = page.read_text()
+    assert page.stat().st_size < 10_000_000
+    assert "<title>a &lt;b&gt;beam&lt;/b&gt;</title>" in words
+    assert "<b>NOT trusted</b>: beam &quot;blade&quot;" in words
+    for heading in ("The mechanism", "The run", "Curves", "The certificate", "The equations"):
+        assert f"<h2>{heading}</h2>" in words
+    assert "<summary>rigid body</summary>" in words
+    assert "<math" in words
+    assert str(scenes.run().certificate.energy) in words
+    assert not any(mark in words for mark in _FETCHED)
+
+
+@pytest.mark.skipif(browser.PROGRAM is None, reason="Chromium is not installed")
+def test_opened(page: Path) -> None:
+    with browser.opened(page, (1000, 900)) as seen:
+        assert seen.wait("document.querySelectorAll('.curves .trace').length === 4"), seen.console
+        inner = "document.querySelector('iframe').contentWindow"
+        assert seen.wait(f"{inner}.__viserMutable && {inner}.__viserMutable.canvas && 1")
+        assert seen.wait(f"{inner}.document.querySelector('#mstmm div').textContent")
+        picture = np.asarray(Image.open(io.BytesIO(seen.picture())).convert("RGB"))
+        assert seen.value("document.documentElement.scrollWidth <= innerWidth")
+        assert seen.console == []
+    assert len(np.unique(picture.reshape(-1, 3) // 16, axis=0)) > 20
+
+
+def test_refusals(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"expected a name ending in \.html"):
+        scenes.run().report(tmp_path / "report.pdf")
+    with pytest.raises(SceneError, match="there is no such quantity"):
+        scenes.run().report(tmp_path / "report.html", quantities=["rod.tip.positron"])
+
+
+def test_everything_is_escaped() -> None:
+    made = document.table([("<script>", "a & b")], ("<i>",)) + document.bullets(["</ul><b>"])
+    made += document.folded("<x>", "")
+    assert "<script>" not in made
+    assert "<i>" not in made
+    assert "<b>" not in made
+    assert "a &amp; b" in made
+
+
+def test_the_command(mstmm: Command, folder: Path) -> None:  # noqa: F811
+    assert mstmm("simulate", "pendulum.toml", "--t-end", "0.5", "-o", "run.nc").code == 0
+    done = mstmm("report", "run.nc", "-o", "read.html", "-q", "rod.tip.position")
+    assert done.code == 0, done.err
+    assert "read.html: a page" in done.out
+    assert (folder / "read.html").stat().st_size > 100_000
+    assert mstmm("report", "pendulum.toml").code == 2
