@@ -87,7 +87,18 @@ def hung() -> Scene:
     return {"gravity": [0, 0, -9.81], "body": [bar], "beam": beams, "hinge": hinges}
 
 
-SCENES = {"slider_crank": (slider_crank, "slider", 2), "shackled": (shackled, "far.tip", 2),
+def meshed() -> Scene:
+    """The slider-crank with a rod of rubber from finite elements."""
+    scene = slider_crank("wrist")
+    del scene["beam"]
+    rod = {"name": "bar", "box": {"size": [ROD, 0.04, 0.04], "divisions": [6, 1, 1]}, "modes": 1,
+           "young": 2e7, "poisson": 0.3, "density": 1100.0,
+           "ends": {"root": {"plane": [1, 0, 0, 0.0]}, "tip": {"plane": [1, 0, 0, ROD]}}}  # fmt: skip
+    scene["hinge"][1]["outboard"], scene["hinge"][3]["type"] = "bar.root", "ball"
+    return scene | {"elastic": [rod]}
+
+
+SCENES = {"meshed": (meshed, "slider", 3), "slider_crank": (slider_crank, "slider", 2), "shackled": (shackled, "far.tip", 2),
           "hung": (hung, "bar.tip", 3)}  # fmt: skip
 
 
@@ -177,6 +188,34 @@ def test_a_stiff_rod_moves_as_a_rigid_one() -> None:
             for ei in (1e4, 1e5)]  # fmt: skip
     assert gaps[0] > 1e-6
     assert gaps[1] < 0.5 * gaps[0]
+
+
+def test_batches_are_runs_one_by_one() -> None:
+    model = mstmm.compile(mstmm.Scene(**slider_crank()))
+    q, u = model.initial_state()
+    batch = model.simulate_batch((np.array([q, q]), np.array([u, 0.5 * u])), t_end=0.2)
+    assert batch.success.all()
+    alone = model.simulate(0.2, initial=(q, 0.5 * u), output_times=[0.0, 0.2])
+    np.testing.assert_allclose(batch.q[1, -1], alone.q[-1], atol=1e-12)
+
+
+def test_a_wrist_that_lets_go_leaves_the_tree() -> None:
+    """Behind the release the rod swings on as the tree that was there without the wrist."""
+    tree = slider_crank()
+    del tree["hinge"][2:], tree["body"][1], tree["hinge"][0]["initial"]["u"]
+    open_tree = mstmm.compile(mstmm.Scene(**tree))
+    place = open_tree.simulate(0.0).position("bar.tip")[0]
+    angle = ANGLE + tree["hinge"][1]["initial"]["q"]
+    wrist = {"name": "wrist", "type": "fixed", "inboard": "ground", "outboard": "bar.tip",
+             "position": place.tolist(), "orientation": [0.0, 0.0, angle],
+             "release": "t >= 0.1", "cut": True}  # fmt: skip
+    held = run(tree | {"hinge": [*tree["hinge"], wrist]})
+    own = held.model.layout.hinges["wrist"]
+    q, u = np.delete(held.q, own.q_slice, 1), np.delete(held.u, own.u_slice, 1)
+    assert np.abs(held.position("bar.tip")[1] - place).max() < 1e-9
+    free = open_tree.simulate(0.3, t_start=0.1, initial=(q[1], u[1]), rtol=1e-9, atol=1e-11)
+    assert np.abs(held.position("bar.tip")[-1] - place).max() > 0.05
+    np.testing.assert_allclose(q[-1], free.q[-1], atol=1e-7)
 
 
 def test_a_stiff_bushing_does_as_the_hinge() -> None:

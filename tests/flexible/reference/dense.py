@@ -13,7 +13,7 @@ both are the same.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -316,16 +316,25 @@ def _units(n: int) -> Array:
 
 
 def solve(
-    scene: Mapping[str, Any], q: Array, u: Array, t: float = 0.0, lagrangian: bool = True
+    scene: Mapping[str, Any],
+    q: Array,
+    u: Array,
+    t: float = 0.0,
+    lagrangian: bool = True,
+    meeting: Sequence[tuple[str, str]] = (),
 ) -> Accelerations:
-    """Accelerations and hinge loads at one state; q, u: hinges in scene order, then modes."""
+    """Accelerations and hinge loads at one state; q, u: hinges in scene order, then modes.
+
+    Ends that are `meeting` ("body.end", or "ground" for where the other is) stay in one place.
+    """
     this = system(scene, lagrangian)
     q, u = np.asarray(q, float), np.asarray(u, float)
     tree, states = this.tree, motion(this, q, u)
     sizes = [6 + body.n for body in this.bodies]
     starts = np.concatenate([[0], np.cumsum(sizes)])
     hinges, total = len(tree.hinges), int(starts[-1])
-    matrix = np.zeros((total + 6 * hinges + tree.nu,) * 2)
+    count = total + 6 * hinges + tree.nu
+    matrix = np.zeros((count + 3 * len(meeting),) * 2)
     right = np.zeros(len(matrix))
     for i, body in enumerate(this.bodies):
         rows = slice(starts[i], starts[i + 1])
@@ -339,11 +348,41 @@ def solve(
         _hinge_rows(this, j, states, q, u, matrix, right, at, own, starts)
         right[own] += laws.hinge_effort(tree, hinge, q[: tree.nq], u[: tree.nu], t)
         matrix[own, own] += np.diag(laws.reflected_inertia(hinge))
+    for k, ends in enumerate(meeting):
+        at = slice(count + 3 * k, count + 3 * k + 3)
+        for sign, (i, J, b) in _moving(this, ends, states):
+            rows = slice(starts[i], starts[i + 1])
+            matrix[at, rows] += sign * J
+            matrix[rows, at] += sign * J.T
+            right[at] -= sign * b
     x = _refined(matrix, right)
     modes = [x[starts[i] + 6 : starts[i + 1]] for i in this.flexible]
     wrenches = x[total : total + 6 * hinges].reshape(hinges, 6)
-    speeds = x[total + 6 * hinges :]
+    speeds = x[total + 6 * hinges : count]
     return Accelerations(np.concatenate([speeds, *modes]), wrenches[:, :3], wrenches[:, 3:])
+
+
+def _moving(
+    this: System, ends: Sequence[str], states: Mapping[int, State]
+) -> Iterator[tuple[int, tuple[int, Array, Array]]]:
+    """Sign, body, matrix and bias of the accelerations of those ends that move."""
+    for sign, name in zip((1, -1), ends, strict=True):
+        if name != "ground":
+            body, _, end = name.partition(".")
+            i = this.tree.body_number(body)
+            moved = end_jet(this.bodies[i], end, states[i], _units(6 + this.bodies[i].n))
+            J, b = _affine(*moved)
+            yield sign, (i, J[:3], b[:3])
+
+
+def end_motion(scene: Mapping[str, Any], name: str, q: Array, u: Array) -> tuple[Array, Array]:
+    """Place and velocity of an end ("body.end")."""
+    this = system(scene)
+    body, _, end = name.partition(".")
+    i = this.tree.body_number(body)
+    still = np.zeros((1, 6 + this.bodies[i].n))
+    place, _ = end_jet(this.bodies[i], end, motion(this, q, u)[i], still)
+    return place.x[0], place.dx[0]
 
 
 def _load(this: System, load: Mapping[str, Any], states: Mapping[int, State]) -> tuple[int, Array]:
