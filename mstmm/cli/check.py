@@ -173,7 +173,9 @@ def _loop_lines(loops: Loops) -> list[str]:
     """What closed loops leave free, and which loads they leave open."""
     if not loops.rows:
         return []
-    lines = [f"  loops: {loops.rank} of {len(loops.rows)} rows count, {loops.mobility} speeds left"]
+    bent = f", of them {loops.shapes} of shapes" if loops.shapes else ""
+    left = f"{loops.mobility} speeds left{bent}"
+    lines = [f"  loops: {loops.rank} of {len(loops.rows)} rows count, {left}"]
     if loops.redundant:
         told = ", ".join(f"{word} of {name}" for name, word in loops.redundant[:_SHOWN])
         more = " ..." if len(loops.redundant) > _SHOWN else ""

@@ -164,7 +164,8 @@ def test_cutting_another_hinge_changes_nothing() -> None:
             )
         np.testing.assert_allclose(other.position("bar.tip"), found[0].position("bar.tip"),
                                    atol=1e-7)  # fmt: skip
-    assert mstmm.compile(mstmm.Scene(**slider_crank())).loops.rank == 2
+    loops = mstmm.compile(mstmm.Scene(**slider_crank())).loops
+    assert (loops.rank, loops.mobility, loops.shapes) == (2, 3, 2)
 
 
 def test_a_start_that_is_bent_stays_bent() -> None:

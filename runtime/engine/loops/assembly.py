@@ -28,6 +28,11 @@ _FIRST, _MOST, _LEAST = 1e-2, 1e8, 1e-12
 _CLOSED, _STILL = 1e-10, 1e-9
 #: Other starts where one leads to an open loop, and how far they are from it (rad, m).
 _TRIES, _SHAKEN = 4, 0.1
+#: So many hinges are named.
+_NAMED = 8
+#: Speeds by which rows may slip, in parts of the largest; pivots that still tell a row from others,
+#: in parts of its mobility.
+_SLIP, _TOLD = 1e-8, 1e-15
 #: So much that the own coordinates of closing hinges alone follow.
 _ALONE = 1e14
 
@@ -101,22 +106,40 @@ class Assembly:
 
     def speeds(self, q: Array, u: Array) -> Array:
         """u (nu,) without slips at the closed q.  SceneError where those held do not allow it."""
-        change, missing = self.calls.correction(self.calls.slip, q, u)
-        largest = self._largest(missing)
-        while True:  # once, but for digits lost behind heavy bodies
-            trial = u + self.free * change
-            change, after = self.calls.correction(self.calls.slip, q, trial)
-            if not self._largest(after) < largest:
-                break
-            u, missing, largest = trial, after, self._largest(after)
-        if largest > 1e-8 * max(1.0, float(np.abs(u).max(initial=0.0))):
-            row = int(np.abs(missing).argmax())
+        u, missing = self._without_slips(q, u)
+        counting = self.calls.inverses() > 0
+        if self._slipping(u, missing) is not None and not counting.all():
+            # Beside a singular pose rows are still told apart by rounding's leave.
+            floors = [self.calls.records.floor(row) for row in range(self.calls.count)]
+            for row, mobility in enumerate(self.calls.mobility.tolist()):
+                self.calls.records.judge(row, _TOLD * mobility)
+            u, missing = self._without_slips(q, u)
+            for row, floor in enumerate(floors):
+                self.calls.records.judge(row, floor)
+        row = self._slipping(u, missing)
+        if row is not None:
             raise SceneError(
                 f"scene: the speeds given for {self._names()} contradict each other by "
                 f"{self._amount(row, missing, '.3g', '/s')} {self._where(row)}; "
                 "give fewer of them, or others"
             )
         return u
+
+    def _without_slips(self, q: Array, u: Array) -> tuple[Array, Array]:
+        """u with its slips corrected, and what is left of them."""
+        change, missing = self.calls.correction(self.calls.slip, q, u)
+        largest = self._largest(missing)
+        while True:  # once, but for digits lost behind heavy bodies
+            trial = u + self.free * change
+            change, after = self.calls.correction(self.calls.slip, q, trial)
+            if not self._largest(after) < largest:
+                return u, missing
+            u, missing, largest = trial, after, self._largest(after)
+
+    def _slipping(self, u: Array, missing: Array) -> int | None:
+        """The row that slips most, where that is more than rounding."""
+        much = _SLIP * max(1.0, float(np.abs(u).max(initial=0.0)))
+        return int(np.abs(missing).argmax()) if self._largest(missing) > much else None
 
     def _free_speeds(self) -> Array:
         found, layout = np.ones(self.calls.engine.nu), self.calls.engine.packed.layout
@@ -178,14 +201,20 @@ class Assembly:
 
     def _open(self, missing: Array) -> str:
         row = int(np.abs(missing).argmax())
-        while_held = f" with {self._names()} held" if self.held else ""
+        while_held = f" with {self._names()} held" if self.held or self._driven() else ""
         return (
             f"scene: {self._subject(row)}: the nearest pose leaves "
             f"{self._amount(row, missing, '.7g')}{while_held}; {self._remedy(row)}"
         )
 
     def _names(self) -> str:
-        return ", ".join(f'"{name}"' for name in self.held) or "driven hinges"
+        """Hinges that are held or driven."""
+        names = [f'"{name}"' for name in (*self.held, *self._driven())]
+        return ", ".join(names[:_NAMED]) + (" ..." if names[_NAMED:] else "")
+
+    def _driven(self) -> list[str]:
+        hinges = self.calls.engine.packed.described.hinge
+        return [hinge.name for hinge in hinges if hinge.drive and hinge.name not in self.held]
 
     def _where(self, row: int) -> str:
         closing = self.calls.closing(row)
@@ -200,7 +229,8 @@ class Assembly:
     def _remedy(self, row: int) -> str:
         if self.calls.coupling_of(row):
             return "leave it or another coupling out, or correct what they equal"
-        return "correct the lengths, or start nearer to where it closes"
+        less = ", hold or drive less" if self.held or self._driven() else ""
+        return f"correct lengths or axes{less}, or start nearer to where it closes"
 
     def _amount(self, row: int, missing: Array, digits: str, per: str = "") -> str:
         amount = f"{abs(missing[row]):{digits}}"

@@ -51,6 +51,8 @@ class Loops:
         not_unique: components of the loads of hinges, "fx" to "mz" along and about their outboard
             axes, by name: rigid bodies do not determine them, results show one of many shares.
         mobility: speeds that are left free.
+        shapes: how many of these are rates of the shapes of flexible bodies, as many as there are
+            unless rows that nothing else can meet take some.
         width: most rows that are open across one hinge at a time.
         singular: whether the start is a singular pose, where fewer rows count than nearby.
     """
@@ -63,6 +65,7 @@ class Loops:
     width: int = 0
     singular: bool = False
     not_unique: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    shapes: int = 0
     decided_by: Callable[[], tuple[str, ...]] = field(default=tuple, repr=False, compare=False)
 
     @property
@@ -141,6 +144,8 @@ class Closed:
             for direction, row in one.rows.items() if row in rank.going
         }  # fmt: skip
         left = without(packed.system, repeated, couplings)
+        mobility = free_speeds - self._shared() - rows
+        bent = sum(slots.nu for slots in packed.layout.modal.values())
         if packed.releases:
             # What repeats others now may be needed once these let go: by every evaluation.
             for row in rank.going:
@@ -154,8 +159,7 @@ class Closed:
             tuple(cut.hinge for cut in packed.expanded.cuts if cut.constraint is None),
             tuple(names), rows,
             tuple(names[row] for row in sorted(rank.here)),
-            free_speeds - self._shared() - rows, records.width, rank.singular,
-            rank.not_unique,
+            mobility, records.width, rank.singular, rank.not_unique, min(mobility, bent),
         )  # fmt: skip
         return told, {row: names[row] for row in sorted(rank.going)}
 

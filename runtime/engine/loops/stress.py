@@ -18,8 +18,9 @@ from .calls import LoopCalls
 _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 #: Yielding in parts of the mobility, repetitions, and states drawn.
 _GIVE, _TIMES, _DRAWN = 1e-7, 4, 2
-#: Parts of the largest component that are rounding.
-_ROUNDING = 1e-5
+#: Parts of the largest component that are rounding, and so many times the gaps (m, rad) that rows
+#: which repeat others leave: by these the states are off.
+_ROUNDING, _OFF = 1e-5, 10.0
 
 _UPPER = np.triu_indices(6)
 
@@ -29,7 +30,9 @@ def not_unique(calls: LoopCalls, q: Array) -> dict[str, tuple[str, ...]]:
 
     `calls` are those of a geometry in which all rows are met.
     """
-    touched = np.any([_touched(calls, q, seed) for seed in range(_DRAWN)], axis=0)
+    gaps = np.abs(calls.correction(calls.gap, q, np.zeros(calls.engine.nu))[1])
+    rounding = max(_ROUNDING, _OFF * float(gaps.max(initial=0.0)))
+    touched = np.any([_touched(calls, q, seed, rounding) for seed in range(_DRAWN)], axis=0)
     packed, found = calls.engine.packed, dict[str, tuple[str, ...]]()
     for number, hinge in enumerate(packed.scene.hinges):
         marks = touched[packed.topology.place_of_hinge(number)]
@@ -46,7 +49,7 @@ def outboard_axes(calls: LoopCalls, place: int) -> Array:
     return np.reshape(packed.end(hinge.outboard)[1], (3, 3))
 
 
-def _touched(calls: LoopCalls, q: Array, seed: int) -> Array:
+def _touched(calls: LoopCalls, q: Array, seed: int, rounding: float) -> Array:
     """(bodies, 6) whether a drawn self-stress state loads the component of the inboard hinge."""
     for row in range(calls.count):
         calls.records.judge(row, 0.0)
@@ -55,7 +58,7 @@ def _touched(calls: LoopCalls, q: Array, seed: int) -> Array:
     for _ in range(_TIMES):
         y = met * calls.stressed(q, _GIVE * calls.mobility * y, _GIVE)
     loads = _loads(calls)
-    return loads > _ROUNDING * loads.max(initial=0.0)
+    return loads > rounding * loads.max(initial=0.0)
 
 
 def _loads(calls: LoopCalls) -> Array:

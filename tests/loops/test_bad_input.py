@@ -1,0 +1,124 @@
+"""Wishes that contradict each other, misfits, and starts beside singular poses, with their words."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mstmm
+
+from .linkages import angles, cranks, four_bar
+from .scenes import four_bars
+
+Scene = dict[str, Any]
+
+
+def hinge(scene: Scene, name: str) -> Scene:
+    found: Scene = next(one for one in scene["hinge"] if one["name"] == name)
+    return found
+
+
+def compiled(scene: Scene) -> mstmm.Model:
+    return mstmm.compile(mstmm.Scene(**scene))
+
+
+def driven(**drives: str) -> Scene:
+    scene = four_bar()
+    for name, text in drives.items():
+        hinge(scene, name).pop("initial", None)
+        hinge(scene, name)["drive"] = text
+    return scene
+
+
+def held(*names: str, off: float = 0.0) -> Scene:
+    scene = four_bar()
+    for name in names:
+        hinge(scene, name)["hold"] = True
+    hinge(scene, names[-1])["initial"]["q"] += off
+    return scene
+
+
+def fast(**speeds: float) -> Scene:
+    scene = four_bar()
+    for name, speed in speeds.items():
+        hinge(scene, name).setdefault("initial", {})["u"] = speed
+    return scene
+
+
+REST = angles(0.9)[1]
+REFUSED = {
+    "drives that cannot be": (driven(foot="0.9", end="1.2"),
+                              r'leaves 0\.10.* m with "foot", "end" held.*drive less'),
+    "drives at odds in speed": (driven(foot="0.9 + t", end=f"{REST!r}"),
+                                r'speeds given for "foot", "end" contradict .* m/s'),
+    "more held than is free": (held("foot", "end", off=0.2),
+                               r'with "foot", "end" held.*hold or drive less'),
+    "speeds at odds": (fast(foot=1.0, end=5.0), r'speeds given for "foot", "end" contradict'),
+    "an axis off by a hundredth": (four_bar(end={"axis": [math.sin(0.01), 0, math.cos(0.01)]}),
+                                   "lengths or axes"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_is_refused_is_told(what: str) -> None:
+    scene, words = REFUSED[what]
+    with pytest.raises(mstmm.SceneError, match=words) as caught:
+        compiled(scene)
+    assert "; " in str(caught.value)
+
+
+def test_what_agrees_is_taken() -> None:
+    """As many drives and holds as one likes, where they say the same."""
+    assert compiled(driven(foot="0.9", end=f"{REST!r}")).simulate(0.1).success
+    assert compiled(held("foot", "knee", "tip", "end")).loops.mobility == 1
+
+
+@pytest.mark.parametrize("misfit", [0.0, 1e-7, 1e-5, 1e-4, 3e-4])
+def test_a_misfit_leaves_open_what_exact_axes_do(misfit: float) -> None:
+    model = compiled(four_bar(end={"axis": [math.sin(misfit), 0, math.cos(misfit)]}))
+    assert model.loops.not_unique == dict.fromkeys(("foot", "knee", "tip", "end"),
+                                                   ("fz", "mx", "my"))  # fmt: skip
+
+
+@pytest.mark.parametrize("angle", [1e-7, 1e-6, 1e-5, 1e-4])
+def test_one_speed_beside_a_singular_pose(angle: float) -> None:
+    """Rows that repeat others but for what rounding makes of them contradict nothing."""
+    scene = four_bars(2, angle=angle)
+    for one in scene["hinge"]:
+        one.get("initial", {}).pop("u", None)
+    scene["hinge"][0].setdefault("initial", {})["u"] = 1.0
+    model = compiled(scene)
+    assert model.loops.singular
+    result = model.simulate(0.3, rtol=1e-8)
+    assert result.success, result.message
+    assert np.ptp(result.energy()) < 1e-5 * np.abs(result.energy()).max()
+
+
+def test_a_trajectory_that_does_not_close_fails_alone() -> None:
+    """The third crank stands where the short coupler does not reach."""
+    scene = driven(foot="a + t")
+    scene["input"] = [{"name": "a", "value": 0.9, "rates": [0, 0], "unit": "rad"}]
+    next(body for body in scene["body"] if body["name"] == "coupler")["ends"]["tip"][0] = 0.95
+    model = compiled(scene)
+    states = tuple(np.tile(one, (3, 1)) for one in model.initial_state())
+    batch = model.simulate_batch(
+        (states[0], states[1]), {"a.value": np.array([0.9, 1.0, 3.14])}, t_end=0.1
+    )
+    assert batch.success.tolist() == [True, True, False]
+    assert "no state near closes it" in batch.messages[2]
+
+
+def test_a_crank_too_long_by_more_than_a_misfit_is_a_structure() -> None:
+    for much, moves in ((1e-4, True), (1e-2, False)):
+        scene = cranks()
+        name = scene["hinge"][2]["outboard"].partition(".")[0]
+        body = next(one for one in scene["body"] if one["name"] == name)
+        body["ends"] = {end: [x * (1 + much), y, z] for end, (x, y, z) in body["ends"].items()}
+        if moves:
+            assert compiled(scene).loops.mobility == 1
+        else:
+            with pytest.raises(mstmm.SceneError, match="no freedom is left"):
+                compiled(scene)
