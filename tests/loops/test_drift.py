@@ -11,7 +11,7 @@ import mstmm
 from mstmm.runtime.result.result import Result
 
 from .linkages import bricard, four_bar
-from .test_nearest import gap
+from .starts.test_nearest import gap
 
 
 def test_a_four_bar_stays_closed() -> None:

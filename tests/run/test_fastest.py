@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from loops.test_flexible import slider_crank
+from loops.bent.test_against_tree import slider_crank
 from reference import random_scenes
 from reference.jets import Array
 from reference.tree import read

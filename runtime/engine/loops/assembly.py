@@ -111,11 +111,11 @@ class Assembly:
         if self._slipping(u, missing) is not None and not counting.all():
             # Beside a singular pose rows are still told apart by rounding's leave.
             floors = [self.calls.records.floor(row) for row in range(self.calls.count)]
-            for row, mobility in enumerate(self.calls.mobility.tolist()):
-                self.calls.records.judge(row, _TOLD * mobility)
+            for k, mobility in enumerate(self.calls.mobility.tolist()):
+                self.calls.records.judge(k, _TOLD * mobility)
             u, missing = self._without_slips(q, u)
-            for row, floor in enumerate(floors):
-                self.calls.records.judge(row, floor)
+            for k, floor in enumerate(floors):
+                self.calls.records.judge(k, floor)
         row = self._slipping(u, missing)
         if row is not None:
             raise SceneError(

@@ -375,7 +375,9 @@ def _moving(
             yield sign, (i, J[:3], b[:3])
 
 
-def end_motion(scene: Mapping[str, Any], name: str, q: Array, u: Array) -> tuple[Array, Array]:
+def end_motion(
+    scene: Mapping[str, Any] | System, name: str, q: Array, u: Array
+) -> tuple[Array, Array]:
     """Place and velocity of an end ("body.end")."""
     this = system(scene)
     body, _, end = name.partition(".")

@@ -7,8 +7,8 @@ import pytest
 
 import mstmm
 
-from .scenes import Scene, andrews, four_bars
-from .test_four_bar import PINS, angles, linkage
+from ..scenes import Scene, andrews, four_bars
+from ..test_four_bar import PINS, angles, linkage
 
 
 def shaken(scene: Scene, seed: int, size: float, kept: str) -> Scene:

@@ -12,7 +12,7 @@ import mstmm
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
-from .scenes import rod
+from ..scenes import rod
 
 Scene = dict[str, Any]
 
@@ -91,15 +91,15 @@ def meshed() -> Scene:
     """The slider-crank with a rod of rubber from finite elements."""
     scene = slider_crank("wrist")
     del scene["beam"]
-    rod = {"name": "bar", "box": {"size": [ROD, 0.04, 0.04], "divisions": [6, 1, 1]}, "modes": 1,
-           "young": 2e7, "poisson": 0.3, "density": 1100.0,
-           "ends": {"root": {"plane": [1, 0, 0, 0.0]}, "tip": {"plane": [1, 0, 0, ROD]}}}  # fmt: skip
+    ends = {name: {"plane": [1, 0, 0, x]} for name, x in (("root", 0.0), ("tip", ROD))}
+    bar = {"name": "bar", "box": {"size": [ROD, 0.04, 0.04], "divisions": [6, 1, 1]}, "modes": 1,
+           "young": 2e7, "poisson": 0.3, "density": 1100.0, "ends": ends}  # fmt: skip
     scene["hinge"][1]["outboard"], scene["hinge"][3]["type"] = "bar.root", "ball"
-    return scene | {"elastic": [rod]}
+    return scene | {"elastic": [bar]}
 
 
-SCENES = {"meshed": (meshed, "slider", 3), "slider_crank": (slider_crank, "slider", 2), "shackled": (shackled, "far.tip", 2),
-          "hung": (hung, "bar.tip", 3)}  # fmt: skip
+SCENES = {"meshed": (meshed, "slider", 3), "slider_crank": (slider_crank, "slider", 2),
+          "shackled": (shackled, "far.tip", 2), "hung": (hung, "bar.tip", 3)}  # fmt: skip
 
 
 def run(scene: Scene, t_end: float = 0.3, **options: Any) -> mstmm.Result:

@@ -1,4 +1,4 @@
-"""Wishes that contradict each other, misfits, and starts beside singular poses, with their words."""
+"""Wishes that contradict each other, misfits, and starts beside singular poses."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 
 import mstmm
 
-from .linkages import angles, cranks, four_bar
-from .scenes import four_bars
+from ..linkages import angles, cranks, four_bar
+from ..scenes import four_bars
 
 Scene = dict[str, Any]
 

@@ -31,7 +31,7 @@ def _closed(scene: Scene, seed: int) -> tuple[Scene, Array, Array, tuple[str, st
     if last in rigid:
         outer, inner = f"{last}.meet", f"{scene['beam'][0]['name']}.skew"
         own = dense.motion(this, q, u)[this.tree.body_number(last)]
-        place = own.A.T @ (dense.end_motion(this, inner, q, u)[0] - own.r)
+        place = np.dot(own.A.T, dense.end_motion(this, inner, q, u)[0] - own.r)
         rigid[last]["ends"]["meet"] = place.tolist()
         wrist["inboard"], this = inner, dense.system(scene)
     else:
@@ -54,7 +54,8 @@ def _start(scene: Scene, q: Array, u: Array) -> None:
     for hinge in scene["hinge"]:
         nq, nu = SIZES[hinge["type"]]
         if nq:
-            hinge["initial"] = {"q": q[at_q : at_q + nq].tolist(), "u": u[at_u : at_u + nu].tolist()}
+            hinge["initial"] = {"q": q[at_q : at_q + nq].tolist(),
+                                "u": u[at_u : at_u + nu].tolist()}  # fmt: skip
         at_q, at_u = at_q + nq, at_u + nu
     for beam in scene["beam"]:
         n = sum(beam["modes"].values())

@@ -11,8 +11,8 @@ from reference.jets import Array
 
 import mstmm
 
-from .linkages import CRANK, FEET, OBLIQUE, ROCKER, bricard, cranks, four_bar, legs
-from .scenes import andrews, four_bars
+from ..linkages import CRANK, FEET, OBLIQUE, ROCKER, bricard, cranks, four_bar, legs
+from ..scenes import andrews, four_bars
 
 
 def off(model: mstmm.Model, kept: tuple[str, ...], size: float, draw: np.random.Generator) -> Array:

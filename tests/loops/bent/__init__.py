@@ -1,0 +1,1 @@
+"""Closed loops that flexible bodies are part of."""

@@ -1,0 +1,1 @@
+"""Where closed loops begin: assembly, and wishes that cannot be met."""
