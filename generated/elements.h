@@ -1533,6 +1533,62 @@ int mstmm_sweep_modal_modal_effort_slope(int n, const real *restrict H, const re
     const real *restrict e_f, const real *restrict d_H, const real *restrict d_e,
     const real *restrict d_e_f, real *restrict d_tau);
 
+extern const mstmm_element mstmm_sweep_planar_pin;
+int mstmm_sweep_planar_pin_forward(const real *restrict Rt, const real *restrict ro,
+    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
+    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
+    real *restrict qdot);
+int mstmm_sweep_planar_pin_inertia(const real *restrict p, real *restrict S);
+int mstmm_sweep_planar_pin_bias_load(const real *restrict p, const real *restrict motion,
+    real *restrict e);
+int mstmm_sweep_planar_pin_pose(const real *restrict A_I, const real *restrict x_I,
+    const real *restrict Rc, const real *restrict r, real *restrict A, real *restrict x);
+int mstmm_sweep_planar_pin_velocity(const real *restrict Rc, const real *restrict r,
+    const real *restrict v_I, const real *restrict w_I, real *restrict v);
+int mstmm_sweep_planar_pin_factor(const real *restrict Rc, const real *restrict r,
+    const real *restrict J, const real *restrict floor_, const real *restrict S, real *restrict F,
+    real *restrict G, real *restrict S_I);
+int mstmm_sweep_planar_pin_push(const real *restrict Rc, const real *restrict r,
+    const real *restrict G, const real *restrict e, const real *restrict tau, real *restrict y,
+    real *restrict e_I);
+int mstmm_sweep_planar_pin_answer(const real *restrict Rc, const real *restrict r,
+    const real *restrict F, const real *restrict G, const real *restrict y,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
+int mstmm_sweep_planar_pin_complement(real *restrict W);
+int mstmm_sweep_planar_pin_divide(const real *restrict F, const real *restrict y, real *restrict z);
+int mstmm_sweep_planar_pin_couple(const real *restrict y, const real *restrict z,
+    real *restrict L_ij);
+int mstmm_sweep_planar_pin_answered(const real *restrict y, const real *restrict z,
+    real *restrict l);
+int mstmm_sweep_planar_pin_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_planar_pin_push_on_ground(const real *restrict e, const real *restrict tau,
+    real *restrict y);
+int mstmm_sweep_planar_pin_meet(const real *restrict A_C, const real *restrict x_C,
+    const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
+    const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
+    real *restrict d);
+int mstmm_sweep_planar_pin_slip(const real *restrict R_C, const real *restrict r_e,
+    const real *restrict d, const real *restrict v_C, const real *restrict w_C,
+    const real *restrict v_B, const real *restrict w_B, real *restrict slip);
+int mstmm_sweep_planar_pin_drift(const real *restrict R_C, const real *restrict r_e,
+    const real *restrict d, const real *restrict slip, const real *restrict motion_C,
+    const real *restrict motion_B, real *restrict drift);
+int mstmm_sweep_planar_pin_row(const real *restrict w, const real *restrict R_C,
+    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
+    real *restrict J_B);
+int mstmm_sweep_planar_pin_known(const real *restrict W, const real *restrict relative,
+    real *restrict l);
+int mstmm_sweep_planar_pin_told(const real *restrict J_A, const real *restrict J_B,
+    const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
+    real *restrict c);
+int mstmm_sweep_planar_pin_act(const real *restrict J, const real *restrict tau, real *restrict e);
+int mstmm_sweep_planar_pin_close(const real *restrict inverse, const real *restrict K,
+    const real *restrict l, real *restrict S, real *restrict e);
+int mstmm_sweep_planar_pin_shed(const real *restrict inverse, const real *restrict K,
+    const real *restrict L_p, real *restrict K_p);
+int mstmm_sweep_planar_pin_multiplier_more(const real *restrict inverse, const real *restrict K,
+    const real *restrict delta, real *restrict x);
+
 extern const mstmm_element mstmm_sweep_qr;
 int mstmm_sweep_qr_factor(const real *restrict S, real *restrict U);
 int mstmm_sweep_qr_bias(const real *restrict U, const real *restrict motion, real *restrict d,

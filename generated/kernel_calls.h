@@ -2118,6 +2118,345 @@ static inline int mstmm_loops_rolling_drift_slope_by(struct mstmm_loops_rolling_
 }
 #define mstmm_loops_rolling_drift_slope(...) mstmm_loops_rolling_drift_slope_by((struct mstmm_loops_rolling_drift_slope){__VA_ARGS__})
 
+struct mstmm_planar_forward {
+    const real *Rt;
+    const real *ro;
+    const real *p;
+    const real *q;
+    const real *u;
+    const real *s;
+    const real *motion_I;
+    real *Rc;
+    real *r;
+    real *motion;
+    real *qdot;
+};
+static inline int mstmm_planar_forward_by(struct mstmm_planar_forward to)
+{
+    return mstmm_sweep_planar_pin_forward(
+        to.Rt, to.ro, to.p, to.q, to.u, to.s, to.motion_I, to.Rc, to.r, to.motion, to.qdot);
+}
+#define mstmm_planar_forward(...) mstmm_planar_forward_by((struct mstmm_planar_forward){__VA_ARGS__})
+
+struct mstmm_planar_inertia {
+    const real *p;
+    real *S;
+};
+static inline int mstmm_planar_inertia_by(struct mstmm_planar_inertia to)
+{
+    return mstmm_sweep_planar_pin_inertia(
+        to.p, to.S);
+}
+#define mstmm_planar_inertia(...) mstmm_planar_inertia_by((struct mstmm_planar_inertia){__VA_ARGS__})
+
+struct mstmm_planar_bias_load {
+    const real *p;
+    const real *motion;
+    real *e;
+};
+static inline int mstmm_planar_bias_load_by(struct mstmm_planar_bias_load to)
+{
+    return mstmm_sweep_planar_pin_bias_load(
+        to.p, to.motion, to.e);
+}
+#define mstmm_planar_bias_load(...) mstmm_planar_bias_load_by((struct mstmm_planar_bias_load){__VA_ARGS__})
+
+struct mstmm_planar_pose {
+    const real *A_I;
+    const real *x_I;
+    const real *Rc;
+    const real *r;
+    real *A;
+    real *x;
+};
+static inline int mstmm_planar_pose_by(struct mstmm_planar_pose to)
+{
+    return mstmm_sweep_planar_pin_pose(
+        to.A_I, to.x_I, to.Rc, to.r, to.A, to.x);
+}
+#define mstmm_planar_pose(...) mstmm_planar_pose_by((struct mstmm_planar_pose){__VA_ARGS__})
+
+struct mstmm_planar_velocity {
+    const real *Rc;
+    const real *r;
+    const real *v_I;
+    const real *w_I;
+    real *v;
+};
+static inline int mstmm_planar_velocity_by(struct mstmm_planar_velocity to)
+{
+    return mstmm_sweep_planar_pin_velocity(
+        to.Rc, to.r, to.v_I, to.w_I, to.v);
+}
+#define mstmm_planar_velocity(...) mstmm_planar_velocity_by((struct mstmm_planar_velocity){__VA_ARGS__})
+
+struct mstmm_planar_factor {
+    const real *Rc;
+    const real *r;
+    const real *J;
+    const real *floor_;
+    const real *S;
+    real *F;
+    real *G;
+    real *S_I;
+};
+static inline int mstmm_planar_factor_by(struct mstmm_planar_factor to)
+{
+    return mstmm_sweep_planar_pin_factor(
+        to.Rc, to.r, to.J, to.floor_, to.S, to.F, to.G, to.S_I);
+}
+#define mstmm_planar_factor(...) mstmm_planar_factor_by((struct mstmm_planar_factor){__VA_ARGS__})
+
+struct mstmm_planar_push {
+    const real *Rc;
+    const real *r;
+    const real *G;
+    const real *e;
+    const real *tau;
+    real *y;
+    real *e_I;
+};
+static inline int mstmm_planar_push_by(struct mstmm_planar_push to)
+{
+    return mstmm_sweep_planar_pin_push(
+        to.Rc, to.r, to.G, to.e, to.tau, to.y, to.e_I);
+}
+#define mstmm_planar_push(...) mstmm_planar_push_by((struct mstmm_planar_push){__VA_ARGS__})
+
+struct mstmm_planar_answer {
+    const real *Rc;
+    const real *r;
+    const real *F;
+    const real *G;
+    const real *y;
+    const real *delta_I;
+    real *udot;
+    real *delta;
+};
+static inline int mstmm_planar_answer_by(struct mstmm_planar_answer to)
+{
+    return mstmm_sweep_planar_pin_answer(
+        to.Rc, to.r, to.F, to.G, to.y, to.delta_I, to.udot, to.delta);
+}
+#define mstmm_planar_answer(...) mstmm_planar_answer_by((struct mstmm_planar_answer){__VA_ARGS__})
+
+struct mstmm_planar_complement {
+    real *W;
+};
+static inline int mstmm_planar_complement_by(struct mstmm_planar_complement to)
+{
+    return mstmm_sweep_planar_pin_complement(
+        to.W);
+}
+#define mstmm_planar_complement(...) mstmm_planar_complement_by((struct mstmm_planar_complement){__VA_ARGS__})
+
+struct mstmm_planar_divide {
+    const real *F;
+    const real *y;
+    real *z;
+};
+static inline int mstmm_planar_divide_by(struct mstmm_planar_divide to)
+{
+    return mstmm_sweep_planar_pin_divide(
+        to.F, to.y, to.z);
+}
+#define mstmm_planar_divide(...) mstmm_planar_divide_by((struct mstmm_planar_divide){__VA_ARGS__})
+
+struct mstmm_planar_couple {
+    const real *y;
+    const real *z;
+    real *L_ij;
+};
+static inline int mstmm_planar_couple_by(struct mstmm_planar_couple to)
+{
+    return mstmm_sweep_planar_pin_couple(
+        to.y, to.z, to.L_ij);
+}
+#define mstmm_planar_couple(...) mstmm_planar_couple_by((struct mstmm_planar_couple){__VA_ARGS__})
+
+struct mstmm_planar_answered {
+    const real *y;
+    const real *z;
+    real *l;
+};
+static inline int mstmm_planar_answered_by(struct mstmm_planar_answered to)
+{
+    return mstmm_sweep_planar_pin_answered(
+        to.y, to.z, to.l);
+}
+#define mstmm_planar_answered(...) mstmm_planar_answered_by((struct mstmm_planar_answered){__VA_ARGS__})
+
+struct mstmm_planar_pull {
+    const real *y;
+    const real *x;
+    real *y_0;
+};
+static inline int mstmm_planar_pull_by(struct mstmm_planar_pull to)
+{
+    return mstmm_sweep_planar_pin_pull(
+        to.y, to.x, to.y_0);
+}
+#define mstmm_planar_pull(...) mstmm_planar_pull_by((struct mstmm_planar_pull){__VA_ARGS__})
+
+struct mstmm_planar_push_on_ground {
+    const real *e;
+    const real *tau;
+    real *y;
+};
+static inline int mstmm_planar_push_on_ground_by(struct mstmm_planar_push_on_ground to)
+{
+    return mstmm_sweep_planar_pin_push_on_ground(
+        to.e, to.tau, to.y);
+}
+#define mstmm_planar_push_on_ground(...) mstmm_planar_push_on_ground_by((struct mstmm_planar_push_on_ground){__VA_ARGS__})
+
+struct mstmm_planar_meet {
+    const real *A_C;
+    const real *x_C;
+    const real *A_B;
+    const real *x_B;
+    const real *r_e;
+    const real *Rc;
+    const real *r;
+    real *R_C;
+    real *r_A;
+    real *d;
+};
+static inline int mstmm_planar_meet_by(struct mstmm_planar_meet to)
+{
+    return mstmm_sweep_planar_pin_meet(
+        to.A_C, to.x_C, to.A_B, to.x_B, to.r_e, to.Rc, to.r, to.R_C, to.r_A, to.d);
+}
+#define mstmm_planar_meet(...) mstmm_planar_meet_by((struct mstmm_planar_meet){__VA_ARGS__})
+
+struct mstmm_planar_slip {
+    const real *R_C;
+    const real *r_e;
+    const real *d;
+    const real *v_C;
+    const real *w_C;
+    const real *v_B;
+    const real *w_B;
+    real *slip;
+};
+static inline int mstmm_planar_slip_by(struct mstmm_planar_slip to)
+{
+    return mstmm_sweep_planar_pin_slip(
+        to.R_C, to.r_e, to.d, to.v_C, to.w_C, to.v_B, to.w_B, to.slip);
+}
+#define mstmm_planar_slip(...) mstmm_planar_slip_by((struct mstmm_planar_slip){__VA_ARGS__})
+
+struct mstmm_planar_drift {
+    const real *R_C;
+    const real *r_e;
+    const real *d;
+    const real *slip;
+    const real *motion_C;
+    const real *motion_B;
+    real *drift;
+};
+static inline int mstmm_planar_drift_by(struct mstmm_planar_drift to)
+{
+    return mstmm_sweep_planar_pin_drift(
+        to.R_C, to.r_e, to.d, to.slip, to.motion_C, to.motion_B, to.drift);
+}
+#define mstmm_planar_drift(...) mstmm_planar_drift_by((struct mstmm_planar_drift){__VA_ARGS__})
+
+struct mstmm_planar_row {
+    const real *w;
+    const real *R_C;
+    const real *r_e;
+    const real *Rc;
+    const real *r_A;
+    real *J_A;
+    real *J_B;
+};
+static inline int mstmm_planar_row_by(struct mstmm_planar_row to)
+{
+    return mstmm_sweep_planar_pin_row(
+        to.w, to.R_C, to.r_e, to.Rc, to.r_A, to.J_A, to.J_B);
+}
+#define mstmm_planar_row(...) mstmm_planar_row_by((struct mstmm_planar_row){__VA_ARGS__})
+
+struct mstmm_planar_known {
+    const real *W;
+    const real *relative;
+    real *l;
+};
+static inline int mstmm_planar_known_by(struct mstmm_planar_known to)
+{
+    return mstmm_sweep_planar_pin_known(
+        to.W, to.relative, to.l);
+}
+#define mstmm_planar_known(...) mstmm_planar_known_by((struct mstmm_planar_known){__VA_ARGS__})
+
+struct mstmm_planar_told {
+    const real *J_A;
+    const real *J_B;
+    const real *l;
+    const real *delta_A;
+    const real *delta_B;
+    real *c;
+};
+static inline int mstmm_planar_told_by(struct mstmm_planar_told to)
+{
+    return mstmm_sweep_planar_pin_told(
+        to.J_A, to.J_B, to.l, to.delta_A, to.delta_B, to.c);
+}
+#define mstmm_planar_told(...) mstmm_planar_told_by((struct mstmm_planar_told){__VA_ARGS__})
+
+struct mstmm_planar_act {
+    const real *J;
+    const real *tau;
+    real *e;
+};
+static inline int mstmm_planar_act_by(struct mstmm_planar_act to)
+{
+    return mstmm_sweep_planar_pin_act(
+        to.J, to.tau, to.e);
+}
+#define mstmm_planar_act(...) mstmm_planar_act_by((struct mstmm_planar_act){__VA_ARGS__})
+
+struct mstmm_planar_close {
+    const real *inverse;
+    const real *K;
+    const real *l;
+    real *S;
+    real *e;
+};
+static inline int mstmm_planar_close_by(struct mstmm_planar_close to)
+{
+    return mstmm_sweep_planar_pin_close(
+        to.inverse, to.K, to.l, to.S, to.e);
+}
+#define mstmm_planar_close(...) mstmm_planar_close_by((struct mstmm_planar_close){__VA_ARGS__})
+
+struct mstmm_planar_shed {
+    const real *inverse;
+    const real *K;
+    const real *L_p;
+    real *K_p;
+};
+static inline int mstmm_planar_shed_by(struct mstmm_planar_shed to)
+{
+    return mstmm_sweep_planar_pin_shed(
+        to.inverse, to.K, to.L_p, to.K_p);
+}
+#define mstmm_planar_shed(...) mstmm_planar_shed_by((struct mstmm_planar_shed){__VA_ARGS__})
+
+struct mstmm_planar_multiplier_more {
+    const real *inverse;
+    const real *K;
+    const real *delta;
+    real *x;
+};
+static inline int mstmm_planar_multiplier_more_by(struct mstmm_planar_multiplier_more to)
+{
+    return mstmm_sweep_planar_pin_multiplier_more(
+        to.inverse, to.K, to.delta, to.x);
+}
+#define mstmm_planar_multiplier_more(...) mstmm_planar_multiplier_more_by((struct mstmm_planar_multiplier_more){__VA_ARGS__})
+
 struct mstmm_classical_body_transfer {
     const real *M;
     const real *r_IO;

@@ -68,9 +68,10 @@ const mstmm_element *const mstmm_elements[] = {
     &mstmm_sweep_link_screw,
     &mstmm_sweep_loops,
     &mstmm_sweep_modal,
+    &mstmm_sweep_planar_pin,
     &mstmm_sweep_qr,
     &mstmm_sweep_tangent,
     NULL,
 };
 
-const int mstmm_element_count = 66;
+const int mstmm_element_count = 67;

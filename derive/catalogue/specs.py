@@ -31,6 +31,7 @@ from .kernels import (
     screw_kernels,
     tangent_kernels,
 )
+from .planar import planar_spec
 from .registry import Element, builtin_elements, builtin_hinges, kind_of
 from .slopes import with_slopes
 
@@ -129,11 +130,8 @@ def shared_specs() -> list[ElementSpec]:
 
 def all_specs() -> list[ElementSpec]:
     """Everything that is generated: what runs need, compiled or replayed."""
-    return [
-        *(spec_of(e) for e in builtin_elements()),
-        *shared_specs(),
-        *(classical_spec(name) for name in RUN),
-    ]
+    made = [*(spec_of(e) for e in builtin_elements()), *shared_specs()]
+    return [*made, planar_spec(made), *(classical_spec(name) for name in RUN)]
 
 
 def on_demand_specs() -> list[ElementSpec]:

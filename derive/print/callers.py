@@ -24,6 +24,7 @@ DIRECT = {
     "tangent": ("sweep", "tangent"),
     "qr": ("sweep", "qr"),
     "loops": ("sweep", "loops"),
+    "planar": ("sweep", "planar_pin"),
     "classical_body": ("classical", "body_spatial"),
     "classical_pin": ("classical", "pin_spatial"),
     "classical_ball": ("classical", "ball"),

@@ -22,6 +22,7 @@ from .loops import (
     UNLOADED,
 )
 from .motion import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
+from .planar import in_plane
 from .qr import QR_CONDENSE, QR_OWN
 from .riccati import CONDENSE, RECOVER
 from .solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
@@ -61,19 +62,28 @@ _CLOSED = (
     Run(whole=CLOSURES_ANSWERED),
 )
 
+
+def _either(run: Run, when: str) -> tuple[Run, ...]:
+    """A pass in space or in a plane."""
+    if run.whole is None or in_plane(run.whole).steps == run.whole.steps:
+        return (replace(run, when=when),)
+    flat = Run(whole=in_plane(run.whole), when=f"{when} planar")
+    return (replace(run, when=f"{when} !planar"), flat)
+
+
 ACCELERATIONS = Sweep(
     "accelerations", "Rates of the coordinates and accelerations.",
     (
         *_GIVEN,
         Run(hook="links_forward", when="linked"),
-        Run(whole=FORWARD, when="!linked"),
+        *_either(Run(whole=FORWARD), "!linked"),
         Run(whole=QR_OWN, when="qr"),
         Run(whole=EFFORTS_POWER, when="balance efforts"),
         Run(whole=EFFORTS),
         Run(whole=LAWS),
         Run(whole=RESTATED, when="refined"),
         Run(whole=STRAIN, when="balance flexible"),
-        Run(whole=POSES, when="posed"),
+        *_either(Run(whole=POSES), "posed"),
         Run(hook="product_before_loads", when="product"),
         *_APPLIED,
         Run(hook="product", when="product"),
@@ -82,7 +92,7 @@ ACCELERATIONS = Sweep(
         Run(whole=CONDENSE, when="!linked !qr !looped"),
         Run(whole=QR_CONDENSE, when="qr"),
         Run(whole=RECOVER, when="!linked !looped"),
-        *(replace(run, when="looped") for run in _CLOSED),
+        *(one for run in _CLOSED for one in _either(run, "looped")),
         Run(whole=DRIVE_POWER, when="balance"),
         Run(whole=COUPLINGS_ANSWERED, when="couplings"),
         Run(hook="product_compared", when="product"),

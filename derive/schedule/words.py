@@ -373,6 +373,7 @@ TRAITS: dict[str, str] = {
     "coupled": "the open row is a coupling of the hinge's speeds",
     "gaping": "a gap",
     "slipping": "a slip",
+    "planar": "every hinge is a free pin, all of them are parallel, and nobody observes",
     "qr": "the sweep is that of least squares",
     "rigid": "the body is the built-in rigid one",
     "kept": "somebody reads S and e behind the sweep",

@@ -57,26 +57,47 @@ class Inliner:
 
 
 def unrolled(kernel: KernelIR, n: int) -> KernelIR:
-    """The kernel for one value of its run-time size: no loops, solves by elimination.
+    """The kernel for one value of its run-time size: no loops, solves by elimination."""
+    return instance(kernel, elements, lambda _, found: found, n)
 
-    Guards and failure codes are those of `kernel`; a guard behind a store stands before it.
+
+def elements(graph: Graph, port: Port) -> Nodes:
+    """The entries of an array, row-major."""
+    places = product(*(range(int(extent)) for extent in port.shape))
+    return [graph.element(port.name, *place) for place in places]
+
+
+def instance(
+    kernel: KernelIR,
+    given: Callable[[Graph, Port], Nodes],
+    kept: Callable[[Port, Nodes], Sequence[Node | None]],
+    n: int = 0,
+) -> KernelIR:
+    """The kernel of what is known of its arguments, for one value of a run-time size.
+
+    `given` tells the numbers of an input, flat; inputs all of whose numbers are known are none of
+    the instance.  `kept` tells what is written of an output, None of what is not.  Guards and
+    failure codes are those of `kernel`; a guard behind a store stands before it.
     """
 
     def fixed(port: Port) -> Port:
         return replace(port, shape=tuple(n if isinstance(e, str) else e for e in port.shape))
 
     graph = Graph()
-    inputs, outputs = map(fixed, kernel.inputs), [fixed(port) for port in kernel.outputs]
-    taken = tuple(inputs)
-    given = {port.name: [graph.element(port.name, *i) for i in _places(port)] for port in taken}
+    taken, outputs = ([*map(fixed, ports)] for ports in (kernel.inputs, kernel.outputs))
+    numbers = {port.name: given(graph, port) for port in taken}
 
     def judge(condition: Node, judged: Guard | Solve) -> None:
         graph.guard(condition, judged.code, judged.message)
 
-    found = _Replay(graph, kernel, given, judge, n).run()
-    values = {port.name: _nested(port.shape, found[port.name]) for port in outputs}
+    found = _Replay(graph, kernel, numbers, judge, n).run()
+    values = {port.name: _nested(port.shape, kept(port, found[port.name])) for port in outputs}
+    inputs = [
+        port for port in taken
+        if not numbers[port.name] or any(node.value is None for node in numbers[port.name])
+    ]  # fmt: skip
     return graph.kernel(
-        kernel.name, taken, outputs, values, purpose=kernel.purpose, sources=kernel.sources
+        kernel.name, inputs, outputs, values, purpose=kernel.purpose, sources=kernel.sources
     )
 
 
@@ -120,11 +141,7 @@ class _Replay(Counted):
         self.results[solve.port][:] = [node for row in found for node in row]
 
 
-def _places(port: Port) -> list[tuple[int, ...]]:
-    return list(product(*(range(int(extent)) for extent in port.shape)))
-
-
-def _nested(shape: tuple[int | str, ...], row: Nodes) -> object:
+def _nested(shape: tuple[int | str, ...], row: Sequence[Node | None]) -> object:
     """Nested lists in a port's shape of its numbers, row-major."""
     if not shape:
         return row[0]

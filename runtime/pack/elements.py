@@ -35,6 +35,9 @@ class Elements:
         """KeyError if nobody defines it."""
         return self.known[key] if key in self.known else prebuilt.elements()[key]
 
+    def __contains__(self, key: Key) -> bool:
+        return key in self.known or key in prebuilt.elements()
+
     def get(self, kind: str, name: str, user: str) -> Element:
         """The element that `user` names as its type; SceneError if nobody defines it."""
         try:

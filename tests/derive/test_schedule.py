@@ -11,7 +11,7 @@ import pytest
 
 import mstmm
 from mstmm.cli import stored
-from mstmm.derive.print.callers import POINTED, callees, calls_header
+from mstmm.derive.print.callers import DIRECT, POINTED, callees, calls_header
 from mstmm.derive.print.sweep import function_text, passes, sweep_files
 from mstmm.derive.schedule.slope import D, Sloped, ports_of
 from mstmm.derive.schedule.steps import Call, Pass, Step, call, inner
@@ -35,7 +35,7 @@ def calls() -> list[Call]:
 def kernel_of(step: Call) -> KernelIR:
     """A kernel with the ports of the one that is called."""
     element, _, name = step.kernel.partition(".")
-    key = ("sweep", element)
+    key = DIRECT.get(element, ("sweep", element))
     if element.startswith("generic{"):
         key = ("sweep", "generic6")
     elif element in POINTED:

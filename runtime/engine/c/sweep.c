@@ -78,6 +78,8 @@ int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const
                          .qdot = qdot, .udot = udot, .required = NULL, .answer = NULL,
                          .balance = balance, .failure = failure,
                          .linked = !(model->needs_pose || model->product || model->qr),
+                         .planar = model->planar && !balance
+                                   && !(model->refines || model->product || model->qr),
                          .observed = 0,
                          .hinges_known = 0, .level = 0, .give = 0, .refined = 0, .asked = NULL, .strike = NULL};
     if (balance) balance->power = balance->potential = 0;

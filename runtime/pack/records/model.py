@@ -11,6 +11,7 @@ from mstmm.numbers.pieces import Pieces
 
 from ...kernels import prebuilt
 from ..elements import Elements
+from ..loops.plane import moves_in_a_plane
 from ..reach import Reach, reach_of
 from ..system import ForceNumbers, LoadNumbers, System
 from .bodies import BodyRecords
@@ -72,6 +73,7 @@ def write(system: System, elements: Elements) -> Written:
         record.own = int(own)
     model.forces, model.n_forces = forces, len(system.forces)
     model.needs_pose = int(bool(system.forces or system.loads or system.dragged or system.closes))
+    model.planar = int(moves_in_a_plane(system, elements))
     model.inputs = write_inputs(system.inputs, system.held.places, memory)
     model.n_inputs = len(system.inputs)
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
