@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 from ..errors import ElementError, SceneError
 from ..ir.facts import builtin_hinges
 from ..ir.spec import ElementSpec
-from ..scene import Scene
+from ..scene import Scene, load_scene
 
 if TYPE_CHECKING:
     from ..derive.catalogue.registry import Element
@@ -30,7 +31,7 @@ class Generated:
 
 
 def compile_scene(
-    scene: Scene,
+    scene: Scene | str | os.PathLike[str],
     engine: str = "auto",
     sweep: str = "riccati",
     accuracy: float = 1e-8,
@@ -40,7 +41,7 @@ def compile_scene(
     """Model of a scene, ready to compute.
 
     Args:
-        scene: validated scene (`load_scene`, or `Scene(...)`).
+        scene: validated scene (`load_scene`, or `Scene(...)`), or the path of a scene file.
         engine: "looped" (element kernels driven by a loop: any size, no compiler), "fused" (code
             of this scene alone, compiled now or found in the cache; a C compiler is needed, pays
             up to about 60 bodies, possible up to 400), or "auto": fused code that is in the cache
@@ -62,10 +63,10 @@ def compile_scene(
     leave a motion of the start undetermined, and outputs of what results do not have;
     EnvironmentFailure if engine="fused" and there is no compiler or it fails.
     """
+    if isinstance(scene, str | os.PathLike):
+        scene = load_scene(scene)
     if not isinstance(scene, Scene):
-        raise SceneError(
-            f"{scene!r:.60}: expected a Scene: mstmm.load_scene(...) of a file, or mstmm.Scene(...)"
-        )
+        raise SceneError(f"{scene!r:.60}: expected a Scene, or the path of a scene file")
     model = compile_level(scene, engine, sweep, accuracy, bake, flexibility)
     if flexibility is None:
         model.refuse_unknown_outputs()

@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import ConfigDict, ValidationError, model_validator
 
 from ..ir.spec import ElementSpec
+from ..markup import table as html_table
 from ..risk import Risk, sentences
 from .checks import couplings, flexible, types
 from .checks import scene as checks
@@ -60,6 +61,23 @@ class Scene(SceneTables):
             return cls(**data)
         finally:
             _source.reset(token)
+
+    @property
+    def summary(self) -> str:
+        """How much there is of what: 3 bodies, 3 hinges, 1 spring."""
+        counts = {"body": len(self.bodies), "hinge": len(self.hinges)}
+        counts |= {name: len(getattr(self, name)) for name in _COUNTED}
+        return ", ".join(_count(n, word) for word, n in counts.items() if n)
+
+    def __repr__(self) -> str:
+        return f"<Scene: {self.summary}>"
+
+    def _repr_html_(self) -> str:
+        hinges = [(one.name, one.type, one.inboard, one.outboard) for one in self.hinges[:_LISTED]]
+        head = ("hinge", "type", "inboard", "outboard")
+        more = len(self.hinges) - len(hinges)
+        behind = f"<p>and {more} more</p>" if more else ""
+        return f"<p>{self.summary}</p>{html_table(hinges, head)}{behind}"
 
     @property
     def risks(self) -> tuple[Risk, ...]:
@@ -110,6 +128,17 @@ class Scene(SceneTables):
         if problems:
             raise Refused(*problems)
         return self
+
+
+#: Tables that a summary counts besides bodies and hinges; hinges that a notebook lists.
+_COUNTED = ("beam", "elastic", "load", "spring", "bushing", "constraint", "coupling", "event")
+_LISTED = 20
+_MANY = {"body": "bodies", "elastic": "elastic bodies", "bushing": "bushings"}
+
+
+def _count(n: int, word: str) -> str:
+    one = "elastic body" if word == "elastic" else word
+    return f"{n} {one if n == 1 else _MANY.get(word, word + 's')}"
 
 
 #: Tables whose elements need no name.

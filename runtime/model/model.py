@@ -15,6 +15,7 @@ from mstmm.arrays import Array, batch, one, one_row, pair, real
 from mstmm.arrays import columns as columns_of
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.markup import table
 from mstmm.risk import Risk
 
 from ..engine.compiled import Compiled
@@ -49,6 +50,14 @@ class Model(Compiled):
     `q` and `u` hold the hinges in the scene's order (`layout`); SI units and radians; speeds and
     quaternions of ball and free hinges in outboard axes, quaternions w, x, y, z.
     """
+
+    def __repr__(self) -> str:
+        free = len(self.free_speeds)
+        return f"<Model: {self.scene.summary}, {free} degrees of freedom; {self.engine}>"
+
+    def _repr_html_(self) -> str:
+        rows = [("degrees of freedom", len(self.free_speeds)), ("engine", self.engine_choice)]
+        return table(rows) + self.scene._repr_html_()
 
     @cached_property
     def _differentiations(self) -> dict[tuple[str, ...], Differentiation]:

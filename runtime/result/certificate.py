@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from mstmm.markup import table
 from mstmm.risk import Risk, sentences
 
 from ..integrate.reached import ReachedError
@@ -122,6 +123,15 @@ class Certificate:
 
     def text(self, verdict: bool = True, warnings: bool = True) -> str:
         """All of it as lines, a name and what is to be said of it; the verdict first."""
+        rows = self.rows(verdict, warnings)
+        width = max(len(name) for name, _ in rows)
+        return "\n".join(f"{name.ljust(width)}  {text}" for name, text in rows)
+
+    def _repr_html_(self) -> str:
+        return table(self.rows())
+
+    def rows(self, verdict: bool = True, warnings: bool = True) -> list[tuple[str, str]]:
+        """The same as pairs of a name and what is to be said of it."""
         few = "not determined: one sample tells of no change; ask for more output times"
         rows = [("verdict", str(self.verdict()))] if verdict else []
         rows.append(("run", self.end))
@@ -147,8 +157,7 @@ class Certificate:
         rows += certify.rows(self.flexible)
         rows += _error_rows(self)
         rows += [("warning", text) for text in self.warnings] if warnings else []
-        width = max(len(name) for name, _ in rows)
-        return "\n".join(f"{name.ljust(width)}  {text}" for name, text in rows)
+        return rows
 
 
 # --- verdict --------------------------------------------------------------------------------------

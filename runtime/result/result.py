@@ -8,6 +8,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mstmm.markup import table
+
 from .certificate import Certificate
 from .record import Record
 
@@ -133,6 +135,12 @@ class Result(Record):
         report = import_module("mstmm").report
         made: Path = report(self, path, title=title, quantities=quantities, trails=trails)
         return made
+
+    def _repr_html_(self) -> str:
+        certificate = self.certificate
+        samples = f"{len(self.t)}, t = {self.t[0]:g} to {self.t[-1]:g} s" if len(self.t) else "none"
+        rows = [("samples", samples), ("method", self.settings.method), *certificate.rows()]
+        return table(rows)
 
     def __repr__(self) -> str:
         return f"<Result: {self.trajectory.message}; {len(self.t)} samples>"

@@ -11,7 +11,7 @@ from cli.commands import Command, folder, mstmm  # noqa: F401  (fixtures)
 from PIL import Image
 from view import browser, scenes
 
-from mstmm.bridge.reporting import document
+from mstmm import markup
 from mstmm.errors import SceneError
 
 #: Nothing may be fetched: the page names no other place but in what readers may follow themselves.
@@ -60,8 +60,8 @@ def test_refusals(tmp_path: Path) -> None:
 
 
 def test_everything_is_escaped() -> None:
-    made = document.table([("<script>", "a & b")], ("<i>",)) + document.bullets(["</ul><b>"])
-    made += document.folded("<x>", "")
+    made = markup.table([("<script>", "a & b")], ("<i>",)) + markup.bullets(["</ul><b>"])
+    made += markup.folded("<x>", "")
     assert "<script>" not in made
     assert "<i>" not in made
     assert "<b>" not in made

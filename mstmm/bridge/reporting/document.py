@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from html import escape
+from collections.abc import Sequence
 
-from ...printable import printable
+from ...markup import text
 
 #: Nothing is fetched from anywhere; scripts and pictures are those of the page itself, and what
 #: moves makes functions of its own (viser's decoder, compiled to WebAssembly).
@@ -31,33 +30,6 @@ details { margin: .6rem 0; } summary { cursor: pointer; color: var(--accent); }
 details > h1 { font-size: 1.2rem; margin-top: .8rem; }
 a { color: var(--accent); }
 """
-
-
-def text(words: object) -> str:
-    """Anything as text that a page can hold."""
-    return escape(printable(str(words)))
-
-
-def table(rows: Iterable[Sequence[object]], head: Sequence[str] = ()) -> str:
-    """Rows of text; without a head the first of each row names it."""
-    first = "".join(f"<th>{text(one)}</th>" for one in head)
-    lines = [f"<tr>{first}</tr>"] if head else []
-    for row in rows:
-        cells = [f"<td>{text(one)}</td>" for one in row]
-        if not head:
-            cells[0] = f"<th>{text(row[0])}</th>"
-        lines.append(f"<tr>{''.join(cells)}</tr>")
-    return f'<div class="wide"><table class="rows">{"".join(lines)}</table></div>'
-
-
-def bullets(sentences: Iterable[object]) -> str:
-    """A list of sentences."""
-    return f"<ul>{''.join(f'<li>{text(one)}</li>' for one in sentences)}</ul>"
-
-
-def folded(summary: str, body: str) -> str:
-    """What is read by those who ask for it."""
-    return f"<details><summary>{text(summary)}</summary>{body}</details>"
 
 
 def section(name: str, title: str, body: str) -> str:

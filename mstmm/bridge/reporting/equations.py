@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 
 from ...errors import ElementError
+from ...markup import folded, text
 from ...scene import Scene
 from ...scene.checks.types import types
-from .document import folded, text
 
 
 def equations(scene: Scene) -> tuple[str, str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from .document import bullets, folded, table, text
+from ...markup import bullets, folded, table, text
 
 if TYPE_CHECKING:
     from ...runtime.result.result import Result
@@ -112,8 +112,7 @@ def _loops(result: Result) -> str:
 
 def certificate(result: Result) -> str:
     """Every line of the certificate, and the risks with their remedies."""
-    lines = result.certificate.text(verdict=False, warnings=False).splitlines()
-    body = f"<pre>{text(chr(10).join(lines))}</pre>"
+    body = table(result.certificate.rows(verdict=False, warnings=False))
     risks = [(risk.element, risk.means, risk.remedy) for risk in result.risks]
     if risks:
         body += "<h3>What asks for attention</h3>" + table(risks, ("of", "what", "remedy"))

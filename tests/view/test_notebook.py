@@ -1,0 +1,65 @@
+"""What a notebook or a prompt shows of scenes, models, results and certificates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from view import scenes
+
+import mstmm
+from mstmm.errors import SceneError
+
+
+def cells(shown: str) -> list[str]:
+    """Texts of all cells; the markup must be well formed."""
+    return [one.text or "" for one in ElementTree.fromstring(f"<p>{shown}</p>").iter() if one.text]
+
+
+def test_a_scene() -> None:
+    scene = mstmm.Scene(**scenes.SCENE)
+    assert repr(scene) == "<Scene: 2 bodies, 3 hinges, 1 beam, 1 spring>"
+    assert {"elbow", "ball", "blade.tip", "rod"} <= set(cells(scene._repr_html_()))
+
+
+def test_a_long_scene_is_cut() -> None:
+    rod = {"mass": 1.0, "inertia": [1, 1, 1], "ends": {"tip": [1, 0, 0]}}
+    chain = {"name": "rope", "count": 50, "inboard": "ground", "end": "tip", "body": [rod],
+             "hinge": [{"type": "pin"}]}  # fmt: skip
+    shown = cells(mstmm.Scene(gravity=[0, 0, 0], chain=[chain])._repr_html_())
+    assert "and 30 more" in shown
+    assert "rope[19].hinge" in shown
+    assert "rope[20].hinge" not in shown
+
+
+def test_a_model_and_a_result() -> None:
+    model, run = scenes.model(), scenes.run()
+    assert repr(model).startswith("<Model: 2 bodies, 3 hinges, 1 beam, 1 spring, 7 degrees of")
+    assert "degrees of freedom" in cells(model._repr_html_())
+    shown = cells(run._repr_html_())
+    assert "201, t = 0 to 2 s" in shown
+    assert str(run.certificate.verdict()) in shown
+    assert set(cells(run.certificate._repr_html_())) <= set(shown)
+
+
+def test_a_view_shows_itself() -> None:
+    shown = scenes.run().view(speed=20.0)._repr_html_()
+    assert shown.startswith("<iframe srcdoc=")
+    assert shown.count('"') == 4  # everything of the page within is escaped
+
+
+def test_the_package_shows_its_public_names() -> None:
+    assert dir(mstmm) == sorted(mstmm.__all__)
+    assert all(hasattr(mstmm, name) for name in dir(mstmm))
+
+
+def test_compile_takes_the_path_of_a_scene(tmp_path: Path) -> None:
+    path = tmp_path / "arm.toml"
+    path.write_text(mstmm.Scene(**scenes.SCENE).to_toml())
+    for given in (path, str(path)):
+        assert mstmm.compile(given, engine="looped").scene == mstmm.Scene(**scenes.SCENE)
+    with pytest.raises(SceneError, match="there is no such file"):
+        mstmm.compile(str(tmp_path / "leg.toml"))
+    with pytest.raises(SceneError, match="expected a Scene, or the path of a scene file"):
+        mstmm.compile(3)  # type: ignore[arg-type]
