@@ -14,6 +14,8 @@
 #define MSTMM_FAILED_CONTROLLER 10
 #define MSTMM_FAILED_LOOP 11
 #define MSTMM_FAILED_BOUNCE 12
+#define MSTMM_FAILED_COUPLING 13
+#define MSTMM_FAILED_FLAT 14
 /* What a kernel returns behind its last result if a determinant is negative (mstmm.ir.statements). */
 #define MSTMM_NEGATIVE 2
 

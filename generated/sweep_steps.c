@@ -1128,7 +1128,7 @@ static int mstmm_at_closures(mstmm_state *state, int index)
         code = mstmm_loops_rolling(
             .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C, .d = closed + MSTMM_CLOSURE_D,
             .W = closed + MSTMM_CLOSURE_W, .gap = closed + MSTMM_CLOSURE_GAP);
-        if (code) return mstmm_fail(state, MSTMM_FAILED_LOOP, index, code);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_FLAT, index, code);
     }
     if (state->level == MSTMM_GAP) {
         mstmm_loops_known(
@@ -1964,7 +1964,7 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
         code = mstmm_loops_rolling(
             .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C, .d = closed + MSTMM_CLOSURE_D,
             .W = closed + MSTMM_CLOSURE_W, .gap = closed + MSTMM_CLOSURE_GAP);
-        if (code) return mstmm_fail(state, MSTMM_FAILED_LOOP, index, code);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_FLAT, index, code);
     }
     mstmm_loops_drift(
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,

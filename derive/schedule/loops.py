@@ -73,7 +73,7 @@ _MEETING = (
 _CONSTRAINED = (
     call("loops.distance", when="distance", p="closure.p", d="closure.d", **_OWN),
     call("loops.plane", when="plane", p="closure.p", d="closure.d", **_OWN),
-    call("loops.rolling", when="rolling", fails="loop", p="closure.p", R_C="closure.R_C",
+    call("loops.rolling", when="rolling", fails="flat", p="closure.p", R_C="closure.R_C",
          d="closure.d", **_OWN),
 )  # fmt: skip
 _DRIFT = call("loops.drift", **_MET, d="closure.d", slip="closure.slip", motion_C="body.motion",

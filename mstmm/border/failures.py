@@ -29,6 +29,10 @@ class Failed(IntEnum):
     CONTROLLER = 10
     """A controller measures, or gives, what is not finite."""
     LOOP = 11
-    """A loop cannot be closed near a state."""
+    """A loop cannot be closed near a state; the element is the frame of what closes it."""
     BOUNCE = 12
     """Nothing can give way to the strike of an event."""
+    COUPLING = 13
+    """A coupling cannot be met near a state; the element is its number."""
+    FLAT = 14
+    """A disc that rolls lies flat on its plane."""

@@ -11,11 +11,9 @@ from typing import Any, Self
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.border.failures import Failed
-from mstmm.ir.statements import NEGATIVE
-from mstmm.scene import Bushing, Spring
 
 from ..pack.packed import Packed
+from .failures import failure_text
 
 
 @dataclass(frozen=True)
@@ -182,108 +180,10 @@ class Calls:
         packed = self.packed
         return packed.scene.bodies.name(packed.topology.at(position)[0])
 
-    def _undefined_force(self, element: Spring | Bushing, at: str) -> str:
-        if isinstance(element, Bushing):
-            return (
-                f'bushing "{element.name}" {at}: its ends are turned by more than 170 degrees from '
-                "rest, beyond its law; make it stiffer, or put a hinge with a law in its place"
-            )
-        return (
-            f'spring "{element.name}" {at}: its direction is undefined because its ends coincide; '
-            "move one of them, or put an elastic hinge or a bushing in its place"
-        )
-
     def failure_text(self, failure: Any, t: float) -> str:
         """A failure of the engine as a sentence: element, cause, time, one way out."""
-        at = f"at t = {t:.9g} s"
-        reason, element = int(failure.reason), int(failure.element)
-        if reason == Failed.UNDETERMINED and self.is_flexible(element):
-            return (
-                f'hinge "{self.hinge_name(element)}" {at}: what it moves has no positive inertia '
-                f'left: the shapes of the flexible body "{self.body_name(element).split("/")[0]}" '
-                "carry it all, or its deflection is beyond the stiffened model; use fewer shapes, "
-                'frame = "chord" or "mean", quadrature = true, or split it into welded beams'
-            )
-        if reason == Failed.UNDETERMINED:
-            return (
-                f'hinge "{self.hinge_name(element)}" {at}: a motion of it is undetermined, because '
-                "what it carries has no positive inertia in that direction (a thin rod on a ball, "
-                "a point mass, collinear axes, three angles at their lock, a negative principal "
-                "moment); give the body inertia, give the hinge rotor inertia (law.inertia), fix "
-                "that motion, or take a ball hinge for three angles"
-            )
-        if reason == Failed.FORCE:
-            return self._undefined_force(self.packed.scene.forces[element], at)
-        if reason == Failed.HINGE:
-            return f'hinge "{self.hinge_name(element)}" {at}: its definition fails in this state'
-        if reason == Failed.SECTION:
-            name = self.hinge_name(element).replace("/", ".")
-            return (
-                f'"{name}" {at}: a section turns by more than 1.5 rad against its floating frame, '
-                "far beyond small deflections; split the body into several that are welded together"
-            )
-        if reason == Failed.MODES:
-            name = self.body_name(element)
-            return (
-                f'flexible body "{name}" {at}: its modal mass matrix is not positive definite; '
-                'use fewer shapes, frame = "chord" or "mean", or quadrature = true'
-            )
-        if reason == Failed.TANGENT:
-            name = self.hinge_name(element) if element >= 0 else ""
-            what = f'hinge "{name}"' if name else "what acts between bodies"
-            if int(failure.code) == NEGATIVE:
-                return (
-                    f"{what} {at}: a motion leaves by itself faster than the step allows (a "
-                    "negative stiffness, a body that topples or buckles, inertia that vanishes); "
-                    "take a shorter step, or give the motion inertia (law.inertia) or a spring"
-                )
-            return (
-                f"{what} {at}: the equations of an implicit step leave a motion undetermined: no "
-                "inertia, stiffness or damping holds it, or a negative stiffness cancels them; "
-                "take a shorter step, or give the motion inertia (law.inertia) or a spring"
-            )
-        if reason == Failed.LOOP and int(failure.code):
-            return (
-                f"{self.closing(element)} {at}: the disc lies flat on its plane and touches it in "
-                "more than a point; end the run before, by an [[event]], or start it upright"
-            )
-        if reason == Failed.LOOP:
-            bodies = self.packed.system.count
-            if element >= bodies:
-                name = self.packed.system.couplings[element - bodies].name
-                return (
-                    f'coupling "{name}" {at}: it does not hold, and no state near makes it hold; '
-                    "see whether drives and other couplings ask for something else"
-                )
-            return (
-                f"{self.closing(element)} {at}: the loop that it closes is open, and "
-                "no state near closes it; start from model.assemble(q, u), or see whether a drive "
-                "asks for more than the mechanism can do"
-            )
-        if reason == Failed.PRODUCT_PIVOT:
-            return (
-                f'hinge "{self.hinge_name(element)}" {at}: the pivot of its classical matrix '
-                'vanishes, so the product does not exist in this state; use sweep = "riccati"'
-            )
-        if reason == Failed.PRODUCT_ERROR:
-            return (
-                f"the product of transfer matrices {at}: its deviation from the Riccati sweep "
-                "exceeds the accuracy asked for (errors grow geometrically along the chain); "
-                'use sweep = "riccati"'
-            )
-        if reason == Failed.BOUNCE:
-            name = self.packed.described.event[element].name
-            return (
-                f'event "{name}" {at}: nothing can give way to its strike, because what it strikes '
-                "is driven or held; let another place bounce, or release the hinge"
-            )
-        if reason == Failed.CONTROLLER:
-            name = self.packed.described.controller[element].name
-            return (
-                f'controller "{name}" {at}: what it measures or gives is not finite; see whether '
-                "the closed loop is stable, with a shorter sample_time perhaps"
-            )
-        return f"an expression of the scene cannot be evaluated {at}"
+        reason, element, code = int(failure.reason), int(failure.element), int(failure.code)
+        return failure_text(self, reason, element, code, t)
 
 
 def _first(texts: list[str]) -> str:

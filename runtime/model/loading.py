@@ -13,9 +13,9 @@ from mstmm.errors import MstmmError, SceneError
 from mstmm.extras import missing
 from mstmm.scene import Scene
 
-from ..engine.identity import kernels_hash
 from ..host.files import refuse_special, seal_is_broken
 from ..kernels import store
+from ..kernels.identity import kernels_hash
 from ..result.output import provenance
 from ..result.result import Result
 from ..run.stability import check_step
@@ -108,7 +108,7 @@ def _rebuilt(data: Any, path: Path) -> Result:
     run = provenance.trajectory(data)
     if not _fits(model, run):
         raise SceneError(f'result file "{path}": its states do not fit its scene')
-    if data.attrs["kernels_sha256"] != kernels_hash(model):
+    if data.attrs["kernels_sha256"] != kernels_hash(model.known):
         note = "saved with other kernels: quantities beyond q and u come from the present ones"
         run = replace(run, notes=(*run.notes, note))
     step = None

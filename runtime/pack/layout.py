@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence, ValuesView
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import overload
 
@@ -16,6 +16,8 @@ from mstmm.scene import Scene
 
 #: Speeds up to which dense matrices are made: 3 GB a matrix.
 _DENSE = 20_000
+#: Behind the name of a constraint, that of what holds its frame: no scene has such a hinge.
+OF_CONSTRAINT = "/constraint"
 
 
 def refuse_dense(nu: int, what: str) -> None:
@@ -106,6 +108,11 @@ class Group:
         return np.asarray(np.array(pattern, dtype=np.int64)[which] + repeats * length)
 
 
+def _shown(name: str) -> str:
+    """The name under which users know what has coordinates."""
+    return name.removesuffix(OF_CONSTRAINT)
+
+
 class Layout:
     """Layout of q (nq) and u (nu) by hinge: the scene's hinges, then those of its chains.
 
@@ -179,8 +186,13 @@ class Layout:
 
     @property
     def owners(self) -> Iterator[HingeSlots]:
-        """Slots of everything that has coordinates: hinges, then flexible bodies."""
+        """Slots of everything that has coordinates, in their order: hinges, constraints with
+        coordinates of their own by their names, flexible bodies."""
         yield from self.hinges.values()
+        for number in self.internal:
+            slots = self.slots(number)
+            if slots.nq:
+                yield replace(slots, name=_shown(slots.name))
         yield from self.modal.values()
 
     def _modal_at(self, entry: int, letter: str) -> HingeSlots | None:
@@ -195,12 +207,12 @@ class Layout:
         slots = self._modal_at(entry, "q")
         if slots is None:
             slots = self.slots(int(np.searchsorted(self.q_places, entry, side="right")) - 1)
-        return f"{slots.name}.{slots.q_names[entry - slots.q]}"
+        return f"{_shown(slots.name)}.{slots.q_names[entry - slots.q]}"
 
     def u_name(self, entry: int) -> str:
         """`hinge.speed` of one entry of u."""
         slots = self.hinge_of_speed(entry)
-        return f"{slots.name}.{slots.u_names[entry - slots.u]}"
+        return f"{_shown(slots.name)}.{slots.u_names[entry - slots.u]}"
 
     def hinge_of_speed(self, entry: int) -> HingeSlots:
         """The hinge, or flexible body, to which an entry of u belongs."""

@@ -16,10 +16,10 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import EnvironmentFailure, SceneError
 
-from ..engine.identity import kernels_hash
 from ..host.files import read_arrays, refuse_special, replacing
 from ..integrate.loop import Samples
 from ..integrate.settings import Settings
+from ..kernels.identity import kernels_hash
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
@@ -51,7 +51,7 @@ class Checkpoint:
         self.asked = {
             "scene": _hash(model.scene.to_toml()),
             "settings": _hash(json.dumps(asdict(settings)) + q.tobytes().hex() + u.tobytes().hex()),
-            "kernels": kernels_hash(model),
+            "kernels": kernels_hash(model.known),
         }
 
     def exists(self) -> bool:

@@ -179,7 +179,7 @@ class SceneSystem:
         y = np.ascontiguousarray(y)
         self.run.failure.reason = 0  # of another state that did not close
         self.engine.lib.mstmm_scene_settle(self.run, t, self.engine.pointer(y))
-        if self.run.failure.reason == Failed.LOOP:
+        if self.run.failure.reason in (Failed.LOOP, Failed.COUPLING, Failed.FLAT):
             raise SceneError(f"scene: {self.engine.failure_text(self.run.failure, t)}")
         return y
 

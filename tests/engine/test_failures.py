@@ -26,6 +26,7 @@ def test_every_reason_has_a_sentence_of_its_own() -> None:
     path = ROOT / "examples" / "branched_tree" / "scene.toml"
     tables = tomllib.loads(path.read_text())
     tables["event"] = [{"when": "shoulder.q > 3", "do": "bounce", "restitution": 0.5}]
+    tables["coupling"] = [{"expression": "shoulder.q - 2*rail.q"}]
     tables["input"] = [{"name": "motor", "unit": "N*m", "value": 0.0}]
     tables["controller"] = [{
         "name": "regulator", "D": [[1.0]], "sample_time": 0.1, "inputs": ["shoulder.angle"],

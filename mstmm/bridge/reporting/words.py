@@ -121,10 +121,10 @@ def certificate(result: Result) -> str:
 
 def provenance(result: Result) -> str:
     """Versions, hashes, and the scene with every default filled in."""
-    from ...runtime.engine.identity import kernels_hash
+    from ...runtime.kernels.identity import kernels_hash
     from ...runtime.result.output.provenance import scene_hash, versions
 
     rows = [*versions().items(), ("scene, SHA-256", scene_hash(result)),
-            ("kernels, SHA-256", kernels_hash(result.model))]  # fmt: skip
+            ("kernels, SHA-256", kernels_hash(result.model.known))]  # fmt: skip
     scene = result.model.scene.to_toml()
     return table(rows) + folded("The scene", f"<pre>{text(scene)}</pre>")

@@ -236,8 +236,10 @@ int mstmm_closed(const mstmm_closing *by, const mstmm_model *model, mstmm_failur
     const int met = gaps.met < OPEN;
     if (!met || !(gaps.repeated < model->loops_apart)) {
         const int where = met ? gaps.where_repeated : gaps.where_met;
-        *failure = (mstmm_failure){MSTMM_FAILED_LOOP, where, 0};
-        return MSTMM_FAILED_LOOP;
+        const int behind = where - model->n_bodies, coupled = behind >= 0;
+        *failure = (mstmm_failure){coupled ? MSTMM_FAILED_COUPLING : MSTMM_FAILED_LOOP,
+                                   coupled ? behind : where, 0};
+        return failure->reason;
     }
     int code = 0;
     for (int k = 0; k < slips && !code; k++) code = by->slips(by->context);

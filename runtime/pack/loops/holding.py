@@ -8,13 +8,14 @@ from mstmm.scene.rules.values import GROUND, split
 from mstmm.scene.tables.closures import CURVE
 from mstmm.scene.tables.hinge_frames import about
 
+from ..layout import OF_CONSTRAINT
 from .curves import along
 
 
 def holding(constraint: Constraint) -> Hinge:
     """The hinge that holds the frame of a constraint where it begins: a weld, with z along the
     normal where there is one, or a way along the curve.  Their names are those of no scene."""
-    name, normal = f"{constraint.name}/constraint", constraint.unit_normal
+    name, normal = f"{constraint.name}{OF_CONSTRAINT}", constraint.unit_normal
     turned = IDENTITY if normal is None else about(normal, None)
     weld = Hinge(name="frame", type="fixed", inboard=GROUND, outboard="frame",
                  orientation=to_quaternion(turned))  # fmt: skip

@@ -14,11 +14,11 @@ from mstmm import risk, version
 from mstmm.arrays import Array
 
 from ...classical.schemes import scheme_of
-from ...engine.identity import kernels_hash
 from ...integrate.loop import Statistics, Status
 from ...integrate.reached import from_dict
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO, get
+from ...kernels.identity import kernels_hash
 from ...run import classical, second_opinion
 from ...run.error_estimate import ErrorEstimate
 from ...run.stretches import from_rows
@@ -59,7 +59,7 @@ def attributes(result: Record) -> dict[str, Any]:
         "format": "mstmm result",
         "format_version": FORMAT,
         "scene_sha256": scene_hash(result),
-        "kernels_sha256": kernels_hash(result.model),
+        "kernels_sha256": kernels_hash(result.model.known),
         "engine": result.model.engine,
         "sweep": "qr" if result.model.packed.qr else "riccati",
         "versions": json.dumps(versions()),

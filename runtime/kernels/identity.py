@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 
-from .compiled import Compiled
+from mstmm.ir.structure import Key
+
+from .prebuilt import Element
 
 
 @cache
@@ -14,9 +17,9 @@ def _manifest() -> bytes:
     return files("mstmm.generated").joinpath("manifest.json").read_bytes()
 
 
-def kernels_hash(model: Compiled) -> str:
-    """SHA-256 of the hashes of all generated kernels, and of the elements that are not prebuilt."""
+def kernels_hash(known: Mapping[Key, Element] | None) -> str:
+    """SHA-256 of the hashes of all generated kernels, and of elements that are not prebuilt."""
     found = hashlib.sha256(_manifest())
-    for (kind, name), element in sorted((model.known or {}).items()):
+    for (kind, name), element in sorted((known or {}).items()):
         found.update(f"{kind} {name} {element.hash}\n".encode())
     return found.hexdigest()

@@ -1,0 +1,161 @@
+"""Failures of the engine as sentences: element, cause, time, one way out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from mstmm.border.failures import Failed
+from mstmm.ir.statements import NEGATIVE
+from mstmm.scene import Bushing
+
+from ..pack.packed import Packed
+
+
+class Naming(Protocol):
+    """An engine that knows what stands at a place of the topology."""
+
+    packed: Packed
+
+    def hinge_name(self, position: int, /) -> str: ...
+    def body_name(self, position: int, /) -> str: ...
+    def is_flexible(self, position: int, /) -> bool: ...
+    def closing(self, position: int, /) -> str: ...
+
+
+def failure_text(engine: Naming, reason: int, element: int, code: int, t: float) -> str:
+    """The sentence of `element`, failed by `reason` at t; `code` is what its kernel says."""
+    sentence = _SENTENCES.get(reason, _expression)
+    return sentence(engine, element, f"at t = {t:.9g} s", code)
+
+
+def _undetermined(engine: Naming, element: int, at: str, code: int) -> str:
+    hinge = engine.hinge_name(element)
+    if engine.is_flexible(element):
+        body = engine.body_name(element).split("/")[0]
+        return (
+            f'hinge "{hinge}" {at}: what it moves has no positive inertia left: the shapes of the '
+            f'flexible body "{body}" carry it all, or its deflection is beyond the stiffened '
+            'model; use fewer shapes, frame = "chord" or "mean", quadrature = true, or split it '
+            "into welded beams"
+        )
+    return (
+        f'hinge "{hinge}" {at}: a motion of it is undetermined, because what it carries has no '
+        "positive inertia in that direction (a thin rod on a ball, a point mass, collinear axes, "
+        "three angles at their lock, a negative principal moment); give the body inertia, give the "
+        "hinge rotor inertia (law.inertia), fix that motion, or take a ball hinge for three angles"
+    )
+
+
+def _force(engine: Naming, element: int, at: str, code: int) -> str:
+    one = engine.packed.scene.forces[element]
+    if isinstance(one, Bushing):
+        return (
+            f'bushing "{one.name}" {at}: its ends are turned by more than 170 degrees from rest, '
+            "beyond its law; make it stiffer, or put a hinge with a law in its place"
+        )
+    return (
+        f'spring "{one.name}" {at}: its direction is undefined because its ends coincide; move one '
+        "of them, or put an elastic hinge or a bushing in its place"
+    )
+
+
+def _expression(engine: Naming, element: int, at: str, code: int) -> str:
+    return f"an expression of the scene cannot be evaluated {at}"
+
+
+def _hinge(engine: Naming, element: int, at: str, code: int) -> str:
+    return f'hinge "{engine.hinge_name(element)}" {at}: its definition fails in this state'
+
+
+def _product_pivot(engine: Naming, element: int, at: str, code: int) -> str:
+    return (
+        f'hinge "{engine.hinge_name(element)}" {at}: the pivot of its classical matrix vanishes, '
+        'so the product does not exist in this state; use sweep = "riccati"'
+    )
+
+
+def _product_error(engine: Naming, element: int, at: str, code: int) -> str:
+    return (
+        f"the product of transfer matrices {at}: its deviation from the Riccati sweep exceeds the "
+        "accuracy asked for (errors grow geometrically along the chain); "
+        'use sweep = "riccati"'
+    )
+
+
+def _section(engine: Naming, element: int, at: str, code: int) -> str:
+    name = engine.hinge_name(element).replace("/", ".")
+    return (
+        f'"{name}" {at}: a section turns by more than 1.5 rad against its floating frame, far '
+        "beyond small deflections; split the body into several that are welded together"
+    )
+
+
+def _modes(engine: Naming, element: int, at: str, code: int) -> str:
+    return (
+        f'flexible body "{engine.body_name(element)}" {at}: its modal mass matrix is not positive '
+        'definite; use fewer shapes, frame = "chord" or "mean", or quadrature = true'
+    )
+
+
+def _tangent(engine: Naming, element: int, at: str, code: int) -> str:
+    name = engine.hinge_name(element) if element >= 0 else ""
+    what = f'hinge "{name}"' if name else "what acts between bodies"
+    if code == NEGATIVE:
+        return (
+            f"{what} {at}: a motion leaves by itself faster than the step allows (a negative "
+            "stiffness, a body that topples or buckles, inertia that vanishes); take a shorter "
+            "step, or give the motion inertia (law.inertia) or a spring"
+        )
+    return (
+        f"{what} {at}: the equations of an implicit step leave a motion undetermined: no inertia, "
+        "stiffness or damping holds it, or a negative stiffness cancels them; take a shorter step, "
+        "or give the motion inertia (law.inertia) or a spring"
+    )
+
+
+def _controller(engine: Naming, element: int, at: str, code: int) -> str:
+    name = engine.packed.described.controller[element].name
+    return (
+        f'controller "{name}" {at}: what it measures or gives is not finite; see whether the '
+        "closed loop is stable, with a shorter sample_time perhaps"
+    )
+
+
+def _loop(engine: Naming, element: int, at: str, code: int) -> str:
+    return (
+        f"{engine.closing(element)} {at}: the loop that it closes is open, and no state near "
+        "closes it; start from model.assemble(q, u), or see whether a drive asks for more than the "
+        "mechanism can do"
+    )
+
+
+def _coupling(engine: Naming, element: int, at: str, code: int) -> str:
+    return (
+        f'coupling "{engine.packed.system.couplings[element].name}" {at}: it does not hold, and no '
+        "state near makes it hold; see whether drives and other couplings ask for something else"
+    )
+
+
+def _flat(engine: Naming, element: int, at: str, code: int) -> str:
+    return (
+        f"{engine.closing(element)} {at}: the disc lies flat on its plane and touches it in more "
+        "than a point; end the run before, by an [[event]], or start it upright"
+    )
+
+
+def _bounce(engine: Naming, element: int, at: str, code: int) -> str:
+    return (
+        f'event "{engine.packed.described.event[element].name}" {at}: nothing can give way to its '
+        "strike, because what it strikes is driven or held; let another place bounce, or release "
+        "the hinge"
+    )
+
+
+_SENTENCES: dict[int, Callable[[Naming, int, str, int], str]] = {
+    Failed.UNDETERMINED: _undetermined, Failed.FORCE: _force, Failed.EXPRESSION: _expression,
+    Failed.HINGE: _hinge, Failed.PRODUCT_PIVOT: _product_pivot,
+    Failed.PRODUCT_ERROR: _product_error, Failed.SECTION: _section, Failed.MODES: _modes,
+    Failed.TANGENT: _tangent, Failed.CONTROLLER: _controller, Failed.LOOP: _loop,
+    Failed.BOUNCE: _bounce, Failed.COUPLING: _coupling, Failed.FLAT: _flat,
+}  # fmt: skip
