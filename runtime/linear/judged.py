@@ -75,7 +75,7 @@ def refuse_unrest(linear: Equations) -> None:
     if leaving and not _balanced(linear, linear.mechanism.ways):
         raise SceneError(
             f"a linear model of closed loops is that of a state at rest, and {_some(leaving)} "
-            "accelerate here; leave q out for the equilibrium, or give one"
+            "would accelerate here; leave q out for the equilibrium, or give one"
         )
 
 

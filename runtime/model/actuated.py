@@ -48,6 +48,11 @@ def actuated(
     nu, places = model.nu, model.freedom.places
     acting = list(places) if actuators is None else _acting(model, actuators)
     few = np.ndim(udot) > 0 and np.shape(udot)[-1] == len(places) != nu
+    if np.ndim(udot) > 0 and np.shape(udot)[-1] not in (nu, len(places)):
+        raise SceneError(
+            f"udot has shape {np.shape(udot)}, expected (..., {len(places)}) of the independent "
+            f"speeds or (..., {nu}) of all"
+        )
     lead, (times, coordinates, speeds, rates) = batch(
         ("t", t, None), ("q", q, model.nq), ("u", u, nu),
         ("udot", udot, len(places) if few else nu),
@@ -72,8 +77,8 @@ def _acting(model: Compiled, names: Sequence[str]) -> list[int]:
     count, wanted = len(set(found)), len(model.freedom.places) if model.freedom else 0
     if count != wanted:
         raise SceneError(
-            f"actuators: {count} speeds act, the mechanism has {wanted} motions; name as many as "
-            f"these, such as hinges of {', '.join(model.layout.u_name(k) for k in _places(model))}"
+            f"actuators: {count} speeds act, the mechanism has {wanted} left free; name as "
+            f"many, such as hinges of {', '.join(model.layout.u_name(k) for k in _places(model))}"
         )
     return sorted(set(found))
 

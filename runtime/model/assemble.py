@@ -16,13 +16,13 @@ def assemble(
     compiled: Compiled, q: Array, u: Array, hold: Sequence[str], fast: Collection[str] | None
 ) -> tuple[Array, Array]:
     """See `Model.assemble`; speeds of the hinges `fast` stay, of all that have some if None."""
-    hinges = compiled.layout.hinges
+    hinges, modal = compiled.layout.hinges, compiled.layout.modal
     if isinstance(hold, str) or not isinstance(hold, Collection):
         raise SceneError(f"hold = {hold!r:.60}: expected a list of names of hinges")
     for name in hold:
         if not isinstance(name, str):
             raise SceneError(f"hold = {hold!r:.60}: expected names of hinges")
-        if name not in hinges:
+        if name not in hinges or name in modal:
             raise SceneError(f'hold: there is no hinge "{name}"{near(name, list(hinges))}')
     if compiled.closed is None:
         return q.copy(), u.copy()

@@ -126,7 +126,7 @@ def test_columns_of_efforts() -> None:
 
 
 REFUSED: dict[str, tuple[list[str], str]] = {
-    "too many": (["foot", "end"], "2 speeds act, the mechanism has 1 motions"),
+    "too many": (["foot", "end"], "2 speeds act, the mechanism has 1 left free"),
     "none": ([], "0 speeds act"),
     "unknown": (["foo.effort"], '"foo.effort": expected an effort'),
     "no effort": (["crank.force.x"], "expected a hinge, or an effort of one"),

@@ -58,6 +58,15 @@ def test_angles_of_more_than_a_turn_are_noted(changes: dict[str, Any], notes: li
         assert note in text and "if degrees were meant, write" in text
 
 
+def test_angles_of_bushings_are_noted() -> None:
+    mount = {"from": "ground", "to": "rod1", "orientation": [30, 0, 0], "stiffness": [1.0] * 6,
+             "rest": {"position": [0, 0, 0], "orientation": [0, 45, 0]}}  # fmt: skip
+    found = mstmm.Scene.from_data(one() | {"bushing": [mount]}).warnings
+    assert [text.partition(" rad")[0] for text in found] == [
+        'bushing "bushing1": orientation: 30', 'bushing "bushing1": rest: 45',
+    ]  # fmt: skip
+
+
 def test_the_note_reaches_the_result() -> None:
     run = mstmm.compile(mstmm.Scene.from_data(one())).simulate(0.0)
     assert not any("degrees" in text for text in run.warnings)

@@ -21,6 +21,9 @@ def notes(scene: SceneTables) -> Iterator[Risk]:
         for k, table in enumerate(chain.hinge):
             yield from _of_hinge(f'hinge {k + 1} of chain "{chain.name}"', table)
         yield from _of_angles(f'chain "{chain.name}": orientation', chain.orientation or ())
+    for bushing in scene.bushing:
+        yield from _of_angles(f'bushing "{bushing.name}": orientation', bushing.orientation)
+        yield from _of_angles(f'bushing "{bushing.name}": rest', bushing.rest.orientation)
     for body in scene.body:
         yield from _of_ends(body.name, body.ends)
     for beam in scene.beam:

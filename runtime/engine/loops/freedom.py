@@ -25,6 +25,8 @@ from .rank import judging
 _ROUNDING = 1e-9
 #: A speed is read off where no other tells more than this many times as much apart.
 _WELL = 4.0
+#: Gaps (m, rad) of loops that are open.
+_OPEN = 1e-6
 #: Speeds that decide others this many times their own size decide nothing any more.
 _MOST = 1e8
 
@@ -74,11 +76,21 @@ class Freedom:
         branches = self._loops.singular and ways == self._loops.mobility
         if rows == ways and not branches and (not ways or np.linalg.cond(scaled) < _MOST):
             return np.asarray(found @ np.linalg.inv(found[own]))
+        self._refuse_open(q)
         names = ", ".join(self._calls.engine.packed.layout.u_name(k) for k in own)
         raise NumericalFailure(
             f"the loops leave {ways} motions here, which {names or 'no speed'} cannot tell apart: "
             "a dead centre or a singular pose; take a state beside it"
         )
+
+    def _refuse_open(self, q: Array) -> None:
+        gaps = np.abs(self._calls.correction(self._calls.gap, q, np.zeros(len(self.sizes)))[1])
+        row = int(gaps.argmax())
+        if gaps[row] > _OPEN:
+            raise NumericalFailure(
+                f"the loop that {self._calls.closing(row)} closes is open by {gaps[row]:.3g} at "
+                "this q; take that of model.assemble(q)"
+            )
 
     def driving(self, q: Array, speed: int) -> Array:
         """All speeds (nu,) for a unit of one that is imposed, the others of these at rest; nan

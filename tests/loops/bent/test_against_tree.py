@@ -243,6 +243,12 @@ def test_what_is_refused() -> None:
     ):
         with pytest.raises(SceneError, match="with flexible bodies cannot follow that yet"):
             asked()
+    with pytest.raises(SceneError, match='hold: there is no hinge "bar"'):
+        model.assemble(hold=["bar"])
+    static = slider_crank()
+    static["beam"][0]["initial"] = "static"
+    with pytest.raises(SceneError, match=r'"bar": initial: loops are closed.*equilibrium'):
+        mstmm.compile(mstmm.Scene(**static))
     distance = {"type": "distance", "from": "bar.tip", "to": "ground", "length": 1.0}
     with pytest.raises(SceneError, match="not compiled in scenes with flexible bodies yet"):
         mstmm.compile(mstmm.Scene(**scene, constraint=[distance]))

@@ -122,3 +122,15 @@ def test_a_crank_too_long_by_more_than_a_misfit_is_a_structure() -> None:
         else:
             with pytest.raises(mstmm.SceneError, match="no freedom is left"):
                 compiled(scene)
+
+
+def test_an_open_state_is_told_as_such() -> None:
+    """Where a mechanism is asked for what its loops leave free, they must be closed."""
+    model = compiled(four_bar(speed=1.0))
+    q, u = model.initial_state()
+    with pytest.raises(mstmm.NumericalFailure, match=r'hinge "tip" closes is open by .*assemble'):
+        model.mass_matrix(q + 0.1)
+    with pytest.raises(mstmm.SceneError, match=r"expected \(..., 1\) of the independent speeds or"):
+        model.inverse_dynamics(q, u, np.zeros(2))
+    with pytest.raises(mstmm.SceneError, match="2 speeds act, the mechanism has 1 left free"):
+        model.inverse_dynamics(q, u, np.zeros(1), actuators=["knee", "foot"])
