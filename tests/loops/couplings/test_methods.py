@@ -189,3 +189,32 @@ def test_loads_of_curved_couplings_have_stiffness() -> None:
     mass = 0.1 + 1.5 * (0.3 * np.cos(angle)) ** 2
     stiffness = 8.0 - 1.5 * 9.81 * 0.3 * np.sin(angle)
     assert abs(model.modes().omega[0] / np.sqrt(stiffness / mass) - 1) < 1e-9
+
+
+def test_a_drive_that_lets_go_in_implicit_steps() -> None:
+    """The damper stops both wheels once the drive is gone, as it does in explicit steps."""
+    model = pair(GEAR, a={"drive": "t", "release": "t > 0.5"}, b={"law": {"damping": 0.1}})
+    result = model.simulate(1.0, "rodas5p", rtol=1e-9, output_times=[0.0, 1.0])
+    assert result.success, result.message
+    rate = np.exp(-0.1 / 9 * 0.5 / (0.02 + 0.3 / 9))
+    assert np.abs(result.u[-1] - [rate, -rate / 3]).max() < 1e-7
+
+
+@pytest.mark.parametrize("method", ["dop853", "rodas5p"])
+def test_a_rack_that_bounces_throws_its_pinion_back(method: str) -> None:
+    """Whatever the inertia of the pinion, e of the speed comes back to both."""
+    rack = {"name": "R", "type": "prismatic", "inboard": "ground", "outboard": "rack",
+            "axis": [0, 1, 0], "initial": {"q": 0.5}}  # fmt: skip
+    model = coupled(
+        [wheel("pinion", 0.05), wheel("rack", 1.0, 4.0)], [pin("P", "pinion"), rack],
+        {"expression": "0.2*P.q - R.q"}, gravity=[0, -9.81, 0],
+        event=[{"name": "stop", "when": "R.q < 0", "do": "bounce", "restitution": 0.6}],
+    )  # fmt: skip
+    fall = 9.81 / (1 + 0.05 / (4.0 * 0.2**2))
+    down, speed = np.sqrt(2 * 0.5 / fall), np.sqrt(2 * 0.5 * fall)
+    after = 0.3
+    result = model.simulate(down + after, method, rtol=1e-9, output_times=[0.0, down + after])
+    assert result.success, result.message
+    up = 0.6 * speed - fall * after
+    assert np.abs(result.u[-1] - [up / 0.2, up]).max() < 1e-6
+    assert abs(result.q[-1, 1] - (0.6 * speed * after - fall * after**2 / 2)) < 1e-6
