@@ -13,12 +13,22 @@ import scipy.integrate
 
 import mstmm as package
 from cli.commands import PENDULUM, Command
+from mstmm.runtime.integrate import steppers
+from mstmm.runtime.run import second_opinion
 
 
 def columns(path: Path) -> dict[str, list[float]]:
     with path.open(newline="") as file:
         head, *rows = csv.reader(file)
     return {name: [float(row[k]) for row in rows] for k, name in enumerate(head)}
+
+
+def test_the_help_names_every_method(mstmm: Command) -> None:
+    told = " ".join(mstmm("simulate", "--help").out.replace("│", " ").split())
+    for name in (*steppers.names(), *second_opinion.METHODS, "dttmm-classical-product", "auto"):
+        family, dash, own = name.partition("-")
+        short = f"-{own}" if dash and family in ("scipy", "sundials") else name
+        assert short in told, name
 
 
 def test_result_is_that_of_the_library(mstmm: Command, folder: Path) -> None:
