@@ -98,32 +98,37 @@ def measured(quick: bool) -> list[dict[str, Any]]:
     models = {count: mstmm.compile(windows(count), engine="looped") for count in SIZES}
     calls = {count: max(4, 8000 // count) for count in SIZES}
     work = {str(count): evaluations(model, calls[count]) for count, model in models.items()}
-    for name, found in per_evaluation(work, 1, rounds).items():
-        bodies = 2 * int(name) + 1
-        times = [us / calls[int(name)] for us in found]
-        results.append({"scene": f"{name} windows", "tool": "mstmm", "us": times,
-                        "ns a body": [1e3 * us / bodies for us in times]})  # fmt: skip
-    return results + ladder_beside(rounds) + platform_beside(rounds) + squeezer_beside(rounds)
+    times, beside = dict[str, list[float]](), list[float]()
+    for _ in range(max(2, rounds // 3)):
+        for name, found in per_evaluation(work, 1, rounds).items():
+            times.setdefault(name, []).extend(us / calls[int(name)] for us in found)
+        beside += iteration_beside()
+    for name, found in times.items():
+        results.append(row_of(int(name), "mstmm", found))
+    results += [row_of(SIZES[-1], "Exudyn", beside)] if beside else []
+    return results + platform_beside(rounds) + squeezer_beside(rounds)
 
 
-def ladder_beside(rounds: int) -> list[dict[str, Any]]:
-    """Exudyn's iterations on the longest row of windows."""
+def row_of(count: int, tool: str, times: list[float]) -> dict[str, Any]:
+    """A row of the table for so many windows, by microseconds of an evaluation."""
+    bodies = 2 * count + 1
+    return {"scene": f"{count} windows", "tool": tool, "us": times,
+            "ns a body": [1e3 * us / bodies for us in times]}  # fmt: skip
+
+
+def iteration_beside() -> list[float]:
+    """Microseconds of an iteration of Exudyn's on the longest row of windows, if it is there."""
     try:
         import exudyn_planar
     except ImportError:
         print("Exudyn is not here")
         return []
-    made, steps, times = exudyn_planar.windows(SIZES[-1]), 10, []
-    for _ in range(max(2, rounds // 3)):
-        count = [0]
+    made, count = exudyn_planar.windows(SIZES[-1]), [0]
 
-        def run(count: list[int] = count) -> None:
-            count[0] = made.run(0.01, steps, sparse=True, modified=False)[0]
+    def run() -> None:
+        count[0] = made.run(0.01, 10, sparse=True, modified=False)[0]
 
-        spent = measure.cpu(run)
-        times.append(1e6 * spent / count[0])
-    return [{"scene": f"{SIZES[-1]} windows", "tool": "Exudyn", "us": times,
-             "ns a body": [1e3 * us / (2 * SIZES[-1] + 1) for us in times]}]  # fmt: skip
+    return [1e6 * measure.cpu(run) / count[0]]
 
 
 def platform_beside(rounds: int) -> list[dict[str, Any]]:
