@@ -8,7 +8,7 @@ from itertools import groupby
 
 from mstmm.errors import ElementError
 
-from ..print.callers import MOST_SPEEDS, POINTED, Specs
+from ..print.callers import DIRECT, MOST_SPEEDS, POINTED, Specs
 from ..print.sweep import passes, sweep_files
 from ..schedule.slope import ports_of
 from ..schedule.steps import (
@@ -173,7 +173,7 @@ class _Steps:
         if element in POINTED:
             key, names = POINTED[element]
             return key, names.get(name, name)
-        return ("sweep", element), name
+        return DIRECT.get(element, ("sweep", element)), name
 
 
 #: Directions, each with its number c.
