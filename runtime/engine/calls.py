@@ -32,7 +32,8 @@ class Observation:
     points: (n, probes, 24): position, velocity, acceleration, angular velocity, angular
     acceleration, rotation matrix (row by row).  loads: (n, bodies, 6) force and moment of each
     inboard hinge.  efforts, udot: (n, nu).  sums: (n, 10): kinetic, gravity and spring energy,
-    power, momentum (3), angular momentum about the inertial origin (3).
+    power, momentum (3), angular momentum about the inertial origin (3).  rows: (n, rows)
+    multipliers of closed loops.
     """
 
     points: Array
@@ -40,11 +41,12 @@ class Observation:
     efforts: Array
     udot: Array
     sums: Array
+    rows: Array
     failures: tuple[str, ...] = ()
 
 
 #: The arrays of an Observation.
-PARTS = ("points", "loads", "efforts", "udot", "sums")
+PARTS = ("points", "loads", "efforts", "udot", "sums", "rows")
 
 
 class Calls:
@@ -126,9 +128,10 @@ class Calls:
         """
         n, place = len(t), {name: i for i, name in enumerate(PARTS)}
         bodies, numbers = self.packed.topology.count, int(self.lib.MSTMM_PROBE_NUMBERS)
+        loops = self.packed.written.loops
         shapes = [
             (len(probes), numbers), (bodies, 6), (self.nu,), (self.nu,),
-            (int(self.lib.MSTMM_SUM_NUMBERS),),
+            (int(self.lib.MSTMM_SUM_NUMBERS),), (0 if loops is None else loops.count,),
         ]  # fmt: skip
         arrays = [
             np.full((n, *shape), np.nan) if name in parts else np.empty((n, *shape[:-1], 0))
@@ -153,9 +156,9 @@ class Calls:
             text = self.failure_text(failure, float(states[0][first + int(at[0])]))
             failures.setdefault((int(failure.reason), int(failure.element)), []).append(text)
             first += int(at[0]) + 1
-        points, loads, efforts, udot, sums = arrays
+        points, loads, efforts, udot, sums, rows = arrays
         return Observation(
-            points, loads, efforts, udot, sums, tuple(map(_first, failures.values()))
+            points, loads, efforts, udot, sums, rows, tuple(map(_first, failures.values()))
         )
 
     # --- words ----------------------------------------------------------------------------------

@@ -70,7 +70,7 @@ class Observed:
                 self._seen(missing, ("points",))
 
     def part(self, name: str) -> Array:
-        """loads, efforts, udot or sums, see `Observation`."""
+        """loads, efforts, udot, sums or rows, see `Observation`."""
         if name not in self._parts:
             self._observe(name, None)
         return self._parts[name]

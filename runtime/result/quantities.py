@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +32,7 @@ from ..engine.shown import (
 )  # fmt: skip
 from ..pack.layout import HingeSlots
 from .bushings import add_bushing
+from .constraints import add_constraint, add_coupling
 from .flexible.names import add_body
 from .names import Quantity, Table, Values
 from .observed import quaternions
@@ -51,8 +53,8 @@ RATES = {
 class Quantities:
     """Every quantity of a run by its name, from the states and what they show.
 
-    Names are made per owner, a hinge, a body, an end, a spring, a bushing or the scene (""), when
-    they are asked for.
+    Names are made per owner, a hinge, a body, an end, a spring, a bushing, a constraint, a coupling
+    or the scene (""), when they are asked for.
     """
 
     def __init__(self, observed: Observed, flexible: FlexibleResults) -> None:
@@ -61,8 +63,17 @@ class Quantities:
         self.layout = observed.engine.packed.layout
         self._orientations: dict[str, Array] = {}
         self._tables: dict[str, Table] = {}
-        self._springs = {one.name: one for one in observed.references.scene.spring}
-        self._bushings = {one.name: one for one in observed.references.scene.bushing}
+        #: What adds the quantities of springs, bushings and what closes loops, by their names.
+        self._more: dict[str, list[Callable[[Table], None]]] = {}
+        scene, closing = observed.references.scene, observed.engine.packed.described
+        for spring in scene.spring:
+            self._owned(spring.name, partial(add_spring, observed=observed, spring=spring))
+        for bushing in scene.bushing:
+            self._owned(bushing.name, partial(add_bushing, observed=observed, bushing=bushing))
+        for one in closing.constraint:
+            self._owned(one.name, partial(add_constraint, observed=observed, one=one))
+        for coupling in closing.coupling:
+            self._owned(coupling.name, partial(add_coupling, observed=observed, name=coupling.name))
 
     # --- of bodies ------------------------------------------------------------------------------
 
@@ -150,11 +161,10 @@ class Quantities:
         return [one.name for one in self.observed.references.scene.output if one.name in there]
 
     def owners(self) -> Iterator[str]:
-        """Hinges, bodies and ends, springs, bushings, and the scene itself."""
+        """Hinges, bodies and ends, springs, bushings, constraints, couplings, the scene itself."""
         yield from self.layout.hinges
         yield from self.observed.references
-        yield from self._springs
-        yield from self._bushings
+        yield from self._more
         yield ""
 
     def of(self, owner: str) -> Table:
@@ -167,16 +177,17 @@ class Quantities:
                 self._body(table, owner)
             elif not owner:
                 self._scene(table)
-            if owner in self._springs:
-                add_spring(table, self.observed, self._springs[owner])
-            if owner in self._bushings:
-                add_bushing(table, self.observed, self._bushings[owner])
+            for add in self._more.get(owner, ()):
+                add(table)
             self._tables[owner] = table
         return self._tables[owner]
 
     def _owns(self, owner: str) -> bool:
-        known = (self.layout.hinges, self.observed.references, self._springs, self._bushings)
+        known = (self.layout.hinges, self.observed.references, self._more)
         return any(owner in owners for owners in known)
+
+    def _owned(self, name: str, add: Callable[[Table], None]) -> None:
+        self._more.setdefault(name, []).append(add)
 
     def _body(self, table: Table, reference: str) -> None:
         for kind, about in BODY.items():

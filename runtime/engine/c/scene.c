@@ -136,6 +136,8 @@ int mstmm_observe(const mstmm_model *model, real *workspace, real t, const real 
                           wanted->points + (size_t)k * MSTMM_PROBE_NUMBERS);
     if (wanted->loads || wanted->efforts) observe_hinges(&state, udot, wanted);
     if (wanted->sums) observe_sums(&state, &balance, wanted->sums);
+    for (int r = 0; wanted->rows && r < model->n_rows; r++)
+        wanted->rows[r] = workspace[model->loops + MSTMM_ROW * (int64_t)r + MSTMM_ROW_X];
     return 0;
 }
 
@@ -150,6 +152,7 @@ int mstmm_observe_many(const mstmm_model *model, real *workspace, int64_t n, con
         if (one.efforts) one.efforts += k * model->nu;
         if (one.udot) one.udot += k * model->nu;
         if (one.sums) one.sums += k * MSTMM_SUM_NUMBERS;
+        if (one.rows) one.rows += k * model->n_rows;
         *failed_at = k;
         int code = mstmm_observe(model, workspace, t[k], q + k * model->nq, u + k * model->nu,
                                  memory + k * model->n_memory, &one, failure);

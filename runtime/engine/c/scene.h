@@ -28,6 +28,7 @@ typedef struct {
     real *efforts; /* nu: H^T f + J udot, what laws and drives put in, or NULL */
     real *udot;    /* nu, or NULL */
     real *sums;    /* MSTMM_SUM_NUMBERS, or NULL */
+    real *rows;    /* n_rows: multipliers of closed loops, or NULL */
 } mstmm_observation;
 
 /* Everything asked for at one state; returns 0 or a reason, with `failure` filled. */
