@@ -4,29 +4,29 @@
 #define MSTMM_LAYOUT_H
 
 /* cdef begin */
-#define MSTMM_BLOCK_R 0
-#define MSTMM_BLOCK_SHIFT 9
-#define MSTMM_BLOCK_MOTION 12
-#define MSTMM_BLOCK_S 21
-#define MSTMM_BLOCK_E 42
-#define MSTMM_BLOCK_DELTA 48
-#define MSTMM_BLOCK_A 54
-#define MSTMM_BLOCK_X 63
-#define MSTMM_BLOCK_V 66
-#define MSTMM_BLOCK_HINGE_R 69
-#define MSTMM_BLOCK_HINGE_D 78
-#define MSTMM_BLOCK_HINGE_V 81
-#define MSTMM_BLOCK_HINGE_W 84
-#define MSTMM_BLOCK_HINGE_C 87
-#define MSTMM_BLOCK_FLOOR 93
+#define MSTMM_BLOCK_A 0
+#define MSTMM_BLOCK_X 9
+#define MSTMM_BLOCK_V 12
+#define MSTMM_BLOCK_DELTA 15
+#define MSTMM_BLOCK_FLOOR 21
+#define MSTMM_BLOCK_HINGE_R 23
+#define MSTMM_BLOCK_HINGE_D 32
+#define MSTMM_BLOCK_R 35
+#define MSTMM_BLOCK_SHIFT 44
+#define MSTMM_BLOCK_HINGE_V 47
+#define MSTMM_BLOCK_HINGE_W 50
+#define MSTMM_BLOCK_HINGE_C 53
+#define MSTMM_BLOCK_S 59
+#define MSTMM_BLOCK_E 80
+#define MSTMM_BLOCK_MOTION 86
 #define MSTMM_BLOCK_FIXED 95
 /* Behind them arrays of the speeds, from FIXED + their number times the speeds. */
 #define MSTMM_SPEED_S 0
 #define MSTMM_SPEED_TAU 1
-#define MSTMM_SPEED_OFFSET 2
-#define MSTMM_SPEED_RATES 3
-#define MSTMM_SPEED_GAIN 4
-#define MSTMM_SPEED_H 10
+#define MSTMM_SPEED_H 2
+#define MSTMM_SPEED_OFFSET 8
+#define MSTMM_SPEED_RATES 9
+#define MSTMM_SPEED_GAIN 10
 #define MSTMM_SPEED_H_FREE 16
 #define MSTMM_BLOCK_PER_SPEED 22
 /* Flexible bodies and sections: arrays behind so many numbers per mode. */

@@ -158,7 +158,7 @@ class Replay(RowSlots):
         known = {
             "linked": False, "product": False, "qr": False, "refined": False, "residual": False,
             "couplings": bool(s.couplings), "looped": s.closes, "balance": not self.level,
-            "efforts": True, "inverse": self.inverse,
+            "efforts": True, "inverse": self.inverse, "weightless": False,
             "driving": not self.level,
             "laws": bool(s.laws), "driven": s.drives is not None,
             "valued": s.values is not None, "posed": bool(self._posed),
@@ -169,7 +169,7 @@ class Replay(RowSlots):
 
     def _has(self, trait: str) -> bool:
         """Whether the subject has a trait; see `schedule.words`."""
-        if trait in ("balance", "efforts", "inverse", "driving"):
+        if trait in ("balance", "efforts", "inverse", "weightless", "driving"):
             return self._scene_has(trait)
         if trait in ("gaping", "slipping"):
             return self.level == trait

@@ -10,6 +10,7 @@ _TRAITS = {
     "outward": "body->section && !body->section->inward", "modal": "body->modal",
     "imposed": "mstmm_imposed(body, state->memory)", "idle": "mstmm_idle(state->observed, body)",
     "drag": "body->modal && body->modal->drag", "inverse": "state->given",
+    "weightless": "state->required",
     "balance": "state->balance", "efforts": "state->efforts", "known": "state->hinges_known",
     "linked": "state->linked", "laws": "model->n_laws", "driven": "model->n_drives",
     "valued": "model->n_values",

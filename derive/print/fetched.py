@@ -15,7 +15,7 @@ from .storage import BLOCK, PER_SPEED, SHARED, TANGENT, VARIABLES, place, reads,
 _NAMED = ("to", "source", "free", "imposed")
 _VARIABLES = ("block", "d_block", "tangent", "nu", "nq")
 #: Steps that few bodies of a scene take part in.
-_RARE = frozenset({"modal", "section", "outward", "placed", "drag", "imposed", "parts"})
+_RARE = frozenset({"modal", "section", "outward", "placed", "drag", "imposed", "parts", "curved"})
 #: Gaps of fewer numbers are as good as none: memory comes in lines of eight.
 _LINE = 8
 

@@ -11,18 +11,18 @@ from mstmm.ir import structure
 from ..schedule.slope import D
 from ..schedule.words import ROLES, SLOTS
 
-#: Numbers of a body's block in the workspace, in their order: slot -> name in C.
+#: Numbers of a body's block in the workspace, in their order: slot -> name in C.  What the same
+#: passes read and write stands together, as memory comes in lines; e stands behind S (links.c).
 BLOCK = {
-    "body.R": "R", "body.r": "SHIFT", "body.motion": "MOTION", "body.S": "S", "body.e": "E",
-    "body.delta": "DELTA", "body.A": "A", "body.x": "X", "body.v": "V", "hinge.R": "HINGE_R",
-    "hinge.d": "HINGE_D", "hinge.v": "HINGE_V", "hinge.w": "HINGE_W", "hinge.c": "HINGE_C",
-    "body.floor": "FLOOR",
+    "body.A": "A", "body.x": "X", "body.v": "V", "body.delta": "DELTA", "body.floor": "FLOOR",
+    "hinge.R": "HINGE_R", "hinge.d": "HINGE_D", "body.R": "R", "body.r": "SHIFT",
+    "hinge.v": "HINGE_V", "hinge.w": "HINGE_W", "hinge.c": "HINGE_C", "body.S": "S",
+    "body.e": "E", "body.motion": "MOTION",
 }  # fmt: skip
 #: Behind them, so many numbers per speed.
 PER_SPEED = {
-    "body.s": ("S", 1), "body.tau": ("TAU", 1), "hinge.g": ("OFFSET", 1),
-    "hinge.rates": ("RATES", 1), "hinge.G": ("GAIN", 6), "hinge.H": ("H", 6),
-    "hinge.H_free": ("H_FREE", 6),
+    "body.s": ("S", 1), "body.tau": ("TAU", 1), "hinge.H": ("H", 6), "hinge.g": ("OFFSET", 1),
+    "hinge.rates": ("RATES", 1), "hinge.G": ("GAIN", 6), "hinge.H_free": ("H_FREE", 6),
 }  # fmt: skip
 #: Numbers of a flexible body in the workspace: slot -> (per mode, per pair of modes).
 MODES = {

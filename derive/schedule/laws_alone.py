@@ -1,7 +1,7 @@
 """The tangent without what velocities and loads add: the mass matrix, and in it the laws' slopes.
 
 It is symmetric, so that it is factored and solved as the mass matrix is: by the same passes over
-slots of its own, behind inverse dynamics, whose hinge motion and inertias stay as they are.
+slots of its own, behind inverse dynamics, whose hinge motion stays as it is.
 Unknown are accelerations, with which speeds and coordinates change in proportion.  Of a law on
 several speeds the symmetric part of the slopes counts; loads, springs between bodies and what
 stiffens flexible bodies are left out.  An approximation, for iterations and for methods that allow
@@ -34,7 +34,9 @@ _NAME = "laws"
 LAWS_OWN = Pass(
     "laws_own", "body", "Inertia of a body, and its modes within a step.",
     (
-        Copy(to="mass.S", source="body.S"),
+        call("body.inertia", when="!modal", p="body.p", S="mass.S"),
+        Copy(to="mass.S", source="body.S", when="modal"),
+        call("frames.pivot_floor", S="mass.S", floor="body.floor"),
         Copy(to="tangent.laws"),
         *only(
             "modal",

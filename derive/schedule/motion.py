@@ -58,10 +58,10 @@ FORWARD = Pass(
              motion_I="connection.motion", motion="body.motion"),
         ChooseBias(subspace="hinge.H", motion="body.motion", chosen="body.chosen", when="staged"),
         Do(whole=MODAL_OWN, when="modal"),
-        call("body.inertia", when="!modal", p="body.p", S="body.S"),
+        call("body.inertia", when="!modal !weightless", p="body.p", S="body.S"),
         call("body.bias_load", when="!modal", p="body.p", motion="body.motion", e="body.e"),
         Copy(to="body.own", source="body.S", when="staged"),
-        call("frames.pivot_floor", when="!staged", S="body.S", floor="body.floor"),
+        call("frames.pivot_floor", when="!staged !weightless", S="body.S", floor="body.floor"),
     ),
     skip="idle", given=("parent.motion",),
 )  # fmt: skip

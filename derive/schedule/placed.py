@@ -104,10 +104,10 @@ FORCES_BY_PLACE = Pass(
 # --- factored -----------------------------------------------------------------------------------
 
 
-def column(b: str) -> Step:
+def column(b: str, d_v: str) -> Step:
     """A direction's row of B_p."""
     return call("frames.placed_column", when="placed", theta="local.turn", x="local.shift",
-                v_P="body.v", v="hinge.v", d_v=D + "hinge.v", Q="local.carrier", B_p=b)  # fmt: skip
+                v_P="body.v", v="hinge.v", d_v=d_v, Q="local.carrier", B_p=b)  # fmt: skip
 
 
 _SP = {"S_p": "place.S"}

@@ -8,6 +8,7 @@ for that body alone with its parent at rest.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from . import placed
@@ -33,6 +34,7 @@ from .steps import (
     Step,
     Sweep,
     call,
+    elsewhere,
     only,
 )
 
@@ -42,8 +44,9 @@ _HINGE_MOTION = Pass(
     "hinge_motion", "body", "Relative motion across the hinge.",
     (call("hinge.hinge", **COORDINATES, **HINGE, qdot="body.qdot"),),
 )  # fmt: skip
-#: Its derivative, as other sweeps do it too.
-HINGE_CHANGE = sloped(_HINGE_MOTION)
+#: Its derivative, as other sweeps do it too: of a hinge by itself, which nobody asks for afterwards.
+_CHANGED = {f"hinge.{name}": f"local.hinge_{name}" for name in HINGE}
+HINGE_CHANGE = elsewhere(sloped(_HINGE_MOTION), "alone", _CHANGED)
 _ACROSS = call("generic{nu}.forward", **CONNECTION, **HINGE, s="body.s",
                motion_I="parent.motion", **BODY)  # fmt: skip
 _FORWARD = Pass(
@@ -133,8 +136,11 @@ _ACROSS_NOW = {"H": "hinge.H", "v": "hinge.v", "w": "hinge.w"}
 _CARRIER = call("generic{nu}.tangent_carrier", **_ACROSS_NOW, s="body.s", c="hinge.c",
                 motion="body.motion", Q="local.carrier")  # fmt: skip
 _TURNED = {"theta": "local.turn", "x": "local.shift"}
-_TURN = call("frames.tangent_turned", R="hinge.R", d_R=D + "hinge.R", d_d=D + "hinge.d",
-             **_TURNED)  # fmt: skip
+
+
+def _turn(change: Callable[[str], str]) -> Call:
+    return call("frames.tangent_turned", R="hinge.R", d_R=change("R"), d_d=change("d"), **_TURNED)
+
 
 
 def _column(b: str, g: str, laws: str) -> dict[str, str]:
@@ -145,7 +151,16 @@ def _column(b: str, g: str, laws: str) -> dict[str, str]:
     }  # fmt: skip
 
 
-_CHANGES = {"s": "body.s"} | {f"d_{name}": f"{D}hinge.{name}" for name in ("H", "v", "w", "c")}
+def _of_section(name: str) -> str:
+    return f"{D}hinge.{name}"
+
+
+def _of_hinge(name: str) -> str:
+    return D + _CHANGED[f"hinge.{name}"]
+
+
+def _changes(change: Callable[[str], str]) -> dict[str, str]:
+    return {"s": "body.s"} | {f"d_{name}": change(name) for name in ("H", "v", "w", "c")}
 
 
 def _along_modes(b: str, g: str, b_p: str) -> tuple[Step, ...]:
@@ -154,9 +169,9 @@ def _along_modes(b: str, g: str, b_p: str) -> tuple[Step, ...]:
                 tau="modes.felt")  # fmt: skip
     return (
         Do(whole=sloped(SECTION_MOTION)),
-        _TURN,
-        call("generic{nu}.tangent_column", **_column(b, g, "none"), **_CHANGES),
-        placed.column(b_p),
+        _turn(_of_section),
+        call("generic{nu}.tangent_column", **_column(b, g, "none"), **_changes(_of_section)),
+        placed.column(b_p, _of_section("v")),
         still(felt, "e"),
     )
 
@@ -183,16 +198,16 @@ def _along_hinge(b: str, g: str, b_p: str, laws: str) -> tuple[Step, ...]:
     column = _column(b, g, laws)
     turning = {port: slot for port, slot in column.items() if port not in ("x", "v")}
     return (
-        Do(whole=HINGE_CHANGE, when="!steady"),
-        Do(whole=HINGE_CHANGE, when="steady curved"),
-        Do(whole=HINGE_CHANGE, when="steady !curved placed"),
+        *only("!steady", *HINGE_CHANGE.steps),
+        *only("steady curved", *HINGE_CHANGE.steps),
+        *only("steady !curved placed", *HINGE_CHANGE.steps),
         call("generic{nu}.tangent_along", when="!curved", H="hinge.H", d_q=D + "body.q",
              **_TURNED),
-        replace(_TURN, when="curved"),
+        replace(_turn(_of_hinge), when="curved"),
         call("generic{nu}.tangent_turning", when="turning", **turning, d_u=D + "body.u"),
         call("generic{nu}.tangent_steady", when="steady !turning", **column, d_u=D + "body.u"),
-        call("generic{nu}.tangent_column", when="!steady", **column, **_CHANGES),
-        placed.column(b_p),
+        call("generic{nu}.tangent_column", when="!steady", **column, **_changes(_of_hinge)),
+        placed.column(b_p, _of_hinge("v")),
     )  # fmt: skip
 
 

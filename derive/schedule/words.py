@@ -336,6 +336,7 @@ TRAITS: dict[str, str] = {
     "efforts": "the caller adds efforts",
     "balance": "power and potential are wanted",
     "inverse": "accelerations are given",
+    "weightless": "efforts are asked for, which no pass needs the inertia of bodies for",
     "driving": "drives give accelerations: none are given, or a residual is asked for",
     "moving": "a hinge, some speed of which is not imposed",
     "curved": "the rates of the coordinates are not the speeds",
