@@ -20300,7 +20300,6 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
     const mstmm_body *body = &state->model->bodies[index];
     double *block = state->workspace + body->block;
     double *parent = mstmm_block(state->model, state->workspace, body->parent);
-    mstmm_complex *tangent = state->tangents->numbers + body->tangent;
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
@@ -20325,11 +20324,11 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
         code = mstmm_complex_judged(state, mstmm_complex_tangent_node(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
-            .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n),
-            .V = bend + MSTMM_BEND_V(n), .D = bend + MSTMM_BEND_D(n),
-            .right = bend + MSTMM_BEND_RIGHT(n), .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
-            .work = bend + MSTMM_BEND_WORK(n)));
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
+            .K = bend + MSTMM_BEND_K(n), .Z_z = bend + MSTMM_BEND_Z_Z(n),
+            .Z_x = bend + MSTMM_BEND_Z_X(n), .V = bend + MSTMM_BEND_V(n),
+            .D = bend + MSTMM_BEND_D(n), .right = bend + MSTMM_BEND_RIGHT(n),
+            .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c, .work = bend + MSTMM_BEND_WORK(n)));
         if (code) return mstmm_complex_fail(state, MSTMM_FAILED_TANGENT, index, code);
     }
     if (body->modal && !body->section) {
@@ -20339,15 +20338,15 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
         code = mstmm_complex_judged(state, mstmm_complex_tangent_node(
             .n = modal->n, .H = state->tangents->held + modal->tangent + MSTMM_BEND_STILL(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
-            .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n),
-            .V = bend + MSTMM_BEND_V(n), .D = bend + MSTMM_BEND_D(n),
-            .right = bend + MSTMM_BEND_RIGHT(n), .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
-            .work = bend + MSTMM_BEND_WORK(n)));
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
+            .K = bend + MSTMM_BEND_K(n), .Z_z = bend + MSTMM_BEND_Z_Z(n),
+            .Z_x = bend + MSTMM_BEND_Z_X(n), .V = bend + MSTMM_BEND_V(n),
+            .D = bend + MSTMM_BEND_D(n), .right = bend + MSTMM_BEND_RIGHT(n),
+            .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c, .work = bend + MSTMM_BEND_WORK(n)));
         if (code) return mstmm_complex_fail(state, MSTMM_FAILED_TANGENT, index, code);
     }
     if (body->modal) {
-        memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), S_c, 54 * sizeof(mstmm_complex));
+        memcpy(state->tangents->numbers + mstmm_carried_at(state->tangents, body), S_c, 54 * sizeof(mstmm_complex));
     }
     if (body->modal && body->section && body->placed) {
         mstmm_complex *place = state->tangents->numbers + body->place;
@@ -20380,6 +20379,7 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
         memcpy(place + MSTMM_PLACE_S(body->nu, body->nq), S_p, 54 * sizeof(mstmm_complex));
     }
     if (!body->section && speeds && body->placed) {
+        mstmm_complex *tangent = state->tangents->numbers + body->tangent;
         mstmm_complex *place = state->tangents->numbers + body->place;
         mstmm_complex_tangent_placed_rows(
             .n = speeds, .H = state->tangents->held + body->tangent + MSTMM_TANGENT_H(body->nu, body->nq),
@@ -20391,12 +20391,13 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
             .Z_x = tangent + MSTMM_TANGENT_W(body->nu, body->nq));
     }
     if (!body->section && speeds) {
+        mstmm_complex *tangent = state->tangents->numbers + body->tangent;
         mstmm_complex_generic_tangent_rows(speeds,
             .H = state->tangents->held + body->tangent + MSTMM_TANGENT_H(body->nu, body->nq),
             .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
             .W = tangent + MSTMM_TANGENT_W(body->nu, body->nq),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = K, .right = right, .D = D,
-            .one = one);
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body), .K = K,
+            .right = right, .D = D, .one = one);
         code = mstmm_complex_judged(state, mstmm_complex_tangent_invert(
             .n = speeds, .D = D, .one = one,
             .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), .work = work));
@@ -20406,9 +20407,10 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
             .K = K, .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq),
             .gain = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
             .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq));
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body));
     }
     if (!body->section && speeds && body->placed) {
+        mstmm_complex *tangent = state->tangents->numbers + body->tangent;
         mstmm_complex *place = state->tangents->numbers + body->place;
         mstmm_complex_tangent_placed_reduce(
             .n = speeds, .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq),
@@ -20419,15 +20421,16 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
     mstmm_complex_frames_tangent_carry(
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
-        .w = block + MSTMM_BLOCK_HINGE_W, .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
-        .T = T, .S_I = state->tangents->numbers + mstmm_tangent_at(state->model, body->parent));
+        .w = block + MSTMM_BLOCK_HINGE_W,
+        .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body), .T = T,
+        .S_I = state->tangents->numbers + mstmm_tangent_at(state, body->parent));
     if (body->placed) {
         mstmm_complex *place = state->tangents->numbers + body->place;
         mstmm_complex_frames_placed_carry(
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .T_p = T_p, .T_w = T,
             .S_pI = state->tangents->numbers + mstmm_place_at(state->model, body->parent),
-            .S_wI = state->tangents->numbers + mstmm_tangent_at(state->model, body->parent));
+            .S_wI = state->tangents->numbers + mstmm_tangent_at(state, body->parent));
     }
     if (body->section && !body->section->inward) {
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -20440,7 +20443,7 @@ static int mstmm_complex_at_tangent_eliminated(mstmm_complex_state *state, int i
             .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = laid + MSTMM_SECTION_H(n), .B = port + MSTMM_PORT_B(n),
             .G = port + MSTMM_PORT_G(n), .W = port + MSTMM_PORT_W(n),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .T = T,
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body), .T = T,
             .K_x = port + MSTMM_PORT_K(n), .K = bend + MSTMM_BEND_K(n),
             .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n));
     }

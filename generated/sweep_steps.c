@@ -2989,12 +2989,10 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
     }
     if (!body->modal) {
         real *block = state->workspace + body->block;
-        real *tangent = state->tangents->numbers + body->tangent;
         mstmm_body_load_by_motion(body->kernels->load_by_motion,
             .p = body->body_p, .motion = block + MSTMM_BLOCK_MOTION,
-            .J = tangent + MSTMM_TANGENT_S(body->nu, body->nq));
+            .J = state->tangents->numbers + mstmm_carried_at(state->tangents, body));
     } else {
-        real *tangent = state->tangents->numbers + body->tangent;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
@@ -3008,7 +3006,7 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
                 code = mstmm_at_drag_slope(state, index);
                 if (code) return code;
             }
-            memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
+            memcpy(state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
             memcpy(bend + MSTMM_BEND_Z_Z(n) + n * c, d_modes + MSTMM_MODES_E_F(n), (size_t)(n) * sizeof(real));
         }
         mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, -1);
@@ -3187,7 +3185,6 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
     real *block = state->workspace + body->block;
     real *from = mstmm_block(state->model, state->workspace, force->body_f);
     real *to = mstmm_block(state->model, state->workspace, force->body_t);
-    real *tangent = state->tangents->numbers + body->tangent;
     real *place = state->tangents->numbers + body->place;
     real *d_block = state->slope->workspace + body->block;
     real *d_from = mstmm_block(state->model, state->slope->workspace, force->body_f);
@@ -3318,7 +3315,7 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
     memset(d_block + MSTMM_BLOCK_V, 0, 3 * sizeof(real));
     for (int c = 0; c < 3; c++) {
         mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, c);
-        memcpy(d_block + MSTMM_BLOCK_E, tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 6 * c, (size_t)(6) * sizeof(real));
+        memcpy(d_block + MSTMM_BLOCK_E, state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 6 * c, (size_t)(6) * sizeof(real));
         if (force->body_f >= 0) {
             mstmm_frames_point_slope(
                 .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
@@ -3388,7 +3385,7 @@ static int mstmm_at_forces_by_place(mstmm_state *state, int index)
                 .F = F_back, .M = M_back, .d_A = d_from + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros,
                 .d_F = d_F_back, .d_M = d_M_back, .d_e = d_from + MSTMM_BLOCK_E);
         }
-        memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
+        memcpy(state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 6 * c, d_block + MSTMM_BLOCK_E, (size_t)(6) * sizeof(real));
     }
     mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, -1);
     return 0;
@@ -3420,7 +3417,6 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
-    real *tangent = state->tangents->numbers + body->tangent;
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
@@ -3476,6 +3472,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
     }
     if (!body->section && speeds) {
         const int nu = body->nu;
+        real *tangent = state->tangents->numbers + body->tangent;
         real *place = state->tangents->numbers + body->place;
         mstmm_generic_tangent_carrier(nu,
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
@@ -3630,11 +3627,11 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         code = mstmm_judged(state, mstmm_tangent_node(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
-            .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n),
-            .V = bend + MSTMM_BEND_V(n), .D = bend + MSTMM_BEND_D(n),
-            .right = bend + MSTMM_BEND_RIGHT(n), .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
-            .work = bend + MSTMM_BEND_WORK(n)));
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
+            .K = bend + MSTMM_BEND_K(n), .Z_z = bend + MSTMM_BEND_Z_Z(n),
+            .Z_x = bend + MSTMM_BEND_Z_X(n), .V = bend + MSTMM_BEND_V(n),
+            .D = bend + MSTMM_BEND_D(n), .right = bend + MSTMM_BEND_RIGHT(n),
+            .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c, .work = bend + MSTMM_BEND_WORK(n)));
         if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
     }
     if (body->modal && !body->section) {
@@ -3644,15 +3641,15 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         code = mstmm_judged(state, mstmm_tangent_node(
             .n = modal->n, .H = bend + MSTMM_BEND_STILL(n), .B = bend + MSTMM_BEND_B(n),
             .G = bend + MSTMM_BEND_G(n), .W = bend + MSTMM_BEND_W(n),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = bend + MSTMM_BEND_K(n),
-            .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n),
-            .V = bend + MSTMM_BEND_V(n), .D = bend + MSTMM_BEND_D(n),
-            .right = bend + MSTMM_BEND_RIGHT(n), .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
-            .work = bend + MSTMM_BEND_WORK(n)));
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
+            .K = bend + MSTMM_BEND_K(n), .Z_z = bend + MSTMM_BEND_Z_Z(n),
+            .Z_x = bend + MSTMM_BEND_Z_X(n), .V = bend + MSTMM_BEND_V(n),
+            .D = bend + MSTMM_BEND_D(n), .right = bend + MSTMM_BEND_RIGHT(n),
+            .gain = bend + MSTMM_BEND_GAIN(n), .S_c = S_c, .work = bend + MSTMM_BEND_WORK(n)));
         if (code) return mstmm_fail(state, MSTMM_FAILED_TANGENT, index, code);
     }
     if (body->modal) {
-        memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), S_c, 54 * sizeof(real));
+        memcpy(state->tangents->numbers + mstmm_carried_at(state->tangents, body), S_c, 54 * sizeof(real));
     }
     if (body->modal && body->section && body->placed) {
         real *place = state->tangents->numbers + body->place;
@@ -3685,6 +3682,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         memcpy(place + MSTMM_PLACE_S(body->nu, body->nq), S_p, 54 * sizeof(real));
     }
     if (!body->section && speeds && body->placed) {
+        real *tangent = state->tangents->numbers + body->tangent;
         real *place = state->tangents->numbers + body->place;
         mstmm_tangent_placed_rows(
             .n = speeds, .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
@@ -3696,12 +3694,13 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .Z_x = tangent + MSTMM_TANGENT_W(body->nu, body->nq));
     }
     if (!body->section && speeds) {
+        real *tangent = state->tangents->numbers + body->tangent;
         mstmm_generic_tangent_rows(speeds,
             .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq),
             .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
             .W = tangent + MSTMM_TANGENT_W(body->nu, body->nq),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .K = K, .right = right, .D = D,
-            .one = one);
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body), .K = K,
+            .right = right, .D = D, .one = one);
         code = mstmm_judged(state, mstmm_tangent_invert(
             .n = speeds, .D = D, .one = one,
             .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), .work = work));
@@ -3711,9 +3710,10 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .K = K, .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq),
             .gain = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
             .V = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq));
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body));
     }
     if (!body->section && speeds && body->placed) {
+        real *tangent = state->tangents->numbers + body->tangent;
         real *place = state->tangents->numbers + body->place;
         mstmm_tangent_placed_reduce(
             .n = speeds, .inverse = tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq),
@@ -3724,15 +3724,16 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
     mstmm_frames_tangent_carry(
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
-        .w = block + MSTMM_BLOCK_HINGE_W, .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
-        .T = T, .S_I = state->tangents->numbers + mstmm_tangent_at(state->model, body->parent));
+        .w = block + MSTMM_BLOCK_HINGE_W,
+        .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body), .T = T,
+        .S_I = state->tangents->numbers + mstmm_tangent_at(state, body->parent));
     if (body->placed) {
         real *place = state->tangents->numbers + body->place;
         mstmm_frames_placed_carry(
             .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .T_p = T_p, .T_w = T,
             .S_pI = state->tangents->numbers + mstmm_place_at(state->model, body->parent),
-            .S_wI = state->tangents->numbers + mstmm_tangent_at(state->model, body->parent));
+            .S_wI = state->tangents->numbers + mstmm_tangent_at(state, body->parent));
     }
     if (body->section && !body->section->inward) {
         const mstmm_modal *modal = mstmm_modal_of(body);
@@ -3745,7 +3746,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = laid + MSTMM_SECTION_H(n), .B = port + MSTMM_PORT_B(n),
             .G = port + MSTMM_PORT_G(n), .W = port + MSTMM_PORT_W(n),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .T = T,
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body), .T = T,
             .K_x = port + MSTMM_PORT_K(n), .K = bend + MSTMM_BEND_K(n),
             .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
@@ -4361,7 +4362,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
     if (body->section) {
         real *tangent = state->tangents->numbers + body->tangent;
         mstmm_frames_tangent_known(
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
             .b = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .g = turned, .e_S = seen,
             .e_b = known);
     }
@@ -4488,7 +4489,7 @@ static int mstmm_at_known_carried(mstmm_state *state, int index)
         for (int k = 0; k < speeds; k++)
             rows[k] = change[columns[k]];
         mstmm_frames_tangent_known(
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
             .b = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq), .g = turned, .e_S = seen,
             .e_b = known);
     }
@@ -4667,12 +4668,14 @@ static int mstmm_at_laws_own(mstmm_state *state, int index)
     if (mstmm_idle(state->observed, body)) return 0;
     if (!body->modal) {
         mstmm_body_inertia(body->kernels->inertia,
-            .p = body->body_p, .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq));
+            .p = body->body_p,
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body));
     } else {
-        memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), block + MSTMM_BLOCK_S, 21 * sizeof(real));
+        memcpy(state->tangents->numbers + mstmm_carried_at(state->tangents, body), block + MSTMM_BLOCK_S, 21 * sizeof(real));
     }
     mstmm_frames_pivot_floor(
-        .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .floor_ = block + MSTMM_BLOCK_FLOOR);
+        .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
+        .floor_ = block + MSTMM_BLOCK_FLOOR);
     for (int j = 0; j < nu * nu; j++)
         (tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq))[j] = 0;
     if (body->modal) {
@@ -4692,24 +4695,6 @@ static int mstmm_at_laws_own(mstmm_state *state, int index)
     return 0;
 }
 
-/* Derivatives: relative motion across the hinge. */
-static int mstmm_at_alone_hinge_motion_slope(mstmm_state *state, int index)
-{
-    real d_hinge_R[9];
-    real d_hinge_d[3];
-    real d_hinge_H[6];
-    real d_hinge_v[3];
-    real d_hinge_w[3];
-    real d_hinge_c[6];
-    const mstmm_body *body = &state->model->bodies[index];
-    mstmm_hinge_slope_of(state, body,
-        .p = body->hinge_p, .q = state->q + body->q, .u = state->u + body->u,
-        .d_q = state->slope->q + body->q, .d_u = state->slope->u + body->u, .d_R = d_hinge_R,
-        .d_d = d_hinge_d, .d_H = d_hinge_H, .d_v = d_hinge_v, .d_w = d_hinge_w, .d_c = d_hinge_c,
-        .d_qdot = state->slope->qdot + body->q);
-    return 0;
-}
-
 /* Rates of the coordinates by each of the speeds. */
 static int mstmm_at_laws_rates(mstmm_state *state, int index)
 {
@@ -4721,7 +4706,7 @@ static int mstmm_at_laws_rates(mstmm_state *state, int index)
     if (body->straight) return 0;
     for (int c = 0; c < nu; c++) {
         mstmm_aim_rate(state, body, c);
-        code = mstmm_at_alone_hinge_motion_slope(state, index);
+        code = mstmm_at_hinge_motion_slope(state, index);
         if (code) return code;
         memcpy(tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + nq * c, state->slope->qdot + body->q, (size_t)(nq) * sizeof(real));
     }
@@ -4768,7 +4753,6 @@ static int mstmm_at_laws_modal_condense(mstmm_state *state, int index)
     real S_c[21];
     real e_c[6];
     const mstmm_body *body = &state->model->bodies[index];
-    real *tangent = state->tangents->numbers + body->tangent;
     real *d_block = state->slope->workspace + body->block;
     int code;
     if (state->efforts) {
@@ -4787,11 +4771,13 @@ static int mstmm_at_laws_modal_condense(mstmm_state *state, int index)
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
         mstmm_modal_rebase(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n),
-            .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq), .e = d_block + MSTMM_BLOCK_E,
-            .S_rf = bend + MSTMM_BEND_V(n), .S_rf_I = bend + MSTMM_BEND_G(n),
-            .S_ff = bend + MSTMM_BEND_D(n), .e_f = d_modes + MSTMM_MODES_E_F(n));
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
+            .e = d_block + MSTMM_BLOCK_E, .S_rf = bend + MSTMM_BEND_V(n),
+            .S_rf_I = bend + MSTMM_BEND_G(n), .S_ff = bend + MSTMM_BEND_D(n),
+            .e_f = d_modes + MSTMM_MODES_E_F(n));
         code = mstmm_modal_condense(
-            .n = modal->n, .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+            .n = modal->n,
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
             .e = d_block + MSTMM_BLOCK_E, .S_rf = bend + MSTMM_BEND_G(n),
             .S_ff = bend + MSTMM_BEND_D(n), .e_f = d_modes + MSTMM_MODES_E_F(n),
             .right = bend + MSTMM_BEND_RIGHT(n), .Gg = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
@@ -4803,14 +4789,15 @@ static int mstmm_at_laws_modal_condense(mstmm_state *state, int index)
         real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
         code = mstmm_modal_condense(
-            .n = modal->n, .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+            .n = modal->n,
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
             .e = d_block + MSTMM_BLOCK_E, .S_rf = bend + MSTMM_BEND_V(n),
             .S_ff = bend + MSTMM_BEND_D(n), .e_f = d_modes + MSTMM_MODES_E_F(n),
             .right = bend + MSTMM_BEND_RIGHT(n), .Gg = bend + MSTMM_BEND_GAIN(n), .S_c = S_c,
             .e_c = e_c, .work = bend + MSTMM_BEND_WORK(n));
         if (code) return mstmm_fail(state, MSTMM_FAILED_MODES, index, code);
     }
-    memcpy(tangent + MSTMM_TANGENT_S(body->nu, body->nq), S_c, 21 * sizeof(real));
+    memcpy(state->tangents->numbers + mstmm_carried_at(state->tangents, body), S_c, 21 * sizeof(real));
     memcpy(d_block + MSTMM_BLOCK_E, e_c, 6 * sizeof(real));
     return 0;
 }
@@ -4845,7 +4832,8 @@ static int mstmm_at_laws_factorise(mstmm_state *state, int index)
         real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
         mstmm_modal_absorb(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
-            .H = laid + MSTMM_SECTION_H(n), .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+            .H = laid + MSTMM_SECTION_H(n),
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
             .e = d_block + MSTMM_BLOCK_E, .U = port + MSTMM_PORT_K(n),
             .S_rf = bend + MSTMM_BEND_V(n), .S_ff = bend + MSTMM_BEND_D(n),
             .e_f = d_modes + MSTMM_MODES_E_F(n));
@@ -4859,10 +4847,10 @@ static int mstmm_at_laws_factorise(mstmm_state *state, int index)
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq), .J = hinge_J_free,
         .W = tangent + MSTMM_TANGENT_W(body->nu, body->nq), .floor_ = block + MSTMM_BLOCK_FLOOR,
-        .S = tangent + MSTMM_TANGENT_S(body->nu, body->nq),
+        .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
         .F = tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq),
         .G = tangent + MSTMM_TANGENT_V(body->nu, body->nq),
-        .S_I = state->tangents->numbers + mstmm_tangent_at(state->model, body->parent));
+        .S_I = state->tangents->numbers + mstmm_tangent_at(state, body->parent));
     if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
     return 0;
 }
@@ -5043,7 +5031,7 @@ int mstmm_at_lagged(mstmm_state *state, int index)
     const int nq = body->nq;
     real *tangent = state->tangents->numbers + body->tangent;
     int code;
-    code = mstmm_at_alone_hinge_motion_slope(state, index);
+    code = mstmm_at_hinge_motion_slope(state, index);
     if (code) return code;
     for (int j = 0; j < nq; j++)
         (state->slope->qdot + body->q)[j] += (state->tangents->rho + body->q)[j];
@@ -5059,7 +5047,7 @@ int mstmm_at_rates_change(mstmm_state *state, int index)
     const mstmm_body *body = &state->model->bodies[index];
     const int nq = body->nq;
     int code;
-    code = mstmm_at_alone_hinge_motion_slope(state, index);
+    code = mstmm_at_hinge_motion_slope(state, index);
     if (code) return code;
     for (int j = 0; j < nq; j++)
         (state->tangents->change + body->q)[j] = (state->slope->qdot + body->q)[j];
@@ -5925,7 +5913,7 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_own(const mstmm_state *state, int index, 
     real *tangent = state->tangents->numbers + body->tangent;
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_MOTION, block + MSTMM_BLOCK_MOTION + 9);
-    mstmm_fetch(tangent + MSTMM_TANGENT_S(body->nu, body->nq), tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 54);
+    mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 54);
     mstmm_fetch(tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq), tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + nu * nu);
 }
 static int mstmm_pass_tangent_own(mstmm_state *state)
@@ -5978,7 +5966,8 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_condense(const mstmm_state *state, int in
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_HINGE_C + 6);
     mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
-    mstmm_fetch(tangent + MSTMM_TANGENT_S(body->nu, body->nq), tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq) + nu * nu);
+    mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 54);
+    mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq) + nu * nu);
 }
 static int mstmm_pass_tangent_condense(mstmm_state *state)
 {
@@ -6413,7 +6402,8 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_condense_tile(const mstmm_state *state, i
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_HINGE_C + 6);
     mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
-    mstmm_fetch(tangent + MSTMM_TANGENT_S(body->nu, body->nq), tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq) + nu * nu);
+    mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 54);
+    mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq) + nu * nu);
 }
 static int mstmm_tiles_tangent_condense(mstmm_state *state)
 {
@@ -6451,7 +6441,8 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_brought_chain(const mstmm_state *state, i
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_HINGE_V, block + MSTMM_BLOCK_HINGE_C + 6);
     mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
-    mstmm_fetch(tangent + MSTMM_TANGENT_S(body->nu, body->nq), tangent + MSTMM_TANGENT_H(body->nu, body->nq) + 6 * nu);
+    mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 54);
+    mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_H(body->nu, body->nq) + 6 * nu);
 }
 static int mstmm_chain_tangent_brought(mstmm_state *state)
 {
@@ -6522,9 +6513,9 @@ MSTMM_AT_ONCE void mstmm_fetch_known_carried_tile(const mstmm_state *state, int 
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_HINGE_C + 6);
     mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 54);
     mstmm_fetch(d_block + MSTMM_BLOCK_E, d_block + MSTMM_BLOCK_E + 6);
     mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU) + nu);
-    mstmm_fetch(tangent + MSTMM_TANGENT_S(body->nu, body->nq), tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 54);
     mstmm_fetch(tangent + MSTMM_TANGENT_H(body->nu, body->nq), tangent + MSTMM_TANGENT_V(body->nu, body->nq) + 6 * nu);
     mstmm_fetch(tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq) + 9);
 }
@@ -6565,7 +6556,7 @@ MSTMM_AT_ONCE void mstmm_fetch_laws_factorise_tile(const mstmm_state *state, int
     mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
-    mstmm_fetch(tangent + MSTMM_TANGENT_S(body->nu, body->nq), tangent + MSTMM_TANGENT_S(body->nu, body->nq) + 21);
+    mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 21);
     mstmm_fetch(tangent + MSTMM_TANGENT_W(body->nu, body->nq), tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq) + nu * nu);
 }
 static int mstmm_tiles_laws_factorise(mstmm_state *state)

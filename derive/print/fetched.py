@@ -76,9 +76,9 @@ def _stretch(slot: str) -> _Stretch | None:
     if begin is None or found is None or own not in SLOTS:
         return None
     numbers = prod(int(word) for word in SLOTS[own].size.split() if word.isdigit())
-    variable = next(word for word in ("d_block", "block", "tangent") if reads(found.text, word))
+    named = (word for word in ("d_block", "block", "tangent") if reads(found.text, word))
     last = f"{found.text} + {size_of(own).replace('free', 'nu')}"
-    return _Stretch(variable, begin, begin + numbers, found.text, last)
+    return _Stretch(next(named, "body"), begin, begin + numbers, found.text, last)
 
 
 def _merged(stretches: Iterable[_Stretch]) -> list[_Stretch]:

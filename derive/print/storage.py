@@ -92,6 +92,7 @@ _MOMENTS = {
 _STATE = {"given": "given", "efforts": "efforts", "udot": "udot", "required": "required",
           "column": "column", "answer": "answer"}  # fmt: skip
 
+_INBOARD = "state->tangents->numbers + mstmm_tangent_at(state, body->parent)"
 #: What the scene gives, and where results go.
 _PLACES = {
     "body.p": "body->body_p", "body.rotor": "body->rotor", "hinge.p": "body->hinge_p",
@@ -127,8 +128,8 @@ _PLACES = {
     "law.slopes": "tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + body->nu * c + law->speed",
     "law.own_slopes": "tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq)"
     " + body->nu * (law->speed + c) + law->speed",
-    "inboard.S": "state->tangents->numbers + mstmm_tangent_at(state->model, body->parent)",
-    "inboard.mass": "state->tangents->numbers + mstmm_tangent_at(state->model, body->parent)",
+    "tangent.S": "state->tangents->numbers + mstmm_carried_at(state->tangents, body)",
+    "inboard.S": _INBOARD, "inboard.mass": _INBOARD,
     "inboard.place": "state->tangents->numbers + mstmm_place_at(state->model, body->parent)",
     "inboard.z": "state->tangents->numbers + mstmm_place_at(state->model, body->parent)"
     " + MSTMM_PLACE_Z(0, 0)",

@@ -44,9 +44,11 @@ _HINGE_MOTION = Pass(
     "hinge_motion", "body", "Relative motion across the hinge.",
     (call("hinge.hinge", **COORDINATES, **HINGE, qdot="body.qdot"),),
 )  # fmt: skip
-#: Its derivative, as other sweeps do it too: of a hinge by itself, which nobody asks for afterwards.
+#: Its derivative, as other sweeps do it too.
+HINGE_CHANGE = sloped(_HINGE_MOTION)
+#: The same where nobody asks for it behind the steps that follow.
 _CHANGED = {f"hinge.{name}": f"local.hinge_{name}" for name in HINGE}
-HINGE_CHANGE = elsewhere(sloped(_HINGE_MOTION), "alone", _CHANGED)
+_CHANGE = elsewhere(HINGE_CHANGE, "", _CHANGED).steps
 _ACROSS = call("generic{nu}.forward", **CONNECTION, **HINGE, s="body.s",
                motion_I="parent.motion", **BODY)  # fmt: skip
 _FORWARD = Pass(
@@ -198,9 +200,9 @@ def _along_hinge(b: str, g: str, b_p: str, laws: str) -> tuple[Step, ...]:
     column = _column(b, g, laws)
     turning = {port: slot for port, slot in column.items() if port not in ("x", "v")}
     return (
-        *only("!steady", *HINGE_CHANGE.steps),
-        *only("steady curved", *HINGE_CHANGE.steps),
-        *only("steady !curved placed", *HINGE_CHANGE.steps),
+        *only("!steady", *_CHANGE),
+        *only("steady curved", *_CHANGE),
+        *only("steady !curved placed", *_CHANGE),
         call("generic{nu}.tangent_along", when="!curved", H="hinge.H", d_q=D + "body.q",
              **_TURNED),
         replace(_turn(_of_hinge), when="curved"),

@@ -147,7 +147,7 @@ static int solve_alone(mstmm_tangent *at, const real *r, const mstmm_known *know
 {
     const mstmm_parts parts = parts_of(at);
     mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq,
-                           .kappa = at->kappa};
+                           .kappa = at->kappa, .kept = at->kept};
     mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
     const int loads = 6 * at->couplings->n_bodies;
     state.slope = &slope;
@@ -217,7 +217,12 @@ int mstmm_across_solve(mstmm_tangent *at, const real *r, const mstmm_known *know
 {
     const int m = at->n_coupled, nu = at->model->nu, first = n_changes(at);
     real *amounts = mstmm_across_changes(at);
-    int code = solve_alone(at, r, known, -1, x);
+    int code = 0;
+    if (known && !at->kept) { /* the first to ask for what is known: it will not be the last */
+        at->keeps = 1;
+        code = mstmm_tangent_factor(at, at->rate, at->s, at->sq, at->kappa);
+    }
+    if (!code) code = solve_alone(at, r, known, -1, x);
     if (code || !m) return code;
     code = changes_along(at, x, known, -1, amounts);
     if (code) return code;

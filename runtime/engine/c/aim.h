@@ -96,10 +96,12 @@ static inline int64_t mstmm_place_at(const mstmm_model *model, int body)
     return body < 0 ? MSTMM_TANGENT_B(0, 0) : model->bodies[body].place;
 }
 
-/* Where S of the tangent is, of a body or (-1) of the ground. */
-static inline int64_t mstmm_tangent_at(const mstmm_model *model, int body)
-{
-    return body < 0 ? 0 : model->bodies[body].tangent;
-}
+/* Where S of the tangent is: with a body's own numbers if somebody asks for it once the body is
+ * eliminated, else where memory is at hand. */
+#define mstmm_carried_at(tangents, body) ((tangents)->kept ? (body)->tangent : (body)->carried)
+
+/* The same of a body or (-1) of the ground. */
+#define mstmm_tangent_at(state, body)                                                              \
+    ((body) < 0 ? 0 : mstmm_carried_at((state)->tangents, &(state)->model->bodies[body]))
 
 #endif

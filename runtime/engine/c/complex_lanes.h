@@ -116,6 +116,7 @@ MSTMM_COMPLEX int mstmm_complex_solve_lu(int n, int m, const mstmm_complex *rest
 typedef struct {
     mstmm_complex *numbers;
     const real *held;    /* what no s changes of them */
+    int kept;            /* S of every body stays */
 } mstmm_complex_tangents;
 
 typedef struct {

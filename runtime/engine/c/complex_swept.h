@@ -1,5 +1,6 @@
 /* Sweeps in complex numbers behind the passes of complex_steps.c, whose end this is. */
 #ifdef MSTMM_LANES
+#include "tiles.h"
 
 typedef struct {
     mstmm_complex_state state;
@@ -22,18 +23,34 @@ static inline void inertia(const mstmm_complex *S, mstmm_lanes *sizes)
         }
 }
 
-/* What bodies bring at s, of numbers `first` to before `end`. */
-static void bring(const mstmm_response *of, mstmm_lanes_at *with, int64_t first, int64_t end)
+/* What bodies bring at s, of numbers `first` to before `end`, from `to` on. */
+static void bring(const mstmm_response *of, const mstmm_lanes_at *with, int64_t first, int64_t end,
+                  mstmm_complex *to)
 {
     const real *by_rate = of->brought, *by_square = by_rate + of->n_numbers;
     const real *lost = by_square + of->n_numbers;
-    mstmm_complex *numbers = with->tangents.numbers;
     const mstmm_complex s = with->s, square = with->square;
-    for (int64_t k = first; k < end; k++) {
-        numbers[k].re = with->tangents.held[k] + s.re * by_rate[k] + square.re * by_square[k];
-        numbers[k].im = s.im * by_rate[k] + square.im * by_square[k];
+    for (int64_t k = first; k < end; k++, to++) {
+        to->re = with->tangents.held[k] + s.re * by_rate[k] + square.re * by_square[k];
+        to->im = s.im * by_rate[k] + square.im * by_square[k];
+        if (of->stiffer) to->im += lost[k];
     }
-    for (int64_t k = first; of->stiffer && k < end; k++) numbers[k].im += lost[k];
+}
+
+/* What a body brings, but for numbers that the elimination makes; S where memory is at hand. */
+static void bring_body(const mstmm_response *of, mstmm_lanes_at *with, int index)
+{
+    const mstmm_model *model = of->at->model;
+    const mstmm_body *body = &model->bodies[index];
+    const int64_t own = body->tangent, B = own + MSTMM_TANGENT_B(body->nu, body->nq);
+    const int64_t made = own + MSTMM_TANGENT_H(body->nu, body->nq);
+    const int64_t behind = own + MSTMM_TANGENT_NUMBERS(body->nu, body->nq);
+    const int64_t end =
+        index + 1 < model->n_bodies ? model->bodies[index + 1].tangent : of->n_numbers;
+    mstmm_complex *numbers = with->tangents.numbers;
+    bring(of, with, own, B, numbers + mstmm_carried_at(&with->tangents, body));
+    bring(of, with, B, made, numbers + B);
+    bring(of, with, behind, end, numbers + behind);
 }
 
 /* --- bodies by their dynamic stiffness --- */
@@ -55,7 +72,8 @@ static void lay_exact(const mstmm_response *of, mstmm_lanes_at *with, int body, 
     const mstmm_body *one = &of->at->model->bodies[body];
     const int n = mstmm_modes_of(one->modal), size = 6 + n;
     mstmm_complex *numbers = with->tangents.numbers;
-    mstmm_complex *S = numbers + one->tangent, *bend = numbers + one->modal->tangent;
+    mstmm_complex *S = numbers + mstmm_carried_at(&with->tangents, one);
+    mstmm_complex *bend = numbers + one->modal->tangent;
     const mstmm_complex per_square = mstmm_complex_inverse(with->square);
     for (int j = 0; j < size; j++)
         for (int k = 0; k < size; k++) {
@@ -98,24 +116,20 @@ static void keep_pivots(const mstmm_response *of, const mstmm_lanes_at *with, in
 static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
 {
     const mstmm_model *model = of->at->model;
-    int64_t begun = of->n_numbers, exact = 0;
-    int next = 0;
+    int64_t exact = 0;
+    int begun = model->n_bodies, next = 0;
     with->growth = 1 + (mstmm_lanes){0};
     with->grown = -1 + (mstmm_bits){0};
     for (int i = model->n_bodies - 1; i >= 0; i--) {
         const mstmm_body *body = &model->bodies[i];
-        const mstmm_complex *S = with->tangents.numbers + body->tangent;
-        const int64_t first = mstmm_tangent_at(model, body->parent);
-        if (first < begun) {
-            bring(of, with, first, begun);
-            begun = first;
-            for (; next < of->n_exact; next++) {
-                const mstmm_body *one = &model->bodies[of->exact_bodies[next]];
-                if (one->tangent < first) break;
-                const int size = 6 + mstmm_modes_of(one->modal);
-                lay_exact(of, with, of->exact_bodies[next], exact);
-                exact += size * size;
-            }
+        const mstmm_complex *S =
+            with->tangents.numbers + mstmm_carried_at(&with->tangents, body);
+        const int least = mstmm_least_parent(model, i, i + 1);
+        while (begun > least) bring_body(of, with, --begun);
+        for (; next < of->n_exact && of->exact_bodies[next] >= begun; next++) {
+            const int size = 6 + mstmm_modes_of(model->bodies[of->exact_bodies[next]].modal);
+            lay_exact(of, with, of->exact_bodies[next], exact);
+            exact += size * size;
         }
         mstmm_lanes before[2], after[2];
         inertia(S, before);
@@ -244,7 +258,8 @@ static void take(mstmm_response *of, int count, const real *s, mstmm_lanes_at *w
     }
     with->square = mstmm_complex_times(with->s, with->s);
     with->slope.workspace = (mstmm_complex *)of->workspace;
-    with->tangents = (mstmm_complex_tangents){(mstmm_complex *)of->numbers, at->numbers};
+    with->tangents = (mstmm_complex_tangents){
+        .numbers = (mstmm_complex *)of->numbers, .held = at->numbers};
     with->state = (mstmm_complex_state){
         .model = at->model, .workspace = at->workspace, .memory = at->memory,
         .slope = &with->slope, .tangents = &with->tangents, .failure = &at->failure};

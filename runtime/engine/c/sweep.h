@@ -58,6 +58,7 @@ typedef struct {
     int q, u, nq, nu; /* place and number of coordinates and speeds in the state */
     int block;        /* first number of its block in the workspace */
     int release;      /* place in memory that is non-zero once they are free; -1: never */
+    int carried;      /* of S in the numbers of a tangent that keeps none: others use it, too */
     signed char n_imposed; /* speeds driven or held until release */
     signed char generic;   /* swept by the hinge kernel and the generic steps */
     signed char straight;  /* the rates of the coordinates are the speeds */
@@ -337,6 +338,7 @@ static inline int mstmm_imposed(const mstmm_body *body, const real *memory)
 /* What the tangent of a step keeps. */
 typedef struct mstmm_tangents {
     real *numbers;        /* see mstmm_tangent_lay */
+    int kept;             /* S of every body stays */
     /* Along unknowns x: du = rate x, da = s x, dq = (sq - kappa g_q)^-1 N x */
     real rate, s, sq, kappa;
     int laws_alone;       /* kappa counts for nothing: see mstmm_laws_factor */

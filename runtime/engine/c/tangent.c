@@ -8,20 +8,48 @@
 #include "aim.h"
 #include "hinge.h"
 #include "sweep_steps.h"
+#include "tiles.h"
 
 int64_t mstmm_bend_numbers(int n);
 int64_t mstmm_port_numbers(int n);
+
+/* Places of S from `place` on, where memory stays at hand: as tiles go from the tips to the root, a
+ * place is taken again once all of its tile are eliminated.  Meanwhile bodies with places that are
+ * free tell the next such body in `place`. */
+static int64_t lay_carried(mstmm_model *model, int64_t place)
+{
+    int64_t unused = -1;
+    for (int end = model->n_bodies, begun = end; end > 0; end -= MSTMM_TILE) {
+        const int first = end > MSTMM_TILE ? end - MSTMM_TILE : 0;
+        const int least = mstmm_least_parent(model, first, end);
+        for (; begun > least; begun--) {
+            mstmm_body *body = &model->bodies[begun - 1];
+            body->carried = (int)(unused < 0 ? place : model->bodies[unused].carried);
+            if (unused < 0)
+                place += MSTMM_TANGENT_B(0, 0);
+            else
+                unused = model->bodies[unused].place;
+        }
+        for (int i = first; i < end; i++) {
+            model->bodies[i].place = unused;
+            unused = i;
+        }
+    }
+    return place;
+}
 
 int64_t mstmm_tangent_lay(mstmm_model *model)
 {
     /* The ground has an S that nobody reads, and a place that does not change. */
     int64_t place = MSTMM_TANGENT_B(0, 0) + MSTMM_PLACE_NUMBERS(0, 0);
+    place = lay_carried(model, place);
     for (int i = 0; i < model->n_bodies; i++) {
         mstmm_body *body = &model->bodies[i];
         const int known = body->kernels->slope_tape || body->kernels->hinge_slope;
         if (!known || !body->kernels->bias_load_slope || !body->kernels->load_by_motion) return -1 - i;
         body->tangent = place;
         place += MSTMM_TANGENT_NUMBERS(body->nu, body->nq);
+        body->place = 0;
         if (body->placed) {
             body->place = place;
             place += MSTMM_PLACE_NUMBERS(body->nu, body->nq);
@@ -206,16 +234,17 @@ static void take_steps(mstmm_tangent *at, real rate, real s, real sq, real kappa
 }
 
 /* Passes of the tangent from no direction at all; `negative` is that of mstmm_tangents. */
-static int run_tangent(mstmm_tangent *at, int (*run)(mstmm_state *), int *negative)
+static int run_tangent(mstmm_tangent *at, int (*run)(mstmm_state *), int *negative, int kept)
 {
     const mstmm_model *model = at->model;
     const mstmm_parts parts = parts_of(at);
     mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq,
-                           .kappa = at->kappa, .negative = negative};
+                           .kappa = at->kappa, .negative = negative, .kept = kept};
     mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
     at->laws_alone = 0;
+    at->kept = kept;
     memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
     memset(parts.d_u, 0, (size_t)model->nu * sizeof(real));
     memset(parts.d_a, 0, (size_t)model->nu * sizeof(real));
@@ -226,7 +255,7 @@ static int run_tangent(mstmm_tangent *at, int (*run)(mstmm_state *), int *negati
 int mstmm_tangent_brought(mstmm_tangent *at, real rate, real s, real sq)
 {
     take_steps(at, rate, s, sq, 0);
-    return run_tangent(at, mstmm_run_tangent_brought, NULL);
+    return run_tangent(at, mstmm_run_tangent_brought, NULL, 1);
 }
 
 int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
@@ -234,8 +263,10 @@ int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kap
     take_steps(at, rate, s, sq, kappa);
     /* With couplings left out a body may topple that they hold. */
     int negative = 0;
+    /* Where loads need poses all bodies are begun before one is eliminated. */
+    const int kept = at->keeps || at->model->needs_pose || at->model->product;
     const int code = run_tangent(at, mstmm_run_tangent,
-                                 at->n_coupled || at->counts ? &negative : NULL);
+                                 at->n_coupled || at->counts ? &negative : NULL, kept);
     return code || !at->n_coupled ? code : mstmm_across_factor(at, negative);
 }
 

@@ -37,6 +37,7 @@ typedef struct {
     int known;            /* there has been a residual since the memory changed */
     int laws_alone;       /* the last tangent was that of mstmm_laws_factor */
     int counts;           /* pivots may be negative: somebody counts them */
+    int keeps, kept;      /* tangents leave S of every body, as increments that are known ask for */
     real t, rate, s, sq, kappa; /* of the last residual and tangent */
     mstmm_failure failure;
 } mstmm_tangent;

@@ -9,13 +9,14 @@
  * that tell where they are by as much more. */
 #define MSTMM_TILE 8
 
-/* The least of bodies first..end-1 and of their parents. */
+/* The least of bodies first..end-1 and of their parents but the ground. */
 static inline int mstmm_least_parent(const mstmm_model *model, int first, int end)
 {
     int least = first;
     for (int i = first; i < end; i++)
-        if (model->bodies[i].parent < least) least = model->bodies[i].parent;
-    return least < 0 ? 0 : least;
+        if (model->bodies[i].parent >= 0 && model->bodies[i].parent < least)
+            least = model->bodies[i].parent;
+    return least;
 }
 
 static inline int mstmm_end_of_tile(const mstmm_model *model, int first)
