@@ -79,6 +79,16 @@ mstmm_generic_push_kernel *const mstmm_generic_push_table[] = {
     mstmm_sweep_generic6_push,
 };
 
+mstmm_generic_push_on_ground_kernel *const mstmm_generic_push_on_ground_table[] = {
+    NULL,
+    mstmm_sweep_generic1_push_on_ground,
+    mstmm_sweep_generic2_push_on_ground,
+    mstmm_sweep_generic3_push_on_ground,
+    mstmm_sweep_generic4_push_on_ground,
+    mstmm_sweep_generic5_push_on_ground,
+    mstmm_sweep_generic6_push_on_ground,
+};
+
 mstmm_generic_answer_kernel *const mstmm_generic_answer_table[] = {
     mstmm_sweep_generic0_answer,
     mstmm_sweep_generic1_answer,
@@ -177,6 +187,26 @@ mstmm_generic_complement_slope_kernel *const mstmm_generic_complement_slope_tabl
     mstmm_sweep_generic4_complement_slope,
     mstmm_sweep_generic5_complement_slope,
     mstmm_sweep_generic6_complement_slope,
+};
+
+mstmm_generic_answered_slope_kernel *const mstmm_generic_answered_slope_table[] = {
+    NULL,
+    mstmm_sweep_generic1_answered_slope,
+    mstmm_sweep_generic2_answered_slope,
+    mstmm_sweep_generic3_answered_slope,
+    mstmm_sweep_generic4_answered_slope,
+    mstmm_sweep_generic5_answered_slope,
+    mstmm_sweep_generic6_answered_slope,
+};
+
+mstmm_generic_pull_slope_kernel *const mstmm_generic_pull_slope_table[] = {
+    NULL,
+    mstmm_sweep_generic1_pull_slope,
+    mstmm_sweep_generic2_pull_slope,
+    mstmm_sweep_generic3_pull_slope,
+    mstmm_sweep_generic4_pull_slope,
+    mstmm_sweep_generic5_pull_slope,
+    mstmm_sweep_generic6_pull_slope,
 };
 
 mstmm_generic_tangent_carrier_kernel *const mstmm_generic_tangent_carrier_table[] = {
@@ -1072,26 +1102,27 @@ static int mstmm_at_closures(mstmm_state *state, int index)
     real *closed = closure ? loops + closure->numbers : NULL;
     int code;
     if (!looped->closure) return 0;
-    if (!body->generic) {
-        code = mstmm_at_hinge_motion(state, index);
-        if (code) return code;
-    }
     if (closure->kind == MSTMM_HINGE) {
         code = mstmm_generic_complement(nu,
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .W = closed + MSTMM_CLOSURE_W);
         if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
     }
-    mstmm_loops_gap(
+    mstmm_loops_meet(
         .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
-        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .R_e = closure->turn,
-        .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .r_e = closure->end,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_A = closed + MSTMM_CLOSURE_LEVER,
-        .d = closed + MSTMM_CLOSURE_D, .gap = closed + MSTMM_CLOSURE_GAP);
+        .d = closed + MSTMM_CLOSURE_D);
     mstmm_loops_slip(
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
         .v_C = block + MSTMM_BLOCK_V, .w_C = block + MSTMM_BLOCK_MOTION,
         .v_B = outboard + MSTMM_BLOCK_V, .w_B = outboard + MSTMM_BLOCK_MOTION,
         .slip = closed + MSTMM_CLOSURE_SLIP);
+    if (state->level == MSTMM_GAP) {
+        mstmm_loops_gap(
+            .R_e = closure->turn, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .d = closed + MSTMM_CLOSURE_D, .gap = closed + MSTMM_CLOSURE_GAP);
+    }
     if (closure->kind == MSTMM_DISTANCE) {
         mstmm_loops_distance(
             .p = closure->p, .d = closed + MSTMM_CLOSURE_D, .W = closed + MSTMM_CLOSURE_W,
@@ -1109,19 +1140,13 @@ static int mstmm_at_closures(mstmm_state *state, int index)
         if (code) return mstmm_fail(state, MSTMM_FAILED_LOOP, index, code);
     }
     if (state->level == MSTMM_GAP) {
-        mstmm_loops_rows(
-            .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C,
-            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
-            .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = closed + MSTMM_CLOSURE_GAP,
-            .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
+        mstmm_loops_known(
+            .W = closed + MSTMM_CLOSURE_W, .relative = closed + MSTMM_CLOSURE_GAP,
             .l = closed + MSTMM_CLOSURE_L);
     }
     if (state->level == MSTMM_SLIP) {
-        mstmm_loops_rows(
-            .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C,
-            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
-            .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = closed + MSTMM_CLOSURE_SLIP,
-            .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
+        mstmm_loops_known(
+            .W = closed + MSTMM_CLOSURE_W, .relative = closed + MSTMM_CLOSURE_SLIP,
             .l = closed + MSTMM_CLOSURE_L);
     }
     if (state->refined) {
@@ -1150,14 +1175,15 @@ static int mstmm_at_closures(mstmm_state *state, int index)
             .slip = closed + MSTMM_CLOSURE_SLIP, .drift = drift);
     }
     if (!state->level) {
-        mstmm_loops_rows(
-            .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C,
-            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
-            .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = drift,
-            .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
-            .l = closed + MSTMM_CLOSURE_L);
+        mstmm_loops_known(
+            .W = closed + MSTMM_CLOSURE_W, .relative = drift, .l = closed + MSTMM_CLOSURE_L);
     }
     for (int k = 0; k < body->nu; k++) {
+        mstmm_loops_row(
+            .w = closed + MSTMM_CLOSURE_W + 6 * k, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k,
+            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k);
         mstmm_loops_act(
             .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = parent + MSTMM_BLOCK_E);
@@ -1168,6 +1194,11 @@ static int mstmm_at_closures(mstmm_state *state, int index)
     }
     for (int c = 0; c < 6; c++) {
         if (closure->rows[c] < 0) continue;
+        mstmm_loops_row(
+            .w = closed + MSTMM_CLOSURE_W + 6 * c, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * c,
+            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * c);
         memcpy(loops + closure->inner[c], closed + MSTMM_CLOSURE_J_A + 6 * c, (size_t)(6) * sizeof(real));
         memcpy(loops + closure->outer[c], closed + MSTMM_CLOSURE_J_B + 6 * c, (size_t)(6) * sizeof(real));
         memcpy(loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN, closed + MSTMM_CLOSURE_L + c, (size_t)(1) * sizeof(real));
@@ -1283,17 +1314,25 @@ static int mstmm_at_row_closed(mstmm_state *state, int index)
     real *loops = state->workspace + state->model->loops;
     const mstmm_loop_row *row = &state->model->rows[index];
     real *line = loops + MSTMM_ROW * (int64_t)index;
-    real *meeting = mstmm_block(state->model, state->workspace, row->body);
-    mstmm_loops_close(
-        .K = line + MSTMM_ROW_K, .l = line + MSTMM_ROW_KNOWN, .L = line + MSTMM_ROW_PIVOT,
-        .floor_ = &row->floor, .inverse = line + MSTMM_ROW_INVERSE, .S = meeting + MSTMM_BLOCK_S,
-        .e = meeting + MSTMM_BLOCK_E);
+    mstmm_loops_settle(
+        .L = line + MSTMM_ROW_PIVOT, .floor_ = &row->floor, .inverse = line + MSTMM_ROW_INVERSE);
+    if ((row->body >= 0)) {
+        real *meeting = mstmm_block(state->model, state->workspace, row->body);
+        mstmm_loops_close(
+            .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
+            .l = line + MSTMM_ROW_KNOWN, .S = meeting + MSTMM_BLOCK_S,
+            .e = meeting + MSTMM_BLOCK_E);
+    }
     for (int c = 0; c < row->n_others; c++) {
         const mstmm_other *other = &row->others[c];
-        mstmm_loops_shed(
-            .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
-            .l = line + MSTMM_ROW_KNOWN, .L_p = loops + other->pair,
-            .K_p = loops + other->column,
+        if ((row->body >= 0)) {
+            mstmm_loops_shed(
+                .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
+                .L_p = loops + other->pair, .K_p = loops + other->column);
+        }
+        mstmm_loops_shed_known(
+            .inverse = line + MSTMM_ROW_INVERSE, .l = line + MSTMM_ROW_KNOWN,
+            .L_p = loops + other->pair,
             .l_p = loops + MSTMM_ROW * (int64_t)other->row + MSTMM_ROW_KNOWN);
         for (int b = 0; b <= c; b++) {
             mstmm_loops_shed_pair(
@@ -1362,10 +1401,6 @@ static int mstmm_at_carried(mstmm_state *state, int index)
             .S_rf = modes + MSTMM_MODES_S_RF(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
             .e_f = modes + MSTMM_MODES_E_F(n));
     }
-    if (!body->generic) {
-        code = mstmm_at_hinge_motion(state, index);
-        if (code) return code;
-    }
     for (int k = 0; k < speeds; k++)
         for (int row = 0; row < 6; row++)
             (mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE))[row * speeds + k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_H))[row * nu + columns[k]];
@@ -1391,12 +1426,19 @@ static int mstmm_at_carried(mstmm_state *state, int index)
         .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
         .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .S_I = parent + MSTMM_BLOCK_S);
     if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
-    mstmm_generic_push(speeds,
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
-        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = block + MSTMM_BLOCK_E,
-        .tau = hinge_tau_free, .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET),
-        .e_I = parent + MSTMM_BLOCK_E);
+    if ((body->parent >= 0)) {
+        mstmm_generic_push(speeds,
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
+            .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = block + MSTMM_BLOCK_E,
+            .tau = hinge_tau_free, .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET),
+            .e_I = parent + MSTMM_BLOCK_E);
+    }
+    if (!body->section && speeds && !(body->parent >= 0)) {
+        mstmm_generic_push_on_ground(speeds,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE), .e = block + MSTMM_BLOCK_E,
+            .tau = hinge_tau_free, .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET));
+    }
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
         if (body->section && !body->section->inward) {
@@ -1404,23 +1446,33 @@ static int mstmm_at_carried(mstmm_state *state, int index)
                 .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .K = loops + pending->column,
                 .K_f = loops + pending->modes);
         }
-        if (!(pending->tau >= 0)) {
+        if (!(pending->tau >= 0) && (body->parent >= 0)) {
             mstmm_generic_push(speeds,
                 .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
                 .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
                 .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = loops + pending->column,
                 .tau = mstmm_zeros, .y = loops + pending->y, .e_I = loops + pending->onward);
         }
+        if (!(pending->tau >= 0) && !body->section && speeds && !(body->parent >= 0)) {
+            mstmm_generic_push_on_ground(speeds,
+                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
+                .e = loops + pending->column, .tau = mstmm_zeros, .y = loops + pending->y);
+        }
         if ((pending->tau >= 0)) {
             for (int k = 0; k < speeds; k++)
                 tau[k] = (loops + pending->tau)[columns[k]];
         }
-        if ((pending->tau >= 0)) {
+        if ((pending->tau >= 0) && (body->parent >= 0)) {
             mstmm_generic_push(speeds,
                 .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
                 .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
                 .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = loops + pending->column,
                 .tau = tau, .y = loops + pending->y, .e_I = loops + pending->onward);
+        }
+        if ((pending->tau >= 0) && !body->section && speeds && !(body->parent >= 0)) {
+            mstmm_generic_push_on_ground(speeds,
+                .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE),
+                .e = loops + pending->column, .tau = tau, .y = loops + pending->y);
         }
         if ((pending->tau >= 0)) {
             mstmm_generic_answered(nu,
@@ -1545,11 +1597,15 @@ static int mstmm_at_row_found(mstmm_state *state, int index)
     real *loops = state->workspace + state->model->loops;
     const mstmm_loop_row *row = &state->model->rows[index];
     real *line = loops + MSTMM_ROW * (int64_t)index;
-    real *meeting = mstmm_block(state->model, state->workspace, row->body);
     mstmm_loops_multiplier(
-        .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
-        .l = line + MSTMM_ROW_KNOWN, .delta = meeting + MSTMM_BLOCK_DELTA,
+        .inverse = line + MSTMM_ROW_INVERSE, .l = line + MSTMM_ROW_KNOWN,
         .x = line + MSTMM_ROW_X);
+    if ((row->body >= 0)) {
+        real *meeting = mstmm_block(state->model, state->workspace, row->body);
+        mstmm_loops_multiplier_more(
+            .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
+            .delta = meeting + MSTMM_BLOCK_DELTA, .x = line + MSTMM_ROW_X);
+    }
     for (int c = 0; c < row->n_others; c++) {
         const mstmm_other *other = &row->others[c];
         mstmm_loops_multiplier_less(
@@ -1719,7 +1775,7 @@ static int mstmm_at_answered_in_plane(mstmm_state *state, int index)
 /* Accelerations and load of a hinge that closes a loop. */
 static int mstmm_at_closures_answered(mstmm_state *state, int index)
 {
-    real along[6];
+    real along[1];
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
@@ -1730,14 +1786,14 @@ static int mstmm_at_closures_answered(mstmm_state *state, int index)
     real *loops = state->workspace + state->model->loops;
     real *closed = closure ? loops + closure->numbers : NULL;
     if (!looped->closure) return 0;
-    mstmm_loops_told(
-        .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
-        .l = closed + MSTMM_CLOSURE_L, .delta_A = parent + MSTMM_BLOCK_DELTA,
-        .delta_B = outboard + MSTMM_BLOCK_DELTA, .c = along);
     for (int j = 0; j < nu; j++)
         (state->udot + body->u)[j] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j];
     for (int k = 0; k < body->nu; k++) {
-        (state->udot + body->u + k)[0] += (along + k)[0];
+        mstmm_loops_told(
+            .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k, .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k,
+            .l = closed + MSTMM_CLOSURE_L + k, .delta_A = parent + MSTMM_BLOCK_DELTA,
+            .delta_B = outboard + MSTMM_BLOCK_DELTA, .c = along);
+        (state->udot + body->u + k)[0] += along[0];
     }
     if (state->refined) {
         for (int c = 0; c < 6; c++) {
@@ -1846,6 +1902,32 @@ static int mstmm_at_couplings_answered(mstmm_state *state, int index)
     return 0;
 }
 
+/* Rows of couplings at the accelerations that are given, and the efforts of their multipliers. */
+static int mstmm_at_couplings_loaded(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    real *loops = state->workspace + state->model->loops;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    for (int c = 0; c < looped->n_pending; c++) {
+        const mstmm_pending *pending = &looped->pending[c];
+        if ((pending->tau >= 0)) {
+            mstmm_generic_pull(nu,
+                .y = loops + pending->tau,
+                .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
+                .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
+        }
+        if ((pending->tau >= 0)) {
+            mstmm_generic_answered(nu,
+                .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + pending->tau,
+                .l = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_KNOWN);
+        }
+    }
+    return 0;
+}
+
 /* Rows of a hinge that closes a loop, and all the load that it puts on its bodies. */
 static int mstmm_at_closures_loaded(mstmm_state *state, int index)
 {
@@ -1861,36 +1943,65 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
     real *closed = closure ? loops + closure->numbers : NULL;
     int code;
     if (!looped->closure) return 0;
-    if (!body->generic) {
-        code = mstmm_at_hinge_motion(state, index);
-        if (code) return code;
-    }
     if (closure->kind == MSTMM_HINGE) {
         code = mstmm_generic_complement(nu,
             .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .W = closed + MSTMM_CLOSURE_W);
         if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
     }
-    mstmm_loops_gap(
+    mstmm_loops_meet(
         .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
-        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .R_e = closure->turn,
-        .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .r_e = closure->end,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_A = closed + MSTMM_CLOSURE_LEVER,
-        .d = closed + MSTMM_CLOSURE_D, .gap = closed + MSTMM_CLOSURE_GAP);
+        .d = closed + MSTMM_CLOSURE_D);
     mstmm_loops_slip(
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
         .v_C = block + MSTMM_BLOCK_V, .w_C = block + MSTMM_BLOCK_MOTION,
         .v_B = outboard + MSTMM_BLOCK_V, .w_B = outboard + MSTMM_BLOCK_MOTION,
         .slip = closed + MSTMM_CLOSURE_SLIP);
+    if (closure->kind == MSTMM_DISTANCE) {
+        mstmm_loops_distance(
+            .p = closure->p, .d = closed + MSTMM_CLOSURE_D, .W = closed + MSTMM_CLOSURE_W,
+            .gap = closed + MSTMM_CLOSURE_GAP);
+    }
+    if (closure->kind == MSTMM_PLANE) {
+        mstmm_loops_plane(
+            .p = closure->p, .d = closed + MSTMM_CLOSURE_D, .W = closed + MSTMM_CLOSURE_W,
+            .gap = closed + MSTMM_CLOSURE_GAP);
+    }
+    if (closure->kind == MSTMM_ROLLING) {
+        code = mstmm_loops_rolling(
+            .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C, .d = closed + MSTMM_CLOSURE_D,
+            .W = closed + MSTMM_CLOSURE_W, .gap = closed + MSTMM_CLOSURE_GAP);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_LOOP, index, code);
+    }
     mstmm_loops_drift(
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
         .slip = closed + MSTMM_CLOSURE_SLIP, .motion_C = block + MSTMM_BLOCK_MOTION,
         .motion_B = outboard + MSTMM_BLOCK_MOTION, .drift = drift);
-    mstmm_loops_rows(
-        .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
-        .Rc = block + MSTMM_BLOCK_R, .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = drift,
-        .J_A = closed + MSTMM_CLOSURE_J_A, .J_B = closed + MSTMM_CLOSURE_J_B,
-        .l = closed + MSTMM_CLOSURE_L);
+    if (closure->kind == MSTMM_DISTANCE) {
+        mstmm_loops_distance_drift(
+            .d = closed + MSTMM_CLOSURE_D, .slip = closed + MSTMM_CLOSURE_SLIP, .drift = drift);
+    }
+    if (closure->kind == MSTMM_ROLLING) {
+        mstmm_loops_rolling_drift(
+            .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .slip = closed + MSTMM_CLOSURE_SLIP, .drift = drift);
+    }
+    mstmm_loops_known(
+        .W = closed + MSTMM_CLOSURE_W, .relative = drift, .l = closed + MSTMM_CLOSURE_L);
+    for (int c = 0; c < looped->n_own; c++) {
+        const mstmm_own *own = &looped->own[c];
+        mstmm_generic_pull(nu,
+            .y = loops + own->tau, .x = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_X,
+            .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
+    }
     for (int k = 0; k < body->nu; k++) {
+        mstmm_loops_row(
+            .w = closed + MSTMM_CLOSURE_W + 6 * k, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k,
+            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k);
         mstmm_loops_act(
             .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = parent + MSTMM_BLOCK_E);
@@ -1901,6 +2012,11 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
     }
     for (int c = 0; c < 6; c++) {
         if (closure->rows[c] < 0) continue;
+        mstmm_loops_row(
+            .w = closed + MSTMM_CLOSURE_W + 6 * c, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * c,
+            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * c);
         mstmm_loops_loaded(
             .K = closed + MSTMM_CLOSURE_J_A + 6 * c,
             .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
@@ -1909,6 +2025,15 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
             .K = closed + MSTMM_CLOSURE_J_B + 6 * c,
             .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
             .e = outboard + MSTMM_BLOCK_E);
+    }
+    for (int c = 0; c < looped->n_own; c++) {
+        const mstmm_own *own = &looped->own[c];
+        mstmm_generic_answered(nu,
+            .y = closed + MSTMM_CLOSURE_L, .z = loops + own->tau,
+            .l = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
+        mstmm_generic_answered(nu,
+            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + own->tau,
+            .l = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
     }
     return 0;
 }
@@ -2397,6 +2522,38 @@ static int mstmm_at_laws_slope(mstmm_state *state, int index)
     return 0;
 }
 
+/* Derivatives: rows of couplings at the accelerations that are given, and the efforts of their multipliers. */
+static int mstmm_at_couplings_loaded_slope(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    real *loops = state->workspace + state->model->loops;
+    real *d_block = state->slope->workspace + body->block;
+    real *d_loops = state->slope->workspace + state->model->loops;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    for (int c = 0; c < looped->n_pending; c++) {
+        const mstmm_pending *pending = &looped->pending[c];
+        if ((pending->tau >= 0)) {
+            mstmm_generic_pull_slope(nu,
+                .y = loops + pending->tau,
+                .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
+                .d_y = d_loops + pending->tau,
+                .d_x = d_loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
+                .d_y_0 = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU));
+        }
+        if ((pending->tau >= 0)) {
+            mstmm_generic_answered_slope(nu,
+                .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + pending->tau,
+                .d_y = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S),
+                .d_z = d_loops + pending->tau,
+                .d_l = d_loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_KNOWN);
+        }
+    }
+    return 0;
+}
+
 /* Derivatives: axes, position and velocity of P of a body, inertial axes. */
 static int mstmm_at_poses_slope(mstmm_state *state, int index)
 {
@@ -2636,10 +2793,10 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
             .d_H = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H),
             .d_W = d_closed + MSTMM_CLOSURE_W);
     }
-    mstmm_loops_gap_slope(
+    mstmm_loops_meet_slope(
         .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
-        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .R_e = closure->turn,
-        .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .r_e = closure->end,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .d_A_C = d_block + MSTMM_BLOCK_A, .d_x_C = d_block + MSTMM_BLOCK_X,
         .d_A_B = d_outboard + MSTMM_BLOCK_A, .d_x_B = d_outboard + MSTMM_BLOCK_X,
         .d_Rc = d_block + MSTMM_BLOCK_R, .d_r = d_block + MSTMM_BLOCK_SHIFT,
@@ -2653,6 +2810,22 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
         .d_v_C = d_block + MSTMM_BLOCK_V, .d_w_C = d_block + MSTMM_BLOCK_MOTION,
         .d_v_B = d_outboard + MSTMM_BLOCK_V, .d_w_B = d_outboard + MSTMM_BLOCK_MOTION,
         .d_slip = d_closed + MSTMM_CLOSURE_SLIP);
+    if (closure->kind == MSTMM_DISTANCE) {
+        mstmm_loops_distance_slope(
+            .p = closure->p, .d = closed + MSTMM_CLOSURE_D, .d_d = d_closed + MSTMM_CLOSURE_D,
+            .d_W = d_closed + MSTMM_CLOSURE_W);
+    }
+    if (closure->kind == MSTMM_PLANE) {
+        mstmm_loops_plane_slope(
+            .p = closure->p, .d = closed + MSTMM_CLOSURE_D, .d_d = d_closed + MSTMM_CLOSURE_D,
+            .d_W = d_closed + MSTMM_CLOSURE_W);
+    }
+    if (closure->kind == MSTMM_ROLLING) {
+        mstmm_loops_rolling_slope(
+            .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C, .d = closed + MSTMM_CLOSURE_D,
+            .d_R_C = d_closed + MSTMM_CLOSURE_R_C, .d_d = d_closed + MSTMM_CLOSURE_D,
+            .d_W = d_closed + MSTMM_CLOSURE_W);
+    }
     mstmm_loops_drift(
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
         .slip = closed + MSTMM_CLOSURE_SLIP, .motion_C = block + MSTMM_BLOCK_MOTION,
@@ -2664,14 +2837,38 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
         .d_d = d_closed + MSTMM_CLOSURE_D, .d_slip = d_closed + MSTMM_CLOSURE_SLIP,
         .d_motion_C = d_block + MSTMM_BLOCK_MOTION,
         .d_motion_B = d_outboard + MSTMM_BLOCK_MOTION, .d_drift = d_drift);
-    mstmm_loops_rows_slope(
-        .W = closed + MSTMM_CLOSURE_W, .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
-        .Rc = block + MSTMM_BLOCK_R, .r_A = closed + MSTMM_CLOSURE_LEVER, .relative = drift,
-        .d_W = d_closed + MSTMM_CLOSURE_W, .d_R_C = d_closed + MSTMM_CLOSURE_R_C,
-        .d_Rc = d_block + MSTMM_BLOCK_R, .d_r_A = d_closed + MSTMM_CLOSURE_LEVER,
-        .d_relative = d_drift, .d_J_A = d_closed + MSTMM_CLOSURE_J_A,
-        .d_J_B = d_closed + MSTMM_CLOSURE_J_B, .d_l = d_closed + MSTMM_CLOSURE_L);
+    if (closure->kind == MSTMM_DISTANCE) {
+        mstmm_loops_distance_drift_slope(
+            .d = closed + MSTMM_CLOSURE_D, .slip = closed + MSTMM_CLOSURE_SLIP,
+            .d_d = d_closed + MSTMM_CLOSURE_D, .d_slip = d_closed + MSTMM_CLOSURE_SLIP,
+            .d_drift = d_drift);
+    }
+    if (closure->kind == MSTMM_ROLLING) {
+        mstmm_loops_rolling_drift_slope(
+            .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .slip = closed + MSTMM_CLOSURE_SLIP, .d_R_C = d_closed + MSTMM_CLOSURE_R_C,
+            .d_slip = d_closed + MSTMM_CLOSURE_SLIP, .d_drift = d_drift);
+    }
+    mstmm_loops_known_slope(
+        .W = closed + MSTMM_CLOSURE_W, .relative = drift, .d_W = d_closed + MSTMM_CLOSURE_W,
+        .d_relative = d_drift, .d_l = d_closed + MSTMM_CLOSURE_L);
+    for (int c = 0; c < looped->n_own; c++) {
+        const mstmm_own *own = &looped->own[c];
+        mstmm_generic_pull_slope(nu,
+            .y = loops + own->tau, .x = loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_X,
+            .d_y = d_loops + own->tau,
+            .d_x = d_loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_X,
+            .d_y_0 = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU));
+    }
     for (int k = 0; k < body->nu; k++) {
+        mstmm_loops_row_slope(
+            .w = closed + MSTMM_CLOSURE_W + 6 * k, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .d_w = d_closed + MSTMM_CLOSURE_W + 6 * k,
+            .d_R_C = d_closed + MSTMM_CLOSURE_R_C, .d_Rc = d_block + MSTMM_BLOCK_R,
+            .d_r_A = d_closed + MSTMM_CLOSURE_LEVER,
+            .d_J_A = d_closed + MSTMM_CLOSURE_J_A + 6 * k,
+            .d_J_B = d_closed + MSTMM_CLOSURE_J_B + 6 * k);
         mstmm_loops_act_slope(
             .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
@@ -2687,6 +2884,14 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
     }
     for (int c = 0; c < 6; c++) {
         if (closure->rows[c] < 0) continue;
+        mstmm_loops_row_slope(
+            .w = closed + MSTMM_CLOSURE_W + 6 * c, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .d_w = d_closed + MSTMM_CLOSURE_W + 6 * c,
+            .d_R_C = d_closed + MSTMM_CLOSURE_R_C, .d_Rc = d_block + MSTMM_BLOCK_R,
+            .d_r_A = d_closed + MSTMM_CLOSURE_LEVER,
+            .d_J_A = d_closed + MSTMM_CLOSURE_J_A + 6 * c,
+            .d_J_B = d_closed + MSTMM_CLOSURE_J_B + 6 * c);
         mstmm_loops_loaded_slope(
             .K = closed + MSTMM_CLOSURE_J_A + 6 * c,
             .x = loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
@@ -2699,6 +2904,17 @@ static int mstmm_at_closures_loaded_slope(mstmm_state *state, int index)
             .d_K = d_closed + MSTMM_CLOSURE_J_B + 6 * c,
             .d_x = d_loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_X,
             .d_e = d_outboard + MSTMM_BLOCK_E);
+    }
+    for (int c = 0; c < looped->n_own; c++) {
+        const mstmm_own *own = &looped->own[c];
+        mstmm_generic_answered_slope(nu,
+            .y = closed + MSTMM_CLOSURE_L, .z = loops + own->tau,
+            .d_y = d_closed + MSTMM_CLOSURE_L, .d_z = d_loops + own->tau,
+            .d_l = d_loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
+        mstmm_generic_answered_slope(nu,
+            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .z = loops + own->tau,
+            .d_y = mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S), .d_z = d_loops + own->tau,
+            .d_l = d_loops + MSTMM_ROW * (int64_t)own->row + MSTMM_ROW_KNOWN);
     }
     return 0;
 }
@@ -2922,6 +3138,45 @@ static int mstmm_at_forces_across(mstmm_state *state, int index)
         .A = from + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_f, .F = F_back,
         .M = M_back, .d_A = d_from + MSTMM_BLOCK_A, .d_A_F = mstmm_zeros, .d_F = d_F_back,
         .d_M = d_M_back, .d_e = d_from + MSTMM_BLOCK_E);
+    return 0;
+}
+
+/* Derivatives: laws on hinge coordinates, added to the efforts. */
+static int mstmm_at_laws_across(mstmm_state *state, int index)
+{
+    real effort[6];
+    real tau[1];
+    real V[1];
+    real P[1];
+    real d_effort[6];
+    real d_tau[6];
+    const mstmm_law *law = &state->model->laws[index];
+    const mstmm_body *body = &state->model->bodies[law->body];
+    real *d_block = state->slope->workspace + body->block;
+    if (!state->model->looped[law->body].closure) return 0;
+    for (int j = 0; j < law->n; j++)
+        effort[j] = mstmm_value_at(state, law->effort[j]);
+    for (int j = 0; j < law->n; j++)
+        d_effort[j] = mstmm_value_at(state->slope, law->effort[j]);
+    if (law->kind == 0) {
+        mstmm_law_coordinate(law->evaluate,
+            .p = law->p, .q = state->q + body->q + law->coordinate,
+            .u = state->u + body->u + law->speed, .effort = effort, .tau = tau, .V = V, .P = P);
+        mstmm_law_coordinate_slope(law->evaluate_slope,
+            .p = law->p, .q = state->q + body->q + law->coordinate,
+            .u = state->u + body->u + law->speed, .effort = effort,
+            .d_q = state->slope->q + body->q + law->coordinate,
+            .d_u = state->slope->u + body->u + law->speed, .d_effort = d_effort, .d_tau = d_tau);
+    } else {
+        mstmm_law_quaternion_slope(law->evaluate_slope,
+            .p = law->p, .q = state->q + body->q + law->coordinate,
+            .u = state->u + body->u + law->speed, .B = law->axes, .effort = effort,
+            .twist_ref = state->memory + law->twist,
+            .d_q = state->slope->q + body->q + law->coordinate,
+            .d_u = state->slope->u + body->u + law->speed, .d_effort = d_effort, .d_tau = d_tau);
+    }
+    for (int j = 0; j < law->n; j++)
+        (d_block + MSTMM_BLOCK_FIXED + MSTMM_SPEED_TAU * body->nu + law->speed)[j] += d_tau[j];
     return 0;
 }
 
@@ -5089,6 +5344,7 @@ MSTMM_AT_ONCE void mstmm_fetch_forward(const mstmm_state *state, int index, int 
     mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(block + MSTMM_BLOCK_S, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_pass_forward(mstmm_state *state)
 {
@@ -5129,6 +5385,7 @@ MSTMM_AT_ONCE void mstmm_fetch_qr_own(const mstmm_state *state, int index, int a
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_DELTA, block + MSTMM_BLOCK_HINGE_D + 3);
     mstmm_fetch(block + MSTMM_BLOCK_HINGE_V, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(body->hinge_p, body->body_p);
 }
 static int mstmm_pass_qr_own(mstmm_state *state)
 {
@@ -5212,6 +5469,7 @@ MSTMM_AT_ONCE void mstmm_fetch_poses(const mstmm_state *state, int index, int ah
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_HINGE_C + 6);
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(body->hinge_p, body->body_p);
 }
 static int mstmm_pass_poses(mstmm_state *state)
 {
@@ -5292,6 +5550,7 @@ MSTMM_AT_ONCE void mstmm_fetch_condense(const mstmm_state *state, int index, int
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E + 6);
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
+    mstmm_fetch(body->hinge_p, body->body_p);
 }
 static int mstmm_pass_condense(mstmm_state *state)
 {
@@ -5314,6 +5573,7 @@ MSTMM_AT_ONCE void mstmm_fetch_qr_condense(const mstmm_state *state, int index, 
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E + 6);
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
+    mstmm_fetch(body->rotor, body->hinge_p);
 }
 static int mstmm_pass_qr_condense(mstmm_state *state)
 {
@@ -5335,6 +5595,7 @@ MSTMM_AT_ONCE void mstmm_fetch_recover(const mstmm_state *state, int index, int 
     mstmm_fetch(block + MSTMM_BLOCK_DELTA, block + MSTMM_BLOCK_DELTA + 6);
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
+    mstmm_fetch(body->hinge_p, body->body_p);
 }
 static int mstmm_pass_recover(mstmm_state *state)
 {
@@ -5353,7 +5614,8 @@ MSTMM_AT_ONCE void mstmm_fetch_closures(const mstmm_state *state, int index, int
     if (!body) return;
     real *block = state->workspace + body->block;
     const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_HINGE_C + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(block + MSTMM_BLOCK_MOTION, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
 }
 static int mstmm_pass_closures(mstmm_state *state)
@@ -5394,8 +5656,11 @@ MSTMM_AT_ONCE void mstmm_fetch_carried(const mstmm_state *state, int index, int 
     if (!body) return;
     real *block = state->workspace + body->block;
     const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E + 6);
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
+    mstmm_fetch(body->rotor, body->hinge_p);
 }
 static int mstmm_pass_carried(mstmm_state *state)
 {
@@ -5581,13 +5846,24 @@ static int mstmm_pass_couplings_answered(mstmm_state *state)
     return 0;
 }
 
+static int mstmm_pass_couplings_loaded(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_couplings_loaded(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 MSTMM_AT_ONCE void mstmm_fetch_closures_loaded(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
     real *block = state->workspace + body->block;
     const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_HINGE_C + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(block + MSTMM_BLOCK_MOTION, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
 }
 static int mstmm_pass_closures_loaded(mstmm_state *state)
@@ -5610,6 +5886,7 @@ MSTMM_AT_ONCE void mstmm_fetch_required(const mstmm_state *state, int index, int
     mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, block + MSTMM_BLOCK_HINGE_C + 6);
     mstmm_fetch(block + MSTMM_BLOCK_E, block + MSTMM_BLOCK_E + 6);
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(body->hinge_p, body->body_p);
 }
 static int mstmm_pass_required(mstmm_state *state)
 {
@@ -5650,6 +5927,7 @@ MSTMM_AT_ONCE void mstmm_fetch_factorise(const mstmm_state *state, int index, in
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_S + 21);
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H_FREE) + 6 * nu);
+    mstmm_fetch(body->rotor, body->body_p);
 }
 static int mstmm_pass_factorise(mstmm_state *state)
 {
@@ -5718,6 +5996,7 @@ MSTMM_AT_ONCE void mstmm_fetch_forward_slope(const mstmm_state *state, int index
     mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(d_block + MSTMM_BLOCK_HINGE_R, d_block + MSTMM_BLOCK_HINGE_C + 6);
     mstmm_fetch(d_block + MSTMM_BLOCK_E, mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_pass_forward_slope(mstmm_state *state)
 {
@@ -5749,6 +6028,16 @@ static int mstmm_pass_laws_slope(mstmm_state *state)
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_laws; i++) {
         const int code = mstmm_at_laws_slope(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_couplings_loaded_slope(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const int code = mstmm_at_couplings_loaded_slope(state, i);
         if (code) return code;
     }
     return 0;
@@ -5905,6 +6194,16 @@ static int mstmm_pass_forces_across(mstmm_state *state)
     return 0;
 }
 
+static int mstmm_pass_laws_across(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_laws; i++) {
+        const int code = mstmm_at_laws_across(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 MSTMM_AT_ONCE void mstmm_fetch_tangent_own(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -5915,6 +6214,7 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_own(const mstmm_state *state, int index, 
     mstmm_fetch(block + MSTMM_BLOCK_MOTION, block + MSTMM_BLOCK_MOTION + 9);
     mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 54);
     mstmm_fetch(tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq), tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + nu * nu);
+    mstmm_fetch(body->body_p, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_pass_tangent_own(mstmm_state *state)
 {
@@ -5968,6 +6268,7 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_condense(const mstmm_state *state, int in
     mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 54);
     mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq) + nu * nu);
+    mstmm_fetch(body->rotor, body->body_p);
 }
 static int mstmm_pass_tangent_condense(mstmm_state *state)
 {
@@ -5990,6 +6291,7 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_brought(const mstmm_state *state, int ind
     mstmm_fetch(block + MSTMM_BLOCK_HINGE_V, block + MSTMM_BLOCK_HINGE_C + 6);
     mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_H(body->nu, body->nq) + 6 * nu);
+    mstmm_fetch(body->rotor, body->body_p);
 }
 static int mstmm_pass_tangent_brought(mstmm_state *state)
 {
@@ -6129,6 +6431,7 @@ MSTMM_AT_ONCE void mstmm_fetch_inverse_dynamics_chain(const mstmm_state *state, 
     mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(block + MSTMM_BLOCK_S, mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
+    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_chain_inverse_dynamics(mstmm_state *state)
 {
@@ -6151,6 +6454,7 @@ static int mstmm_chain_inverse_dynamics(mstmm_state *state)
         }
         for (; law < model->n_laws && model->laws[law].body < end; law++) {
             const int i = law;
+            if (mstmm_beyond_cache(model)) mstmm_fetch_law(model, i, MSTMM_TILE);
             code = mstmm_at_laws(state, i);
             if (code) return code;
         }
@@ -6165,6 +6469,7 @@ MSTMM_AT_ONCE void mstmm_fetch_correction_chain(const mstmm_state *state, int in
     real *block = state->workspace + body->block;
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_A, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_chain_correction(mstmm_state *state)
 {
@@ -6200,6 +6505,7 @@ MSTMM_AT_ONCE void mstmm_fetch_motion_chain(const mstmm_state *state, int index,
     real *block = state->workspace + body->block;
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_A, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_chain_motion(mstmm_state *state)
 {
@@ -6233,6 +6539,7 @@ MSTMM_AT_ONCE void mstmm_fetch_factorisation_chain(const mstmm_state *state, int
     mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(block + MSTMM_BLOCK_S, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_chain_factorisation(mstmm_state *state)
 {
@@ -6295,6 +6602,7 @@ MSTMM_AT_ONCE void mstmm_fetch_required_slope_chain(const mstmm_state *state, in
     mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(d_block + MSTMM_BLOCK_HINGE_R, d_block + MSTMM_BLOCK_HINGE_C + 6);
     mstmm_fetch(d_block + MSTMM_BLOCK_E, mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_chain_required_slope(mstmm_state *state)
 {
@@ -6343,8 +6651,15 @@ static int mstmm_tiles_required_slope(mstmm_state *state)
             if (code) return code;
         }
         for (int i = law; i < behind; i++) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_law(model, i, -MSTMM_TILE);
             code = mstmm_at_laws_slope(state, i);
             if (code) return code;
+        }
+        if (model->n_couplings) {
+            for (int i = begun - 1; i >= least; i--) {
+                code = mstmm_at_couplings_loaded_slope(state, i);
+                if (code) return code;
+            }
         }
         if ((model->needs_pose || model->product) && model->n_flexible) {
             for (int i = begun - 1; i >= least; i--) {
@@ -6373,6 +6688,7 @@ MSTMM_AT_ONCE void mstmm_fetch_applied_slope_chain(const mstmm_state *state, int
     mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(d_block + MSTMM_BLOCK_HINGE_R, d_block + MSTMM_BLOCK_HINGE_C + 6);
     mstmm_fetch(d_block + MSTMM_BLOCK_E, mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_chain_applied_slope(mstmm_state *state)
 {
@@ -6404,6 +6720,7 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_condense_tile(const mstmm_state *state, i
     mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 54);
     mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq) + nu * nu);
+    mstmm_fetch(body->rotor, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_tiles_tangent_condense(mstmm_state *state)
 {
@@ -6419,6 +6736,7 @@ static int mstmm_tiles_tangent_condense(mstmm_state *state)
             if (code) return code;
         }
         for (int i = law; i < behind; i++) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_law(model, i, -MSTMM_TILE);
             code = mstmm_at_law_slopes(state, i);
             if (code) return code;
         }
@@ -6443,6 +6761,7 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_brought_chain(const mstmm_state *state, i
     mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 54);
     mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_H(body->nu, body->nq) + 6 * nu);
+    mstmm_fetch(body->rotor, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_chain_tangent_brought(mstmm_state *state)
 {
@@ -6457,6 +6776,7 @@ static int mstmm_chain_tangent_brought(mstmm_state *state)
         }
         for (; law < model->n_laws && model->laws[law].body < end; law++) {
             const int i = law;
+            if (mstmm_beyond_cache(model)) mstmm_fetch_law(model, i, MSTMM_TILE);
             code = mstmm_at_law_slopes(state, i);
             if (code) return code;
         }
@@ -6518,6 +6838,7 @@ MSTMM_AT_ONCE void mstmm_fetch_known_carried_tile(const mstmm_state *state, int 
     mstmm_fetch(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU) + nu);
     mstmm_fetch(tangent + MSTMM_TANGENT_H(body->nu, body->nq), tangent + MSTMM_TANGENT_V(body->nu, body->nq) + 6 * nu);
     mstmm_fetch(tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq), tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq) + 9);
+    mstmm_fetch(body->rotor, body->body_p);
 }
 static int mstmm_tiles_known_carried(mstmm_state *state)
 {
@@ -6533,6 +6854,7 @@ static int mstmm_tiles_known_carried(mstmm_state *state)
             if (code) return code;
         }
         for (int i = law; i < behind; i++) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_law(model, i, -MSTMM_TILE);
             code = mstmm_at_known_laws(state, i);
             if (code) return code;
         }
@@ -6558,6 +6880,7 @@ MSTMM_AT_ONCE void mstmm_fetch_laws_factorise_tile(const mstmm_state *state, int
     mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 21);
     mstmm_fetch(tangent + MSTMM_TANGENT_W(body->nu, body->nq), tangent + MSTMM_TANGENT_GAIN(body->nu, body->nq) + nu * nu);
+    mstmm_fetch(body->rotor, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_tiles_laws_factorise(mstmm_state *state)
 {
@@ -6580,6 +6903,7 @@ static int mstmm_tiles_laws_factorise(mstmm_state *state)
         }
         if (model->n_laws) {
             for (int i = law; i < behind; i++) {
+                if (mstmm_beyond_cache(model)) mstmm_fetch_law(model, i, -MSTMM_TILE);
                 code = mstmm_at_laws_own_slopes(state, i);
                 if (code) return code;
             }
@@ -6623,6 +6947,7 @@ static int mstmm_tiles_laws_column_carried(mstmm_state *state)
         }
         if (state->tangents->shifted && model->n_laws) {
             for (int i = law; i < behind; i++) {
+                if (mstmm_beyond_cache(model)) mstmm_fetch_law(model, i, -MSTMM_TILE);
                 code = mstmm_at_known_laws(state, i);
                 if (code) return code;
             }
@@ -6885,6 +7210,14 @@ int mstmm_run_inverse_dynamics(mstmm_state *state)
         code = mstmm_pass_forces(state);
         if (code) return code;
     }
+    if (model->n_couplings && state->residual) {
+        code = mstmm_hook_couplings_valued(state);
+        if (code) return code;
+    }
+    if (model->n_couplings && state->residual) {
+        code = mstmm_pass_couplings_loaded(state);
+        if (code) return code;
+    }
     if (model->looped && state->residual) {
         code = mstmm_pass_closures_loaded(state);
         if (code) return code;
@@ -7053,11 +7386,19 @@ int mstmm_run_required_slope(mstmm_state *state)
         code = mstmm_chain_required_slope(state);
         if (code) return code;
     }
-    if ((model->needs_pose || model->product) || model->looped) {
+    if (model->n_couplings || (model->needs_pose || model->product) || model->looped) {
         code = mstmm_pass_efforts_slope(state);
         if (code) return code;
         code = mstmm_pass_laws_slope(state);
         if (code) return code;
+        if (model->n_couplings) {
+            code = mstmm_hook_coupling_slopes(state);
+            if (code) return code;
+        }
+        if (model->n_couplings) {
+            code = mstmm_pass_couplings_loaded_slope(state);
+            if (code) return code;
+        }
         if ((model->needs_pose || model->product)) {
             code = mstmm_pass_poses_slope(state);
             if (code) return code;
@@ -7133,8 +7474,16 @@ int mstmm_run_applied_slope(mstmm_state *state)
         code = mstmm_pass_efforts_slope(state);
         if (code) return code;
     }
+    if (model->n_couplings) {
+        code = mstmm_hook_coupling_slopes(state);
+        if (code) return code;
+    }
+    if (model->n_couplings) {
+        code = mstmm_pass_couplings_loaded_slope(state);
+        if (code) return code;
+    }
     if (model->looped) {
-        code = mstmm_pass_laws_slope(state);
+        code = mstmm_pass_laws_across(state);
         if (code) return code;
     }
     if (model->looped) {

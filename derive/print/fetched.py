@@ -16,6 +16,10 @@ _NAMED = ("to", "source", "free", "imposed")
 _VARIABLES = ("block", "d_block", "tangent", "nu", "nq")
 #: Steps that few bodies of a scene take part in.
 _RARE = frozenset({"modal", "section", "outward", "placed", "drag", "imposed", "parts", "curved"})
+#: Numbers of the scene that passes read of a body, side by side (runtime/pack/records/bodies.py).
+_GIVEN = ("connection.R", "body.rotor", "hinge.p", "body.p")
+_FIRST = ("body->connection", "body->rotor", "body->hinge_p", "body->body_p")
+_LAST = ("body->rotor", "body->hinge_p", "body->body_p", "body->body_p + MSTMM_RIGID_NUMBERS")
 #: Gaps of fewer numbers are as good as none: memory comes in lines of eight.
 _LINE = 8
 
@@ -38,6 +42,9 @@ def fetching(name: str, passes: Iterable[Pass]) -> str:
     if not stretches:
         return ""
     lines = [f"    mstmm_fetch({one.first}, {one.last});" for one in stretches]
+    given = [at for at, slot in enumerate(_GIVEN) if slot in slots]
+    if given:
+        lines.append(f"    mstmm_fetch({_FIRST[given[0]]}, {_LAST[given[-1]]});")
     used = [word for word in _VARIABLES if any(reads(line, word) for line in lines)]
     declared = [f"    {VARIABLES[word][0]}" for word in used]
     given = "const mstmm_state *state, int index, int ahead"

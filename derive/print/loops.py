@@ -90,6 +90,10 @@ def _fetched(name: str, ahead: str) -> str:
     return f"if (mstmm_beyond_cache(model)) mstmm_fetch_{name}(state, i, {ahead});\n"
 
 
+def _fetched_law(ahead: str) -> str:
+    return f"if (mstmm_beyond_cache(model)) mstmm_fetch_law(model, i, {ahead});\n"
+
+
 def _tiles(group: Tiled) -> str:
     """Tiles of bodies begun and then swept."""
     begun = [run.whole for run in group.begun if run.whole is not None and not run.when]
@@ -124,7 +128,8 @@ def _chained(group: Chained) -> str:
         if whole.subject == "law":
             lines.append(
                 "        for (; law < model->n_laws && model->laws[law].body < end; law++) {\n"
-                f"            const int i = law;\n            {at}        }}\n"
+                "            const int i = law;\n"
+                f"            {_fetched_law('MSTMM_TILE')}            {at}        }}\n"
             )
             continue
         fetched = f"            {_fetched(name, 'MSTMM_TILE')}" if whole is group.main else ""
@@ -153,6 +158,7 @@ def _begun(run: Run) -> str:
     at = _at(run.whole, "").format(indent=indent + "    ")
     if run.whole.subject == "law":
         text = f"{indent}for (int i = law; i < behind; i++) {{\n"
+        text += f"{indent}    {_fetched_law('-MSTMM_TILE')}"
     else:
         text = f"{indent}for (int i = begun - 1; i >= least; i--) {{\n"
     return f"{opened}{text}{indent}    {at}{indent}}}\n{closed}"

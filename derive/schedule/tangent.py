@@ -144,7 +144,6 @@ def _turn(change: Callable[[str], str]) -> Call:
     return call("frames.tangent_turned", R="hinge.R", d_R=change("R"), d_d=change("d"), **_TURNED)
 
 
-
 def _column(b: str, g: str, laws: str) -> dict[str, str]:
     """A direction's row of B and of G, and what the hinge's rows change by."""
     return {

@@ -112,6 +112,34 @@ static void keep_pivots(const mstmm_response *of, const mstmm_lanes_at *with, in
     }
 }
 
+/* Bodies that far ahead are asked for: numbers of lanes are many. */
+#define MSTMM_COMPLEX_AHEAD 2
+
+/* Asks for what a sweep needs of a body: what all frequencies bring, where `brought`, what is kept
+ * of the elimination, and loads and motions. */
+static inline void ask_for(const mstmm_response *of, const mstmm_lanes_at *with, int index,
+                           int brought)
+{
+    const mstmm_model *model = of->at->model;
+    if (index < 0 || index >= model->n_bodies) return;
+    const mstmm_body *body = &model->bodies[index];
+    const int nu = body->nu;
+    const int64_t own = body->tangent, kept = own + MSTMM_TANGENT_B(nu, body->nq);
+    const mstmm_complex *numbers = with->tangents.numbers;
+    mstmm_fetch(numbers + kept, numbers + own + MSTMM_TANGENT_KNOWN(nu, body->nq));
+    if (brought) {
+        const int64_t end = own + MSTMM_TANGENT_V(nu, body->nq);
+        mstmm_fetch(with->tangents.held + own, with->tangents.held + end);
+        for (int k = 0; k < 2; k++) {
+            const real *from = of->brought + k * of->n_numbers;
+            mstmm_fetch(from + own, from + end);
+        }
+    } else {
+        const mstmm_complex *block = with->slope.workspace + body->block;
+        mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
+    }
+}
+
 /* Numbers are brought no sooner than a body adds to them or is met, so that the cache has them. */
 static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
 {
@@ -125,7 +153,10 @@ static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
         const mstmm_complex *S =
             with->tangents.numbers + mstmm_carried_at(&with->tangents, body);
         const int least = mstmm_least_parent(model, i, i + 1);
-        while (begun > least) bring_body(of, with, --begun);
+        while (begun > least) {
+            if (mstmm_beyond_cache(model)) ask_for(of, with, begun - 1 - MSTMM_COMPLEX_AHEAD, 1);
+            bring_body(of, with, --begun);
+        }
         for (; next < of->n_exact && of->exact_bodies[next] >= begun; next++) {
             const int size = 6 + mstmm_modes_of(model->bodies[of->exact_bodies[next]].modal);
             lay_exact(of, with, of->exact_bodies[next], exact);
@@ -146,19 +177,31 @@ static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
     return 0;
 }
 
-static int solve_alone(mstmm_lanes_at *with, const mstmm_complex *column, mstmm_complex *unit,
-                       mstmm_complex *x)
+static int solve_alone(const mstmm_response *of, mstmm_lanes_at *with,
+                       const mstmm_complex *column, mstmm_complex *unit, mstmm_complex *x)
 {
     mstmm_complex_state *state = &with->state;
-    const int n = state->model->n_bodies;
+    const int n = state->model->n_bodies, ahead = MSTMM_COMPLEX_AHEAD;
+    const int far = mstmm_beyond_cache(state->model);
     int code = 0;
     memset(with->slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(mstmm_complex)); /* the ground's */
     state->column = column;
     state->answer = x;
-    for (int i = 0; !code && i < n; i++) code = mstmm_complex_at_tangent_column(state, i);
+    int begun = n;
+    for (; unit && !code && begun > 0; begun--)
+        code = mstmm_complex_at_tangent_column(state, begun - 1);
     if (unit) *unit = mstmm_complex_plain(1);
-    for (int i = n - 1; !code && i >= 0; i--) code = mstmm_complex_at_tangent_carried(state, i);
-    for (int i = 0; !code && i < n; i++) code = mstmm_complex_at_tangent_answered(state, i);
+    for (int i = n - 1; !code && i >= 0; i--) {
+        const int least = mstmm_least_parent(state->model, i, i + 1);
+        if (far) ask_for(of, with, i - ahead, 0);
+        for (; !code && begun > least; begun--)
+            code = mstmm_complex_at_tangent_column(state, begun - 1);
+        if (!code) code = mstmm_complex_at_tangent_carried(state, i);
+    }
+    for (int i = 0; !code && i < n; i++) {
+        if (far) ask_for(of, with, i + ahead, 0);
+        code = mstmm_complex_at_tangent_answered(state, i);
+    }
     return code;
 }
 
@@ -214,7 +257,7 @@ static int close_couplings(mstmm_response *of, mstmm_lanes_at *with)
                    + MSTMM_BLOCK_E + k % 6;
         else
             column[all->speeds[k - loads]] = mstmm_complex_plain(1);
-        int code = solve_alone(with, column, unit, answer);
+        int code = solve_alone(of, with, column, unit, answer);
         if (k >= loads) column[all->speeds[k - loads]] = mstmm_complex_plain(0);
         if (!code) code = coupled_along(of, with, answer, changes);
         if (code) return code;
@@ -280,7 +323,7 @@ void MSTMM_BY_LANES(MSTMM_LANES)(mstmm_response *of, int count, const real *s, i
     if (!code && m) code = close_couplings(of, &with);
     for (int64_t k = 0; !code && k < n; k++) {
         for (int j = 0; j < nu; j++) column[j] = mstmm_complex_plain(columns[k * nu + j]);
-        code = solve_alone(&with, column, NULL, answer);
+        code = solve_alone(of, &with, column, NULL, answer);
         if (!code && m) code = add_couplings(of, &with, answer);
         for (int lane = 0; lane < count; lane++) {
             real *to = x + 2 * nu * (lane * n + k);

@@ -43,6 +43,20 @@ MSTMM_AT_ONCE void mstmm_fetch(const void *from, const void *to)
 #endif
 }
 
+/* Numbers of a rigid body. */
+#define MSTMM_RIGID_NUMBERS 10
+
+/* Asks for the law that will be met `ahead` of law `index`. */
+MSTMM_AT_ONCE void mstmm_fetch_law(const mstmm_model *model, int index, int ahead)
+{
+    const int near = index + ahead, far = near + ahead;
+    if (far < 0 || far >= model->n_laws) return;
+    mstmm_fetch(&model->laws[far], &model->laws[far] + 1);
+    const mstmm_law *law = &model->laws[near];
+    mstmm_fetch(law->p, law->p + MSTMM_TILE);
+    mstmm_fetch(law->effort, law->effort + law->n);
+}
+
 /* The body that will be met `ahead` of body `index`; NULL near the end of the sweep. */
 MSTMM_AT_ONCE const mstmm_body *mstmm_coming(const mstmm_model *model, int index, int ahead)
 {

@@ -13,6 +13,9 @@ from mstmm.ir.tape import Tape, compile_tape
 
 from ...kernels.tape import c_tape
 
+#: Numbers side by side: a sweep over many bodies meets them in this order.
+_ROOM = 4096
+
 
 class Memory:
     """Makes arrays, tapes and records of C; `kept` keeps them, `slots` is what a tape needs."""
@@ -20,6 +23,8 @@ class Memory:
     def __init__(self, ffi: Any) -> None:
         self.ffi, self.slots = ffi, 0
         self.kept: list[Any] = []
+        #: C type -> a room, and how many of its numbers are taken.
+        self._rooms: dict[str, tuple[Any, int]] = {}
 
     def new(self, kind: str, given: Any = None) -> Any:
         """A new record, or an array of them."""
@@ -28,12 +33,21 @@ class Memory:
         return made
 
     def reals(self, numbers: Sequence[float]) -> Any:
-        """`real *` to numbers of their own."""
-        return self.new("real[]", list(numbers) or [0.0])
+        """`real *` to numbers of their own, next to those asked for before."""
+        return self._placed("real", list(numbers) or [0.0])
 
     def ints(self, numbers: Sequence[int]) -> Any:
-        """`int *` to numbers of their own."""
-        return self.new("int[]", list(numbers) or [0])
+        """`int *` to numbers of their own, next to those asked for before."""
+        return self._placed("int", list(numbers) or [0])
+
+    def _placed(self, kind: str, numbers: list[Any]) -> Any:
+        count = len(numbers)
+        room, taken = self._rooms.get(kind, (None, _ROOM))
+        if taken + count > _ROOM:
+            room, taken = self.new(f"{kind}[]", max(_ROOM, count)), 0
+        room[taken : taken + count] = numbers
+        self._rooms[kind] = room, taken + count
+        return room + taken
 
     def array(self, numbers: Array) -> Any:
         """`real *` to the numbers of an array, row by row."""
