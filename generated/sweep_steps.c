@@ -534,12 +534,16 @@ static int mstmm_at_forward_in_plane(mstmm_state *state, int index, const real *
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .motion = block + MSTMM_BLOCK_MOTION, .qdot = state->qdot + body->q);
     if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
-    mstmm_planar_inertia(
-        .p = body->body_p, .S = block + MSTMM_BLOCK_S);
+    if (!state->required) {
+        mstmm_planar_inertia(
+            .p = body->body_p, .S = block + MSTMM_BLOCK_S);
+    }
     mstmm_planar_bias_load(
         .p = body->body_p, .motion = block + MSTMM_BLOCK_MOTION, .e = block + MSTMM_BLOCK_E);
-    mstmm_frames_pivot_floor(
-        .S = block + MSTMM_BLOCK_S, .floor_ = block + MSTMM_BLOCK_FLOOR);
+    if (!state->required) {
+        mstmm_frames_pivot_floor(
+            .S = block + MSTMM_BLOCK_S, .floor_ = block + MSTMM_BLOCK_FLOOR);
+    }
     return 0;
 }
 
@@ -1137,7 +1141,7 @@ static int mstmm_at_closures(mstmm_state *state, int index)
         code = mstmm_loops_rolling(
             .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C, .d = closed + MSTMM_CLOSURE_D,
             .W = closed + MSTMM_CLOSURE_W, .gap = closed + MSTMM_CLOSURE_GAP);
-        if (code) return mstmm_fail(state, MSTMM_FAILED_LOOP, index, code);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_FLAT, index, code);
     }
     if (state->level == MSTMM_GAP) {
         mstmm_loops_known(
@@ -1973,7 +1977,7 @@ static int mstmm_at_closures_loaded(mstmm_state *state, int index)
         code = mstmm_loops_rolling(
             .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C, .d = closed + MSTMM_CLOSURE_D,
             .W = closed + MSTMM_CLOSURE_W, .gap = closed + MSTMM_CLOSURE_GAP);
-        if (code) return mstmm_fail(state, MSTMM_FAILED_LOOP, index, code);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_FLAT, index, code);
     }
     mstmm_loops_drift(
         .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
@@ -5363,8 +5367,10 @@ MSTMM_AT_ONCE void mstmm_fetch_forward_in_plane(const mstmm_state *state, int in
     if (!body) return;
     real *block = state->workspace + body->block;
     const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_E + 6);
-    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_S, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_pass_forward_in_plane(mstmm_state *state)
 {
@@ -5487,8 +5493,8 @@ MSTMM_AT_ONCE void mstmm_fetch_poses_in_plane(const mstmm_state *state, int inde
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
     real *block = state->workspace + body->block;
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
 }
 static int mstmm_pass_poses_in_plane(mstmm_state *state)
 {
@@ -5635,9 +5641,9 @@ MSTMM_AT_ONCE void mstmm_fetch_closures_in_plane(const mstmm_state *state, int i
     if (!body) return;
     real *block = state->workspace + body->block;
     const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_MOTION + 9);
     mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
-    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_MOTION, mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
 }
 static int mstmm_pass_closures_in_plane(mstmm_state *state)
 {
@@ -5679,9 +5685,11 @@ MSTMM_AT_ONCE void mstmm_fetch_carried_in_plane(const mstmm_state *state, int in
     if (!body) return;
     real *block = state->workspace + body->block;
     const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E + 6);
-    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + nu * nu);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
+    mstmm_fetch(body->rotor, body->hinge_p);
 }
 static int mstmm_pass_carried_in_plane(mstmm_state *state)
 {
@@ -5761,9 +5769,9 @@ MSTMM_AT_ONCE void mstmm_fetch_answered_in_plane(const mstmm_state *state, int i
     if (!body) return;
     real *block = state->workspace + body->block;
     const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
     mstmm_fetch(block + MSTMM_BLOCK_DELTA, block + MSTMM_BLOCK_DELTA + 6);
-    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + nu * nu);
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
 }
 static int mstmm_pass_answered_in_plane(mstmm_state *state)
 {

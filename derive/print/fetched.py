@@ -42,9 +42,9 @@ def fetching(name: str, passes: Iterable[Pass]) -> str:
     if not stretches:
         return ""
     lines = [f"    mstmm_fetch({one.first}, {one.last});" for one in stretches]
-    given = [at for at, slot in enumerate(_GIVEN) if slot in slots]
-    if given:
-        lines.append(f"    mstmm_fetch({_FIRST[given[0]]}, {_LAST[given[-1]]});")
+    told = [at for at, slot in enumerate(_GIVEN) if slot in slots]
+    if told:
+        lines.append(f"    mstmm_fetch({_FIRST[told[0]]}, {_LAST[told[-1]]});")
     used = [word for word in _VARIABLES if any(reads(line, word) for line in lines)]
     declared = [f"    {VARIABLES[word][0]}" for word in used]
     given = "const mstmm_state *state, int index, int ahead"

@@ -82,11 +82,13 @@ def test_what_reads_others_is_not_begun(slot: str) -> None:
 def test_what_is_asked_for_is_what_is_used() -> None:
     text = fetching("some", [COLUMN, LAWS_OWN])
     assert re.findall(r"mstmm_fetch\((\w+\([^)]*\)|\w+ \+ \w+(?:\([^)]*\))?),", text) == [
-        "block + MSTMM_BLOCK_S",
+        "block + MSTMM_BLOCK_FLOOR",
+        "block + MSTMM_BLOCK_E",
         "mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU)",
-        "tangent + MSTMM_TANGENT_S(body->nu, body->nq)",
         "tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq)",
     ]
+    assert "mstmm_fetch(state->tangents->numbers + mstmm_carried_at(" in text
+    assert "mstmm_fetch(body->body_p, body->body_p + MSTMM_RIGID_NUMBERS);" in text
     assert fetching("none", [Pass("none", "load", "", ())]) == ""
 
 

@@ -12,6 +12,7 @@ from reference.random_scenes import random_scene
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.runtime.engine.tangent import Tangent
 
 
 def compiled(scene: dict[str, Any]) -> mstmm.Model:
@@ -161,3 +162,35 @@ def test_a_release_is_refused() -> None:
     model = compiled(pendulum(drive="0", release="t >= 1"))
     with pytest.raises(SceneError, match='hinge "pin" is released during the run'):
         model.derivatives([0.0], [0.0])
+
+
+def carried(scene: dict[str, Any]) -> tuple[list[int], list[int]]:
+    """Parents of the bodies, and where the tangent carries their S while they wait."""
+    model = compiled(scene)
+    Tangent(model.looped)
+    packed = model.looped.packed
+    bodies = packed.model.bodies
+    count = packed.system.count
+    return [bodies[i].parent for i in range(count)], [bodies[i].carried for i in range(count)]
+
+
+def test_long_chains_carry_in_a_few_places() -> None:
+    rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.1, 0.1, 0.1],
+           "ends": {"tip": [1, 0, 0]}}  # fmt: skip
+    chain = {"name": "rope", "count": 500, "inboard": "ground", "body": rod,
+             "hinge": {"type": "pin"}}  # fmt: skip
+    _, places = carried({"gravity": [0, -9.81, 0], "chain": [chain]})
+    assert len(set(places)) < 20
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_nobody_waits_where_another_does(seed: int) -> None:
+    """A place is taken again by bodies that are begun once its body is eliminated."""
+    parents, places = carried(drawn(700 + seed, most=90)[0])
+    children: dict[int, list[int]] = {}
+    for body, parent in enumerate(parents):
+        children.setdefault(parent, []).append(body)
+    for body, place in enumerate(places):
+        for other in range(body + 1, len(places)):
+            if places[other] == place:
+                assert max(children.get(body, [0])) < other
