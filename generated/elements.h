@@ -1327,6 +1327,8 @@ int mstmm_sweep_loops_slip(const real *restrict R_C, const real *restrict r_e,
 int mstmm_sweep_loops_drift(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict slip, const real *restrict motion_C,
     const real *restrict motion_B, real *restrict drift);
+int mstmm_sweep_loops_closing(const real *restrict gap, const real *restrict rate,
+    real *restrict relative);
 int mstmm_sweep_loops_row(const real *restrict w, const real *restrict R_C,
     const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
     real *restrict J_B);

@@ -1665,6 +1665,18 @@ static inline int mstmm_loops_drift_by(struct mstmm_loops_drift to)
 }
 #define mstmm_loops_drift(...) mstmm_loops_drift_by((struct mstmm_loops_drift){__VA_ARGS__})
 
+struct mstmm_loops_closing {
+    const real *gap;
+    const real *rate;
+    real *relative;
+};
+static inline int mstmm_loops_closing_by(struct mstmm_loops_closing to)
+{
+    return mstmm_sweep_loops_closing(
+        to.gap, to.rate, to.relative);
+}
+#define mstmm_loops_closing(...) mstmm_loops_closing_by((struct mstmm_loops_closing){__VA_ARGS__})
+
 struct mstmm_loops_row {
     const real *w;
     const real *R_C;

@@ -20,6 +20,8 @@ int mstmm_sweep_loops_slip(const real *restrict R_C, const real *restrict r_e,
 int mstmm_sweep_loops_drift(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict slip, const real *restrict motion_C,
     const real *restrict motion_B, real *restrict drift);
+int mstmm_sweep_loops_closing(const real *restrict gap, const real *restrict rate,
+    real *restrict relative);
 int mstmm_sweep_loops_row(const real *restrict w, const real *restrict R_C,
     const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
     real *restrict J_B);
@@ -637,6 +639,46 @@ static const mstmm_port mstmm_sweep_loops_drift_inputs[] = {
 
 static const mstmm_port mstmm_sweep_loops_drift_outputs[] = {
     {"drift", 6, "", 0, 0},
+};
+
+/* accelerations that close a gap in a step
+ * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
+ * in  gap[6] gap, axes of C
+ * in  rate[1] (1/s^2) accelerations by changes of coordinates
+ * out relative[6] motion of the end of B relative to C
+ */
+int mstmm_sweep_loops_closing(const real *restrict gap, const real *restrict rate,
+    real *restrict relative)
+{
+    const real t0 = gap[0] * rate[0];
+    relative[0] = t0;
+    const real t1 = gap[1] * rate[0];
+    relative[1] = t1;
+    const real t2 = gap[2] * rate[0];
+    relative[2] = t2;
+    const real t3 = gap[3] * rate[0];
+    relative[3] = t3;
+    const real t4 = gap[4] * rate[0];
+    relative[4] = t4;
+    const real t5 = gap[5] * rate[0];
+    relative[5] = t5;
+    return 0;
+}
+
+static int mstmm_sweep_loops_closing_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_loops_closing(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_loops_closing_inputs[] = {
+    {"gap", 6, "", 0, 0},
+    {"rate", 1, "1/s^2", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_loops_closing_outputs[] = {
+    {"relative", 6, "", 0, 0},
 };
 
 /* row of a direction of a hinge that closes a loop
@@ -3982,6 +4024,18 @@ static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "closing",
+        .function = (void (*)(void))mstmm_sweep_loops_closing,
+        .call = mstmm_sweep_loops_closing_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_loops_closing_inputs,
+        .outputs = mstmm_sweep_loops_closing_outputs,
+        .ir_hash = "8ef788c7a5068469365b6111b2f895ca7ca494dfab3842a44cd19ab10ce37ed4",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "row",
         .function = (void (*)(void))mstmm_sweep_loops_row,
         .call = mstmm_sweep_loops_row_call,
@@ -4359,7 +4413,7 @@ const mstmm_element mstmm_sweep_loops = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "loops",
-    .hash = "413bd88fc0b9602d7a2c6fc34bd20dfdcb2339b7e03d67ceeefb55f7154943df",
+    .hash = "eb09e33631f39e6f930409b5cc4c4c937b3ea913ef84aedb3497d17cd9fdd4f1",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4369,6 +4423,6 @@ const mstmm_element mstmm_sweep_loops = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 35,
+    .n_kernels = 36,
     .kernels = mstmm_sweep_loops_kernels,
 };

@@ -1095,6 +1095,7 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
 static int mstmm_at_closures(mstmm_state *state, int index)
 {
     real drift[6];
+    real relative[6];
     const mstmm_body *body = &state->model->bodies[index];
     real *block = state->workspace + body->block;
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
@@ -1123,6 +1124,11 @@ static int mstmm_at_closures(mstmm_state *state, int index)
         .v_B = outboard + MSTMM_BLOCK_V, .w_B = outboard + MSTMM_BLOCK_MOTION,
         .slip = closed + MSTMM_CLOSURE_SLIP);
     if (state->level == MSTMM_GAP) {
+        mstmm_loops_gap(
+            .R_e = closure->turn, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .d = closed + MSTMM_CLOSURE_D, .gap = closed + MSTMM_CLOSURE_GAP);
+    }
+    if ((state->closing > 0)) {
         mstmm_loops_gap(
             .R_e = closure->turn, .R_C = closed + MSTMM_CLOSURE_R_C,
             .d = closed + MSTMM_CLOSURE_D, .gap = closed + MSTMM_CLOSURE_GAP);
@@ -1162,25 +1168,31 @@ static int mstmm_at_closures(mstmm_state *state, int index)
                 .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU));
         }
     }
-    if (!state->level) {
+    if (!state->level && !(state->closing > 0)) {
         mstmm_loops_drift(
             .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
             .d = closed + MSTMM_CLOSURE_D, .slip = closed + MSTMM_CLOSURE_SLIP,
             .motion_C = block + MSTMM_BLOCK_MOTION, .motion_B = outboard + MSTMM_BLOCK_MOTION,
             .drift = drift);
     }
-    if (!state->level && closure->kind == MSTMM_DISTANCE) {
+    if (!state->level && !(state->closing > 0) && closure->kind == MSTMM_DISTANCE) {
         mstmm_loops_distance_drift(
             .d = closed + MSTMM_CLOSURE_D, .slip = closed + MSTMM_CLOSURE_SLIP, .drift = drift);
     }
-    if (!state->level && closure->kind == MSTMM_ROLLING) {
+    if (!state->level && !(state->closing > 0) && closure->kind == MSTMM_ROLLING) {
         mstmm_loops_rolling_drift(
             .p = closure->p, .R_C = closed + MSTMM_CLOSURE_R_C,
             .slip = closed + MSTMM_CLOSURE_SLIP, .drift = drift);
     }
-    if (!state->level) {
+    if (!state->level && !(state->closing > 0)) {
         mstmm_loops_known(
             .W = closed + MSTMM_CLOSURE_W, .relative = drift, .l = closed + MSTMM_CLOSURE_L);
+    }
+    if ((state->closing > 0)) {
+        mstmm_loops_closing(
+            .gap = closed + MSTMM_CLOSURE_GAP, .rate = &state->closing, .relative = relative);
+        mstmm_loops_known(
+            .W = closed + MSTMM_CLOSURE_W, .relative = relative, .l = closed + MSTMM_CLOSURE_L);
     }
     for (int k = 0; k < body->nu; k++) {
         mstmm_loops_row(

@@ -144,6 +144,23 @@ def drift() -> Derivation:
     )
 
 
+def closing() -> Derivation:
+    """relative = rate gap: what the end of B would have to be accelerated by so that its gap were
+    gone at the end of a step; 1 / rate is what accelerations change coordinates by (M. Arnold,
+    O. Brüls, Multibody Syst. Dyn. 18 (2007) 185-202)."""
+    gap = Quantity(symbol("gap", 6), "", "gap, axes of C")
+    rate = Quantity(symbol("rate", 1), "1/s^2", "accelerations by changes of coordinates")
+    value = _times(rate.symbol[0, 0], gap.symbol)
+    return Derivation(
+        "loops",
+        "accelerations that close a gap in a step",
+        (gap, rate),
+        (RELATIVE,),
+        (Equation("rate gap", RELATIVE.symbol, value),),
+        sources=SOURCES,
+    )
+
+
 def row() -> Derivation:
     """The row of one direction, by the accelerations of A and of B.
 
@@ -431,8 +448,8 @@ def pull(nu: int) -> Derivation:
 
 #: Steps that have no size of a hinge.
 STEPS = (
-    meet, gap, slip, drift, row, known, told, act, settle, close, shed, shed_known, shed_pair,
-    multiplier, multiplier_more, multiplier_less, yielded, loaded,
+    meet, gap, slip, drift, closing, row, known, told, act, settle, close, shed, shed_known,
+    shed_pair, multiplier, multiplier_more, multiplier_less, yielded, loaded,
 )  # fmt: skip
 #: Steps for hinges that have speeds.
 OF_SPEEDS = (divide, couple, answered, pull)

@@ -433,6 +433,7 @@ _TRAITS: dict[str, Callable[[Replay, BodyStructure], bool]] = {
     "distance": lambda replay, body: replay.closed_by("distance"),
     "plane": lambda replay, body: replay.closed_by("plane"),
     "rolling": lambda replay, body: replay.closed_by("rolling"),
+    "placing": lambda replay, body: False,
     "kept": lambda replay, body: not replay.level,
     "corrected": lambda replay, body: bool(replay.level),
     "soft": lambda replay, body: bool(replay.row().soft),

@@ -32,6 +32,7 @@ _TRAITS = {
     "inside": "(row->body >= 0)", "refined": "state->refined", "couplings": "model->n_couplings",
     "unmet": "(coupling->row < 0)",
     "coupled": "(pending->tau >= 0)",
+    "placing": "(state->closing > 0)",
     "gaping": "state->level == MSTMM_GAP", "slipping": "state->level == MSTMM_SLIP",
     "united": "state->tangents->unit",
     "effort": "force->effort", "qr": "model->qr", "planar": "state->planar",

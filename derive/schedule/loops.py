@@ -60,6 +60,11 @@ def _known(relative: str, when: str) -> Call:
     return call("loops.known", when=when, W="closure.W", relative=relative, l="closure.l")
 
 
+def _gap(when: str) -> tuple[Call, ...]:
+    return (call("loops.gap", when=when, R_e="closure.turn", R_C="closure.R_C", d="closure.d",
+                 gap="closure.gap"),)  # fmt: skip
+
+
 _MEETING = (
     call("frames.pose", when="staged", A_I="connection.R", x_I="connection.r", Rc="hinge.R",
          r="hinge.d", A="body.R", x="body.r"),
@@ -78,6 +83,8 @@ _CONSTRAINED = (
 )  # fmt: skip
 _DRIFT = call("loops.drift", **_MET, d="closure.d", slip="closure.slip", motion_C="body.motion",
               motion_B="outboard.motion", drift="local.drift")  # fmt: skip
+#: Or, where steps close gaps by their accelerations:
+_CLOSING = call("loops.closing", gap="closure.gap", rate="step.closing", relative="local.relative")
 #: And directions that turn.
 _BENT = (
     call("loops.distance_drift", when="distance", d="closure.d", slip="closure.slip",
@@ -98,13 +105,14 @@ CLOSURES = Pass(
     "closures", "body", "Rows of what closes a loop, and the load of a hinge's laws.",
     (
         *_MEETING,
-        call("loops.gap", when="gaping", R_e="closure.turn", R_C="closure.R_C", d="closure.d",
-             gap="closure.gap"),
+        *_gap("gaping"),
+        *_gap("placing"),
         *_CONSTRAINED,
         _known("closure.gap", "gaping"),
         _known("closure.slip", "slipping"),
         efforts_of_own("own.told", "refined"),
-        *only("!corrected", _DRIFT, *_BENT, _known("local.drift", "")),
+        *only("!corrected !placing", _DRIFT, *_BENT, _known("local.drift", "")),
+        *only("placing", _CLOSING, _known("local.relative", "")),
         _EFFORTS,
         Each(
             of="rows",

@@ -16,8 +16,8 @@ _HOLDS = {
     **dict.fromkeys(("own", "free", "moving", "hinged", "known"), True),
     **dict.fromkeys(
         ("parts", "staged", "section", "outward", "modal", "imposed", "distance", "plane",
-         "rolling", "coupled", "soft", "corrected", "gaping", "slipping", "refined", "inverse",
-         "balance", "kept", "unmoved"), False,
+         "rolling", "coupled", "soft", "corrected", "gaping", "placing", "slipping", "refined",
+         "inverse", "balance", "kept", "unmoved"), False,
     ),
 }  # fmt: skip
 #: What could be met one by one, and is not there.

@@ -289,6 +289,7 @@ inboard.S | 54 | tangent.S of the parent
 inboard.place | 54 | place.S of the parent
 inboard.z | 9 | place.z of the parent
 step.rate | 1 | change of the speeds along the unknowns
+step.closing | 1 | accelerations that close a gap of one within a step
 step.q | 1 | inverse time by which coordinates follow speeds
 step.kappa | 1 | whether the rates' own slopes count
 body.rho | nq | what the rates lack
@@ -372,6 +373,7 @@ TRAITS: dict[str, str] = {
     "couplings": "coordinates are coupled",
     "unmet": "other rows do what the coupling asks",
     "coupled": "the open row is a coupling of the hinge's speeds",
+    "placing": "gaps are to be closed by accelerations within a step",
     "gaping": "a gap",
     "slipping": "a slip",
     "planar": "every hinge is a free pin, all of them are parallel, and nobody observes",

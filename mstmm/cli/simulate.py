@@ -112,9 +112,9 @@ def simulate(
             "--method", metavar="NAME", show_default=f"{METHOD}, auto with --error",
             help="auto, which chooses; dop853, dopri5, pirk13, rk4; for stiff motion rodas4p2, "
             "rodas5p, rodas4, ros34pw2, rodas4pw, esdirk436, kvaerno5, genalpha, dttmm, hht, "
-            "newmark, wilson, houbolt; exprb32 for undamped vibration; dttmm-classical, "
-            "dttmm-classical-product; scipy-DOP853, -RK45, -RK23, -Radau, -BDF, -LSODA; "
-            "sundials-BDF, -Adams.  mstmm list tells of each."
+            "newmark, wilson, houbolt, genalpha-index3, hht-index3; exprb32 for undamped "
+            "vibration; dttmm-classical, dttmm-classical-product; scipy-DOP853, -RK45, "
+            "-RK23, -Radau, -BDF, -LSODA; sundials-BDF, -Adams.  mstmm list tells of each."
         ),
     ] = None,
     step: Annotated[

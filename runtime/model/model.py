@@ -437,11 +437,11 @@ class Model(Compiled):
                 code); auto, which is dop853 until stability sets its steps, then rodas4p2 (rtol
                 from 1e-5 on) or rodas5p, and back; for stiff motion rodas4p2, rodas5p, rodas4,
                 ros34pw2, rodas4pw, esdirk436, kvaerno5, genalpha, dttmm, hht, newmark, wilson or
-                houbolt; exprb32 for undamped vibration of few unknowns; scipy-DOP853, scipy-RK45,
-                scipy-Radau, scipy-BDF, scipy-LSODA, sundials-BDF, sundials-Adams: integrators
-                of SciPy and SUNDIALS on the same kernels; dttmm-classical,
-                dttmm-classical-product (with `step`): the discrete-time transfer matrix method in
-                absolute coordinates.
+                houbolt; genalpha-index3 and hht-index3, which close loops by positions; exprb32 for
+                undamped vibration of few unknowns; scipy-DOP853, scipy-RK45, scipy-Radau,
+                scipy-BDF, scipy-LSODA, sundials-BDF, sundials-Adams: integrators of SciPy and
+                SUNDIALS on the same kernels; dttmm-classical, dttmm-classical-product (with
+                `step`): the discrete-time transfer matrix method in absolute coordinates.
                 Without one dop853; auto where an error is given.
             step: fixed step in s; otherwise `rtol` (1e-9) and `atol` (1e-12) control the step.
             output_times: times of the samples (s, increasing); otherwise every accepted step (with
@@ -453,7 +453,7 @@ class Model(Compiled):
                 in its unit, of several in parts of how far each goes.
             max_step, max_steps: longest step in s and largest number of steps; 0 for no limit.
             radius: spectral radius, 0 to 1, that genalpha and dttmm leave to infinitely fast motion
-                (0.8).
+                (0.8); below 1 with genalpha-index3.
             scheme, iterations: of dttmm-classical; generalised-alpha, hht, newmark or wilson, with
                 a number as in "hht:0.3", and how many linear solutions a step may take.
             tangent: of the equations of motion, for implicit methods: exact; laws, inertia and the

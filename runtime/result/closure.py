@@ -11,6 +11,7 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
 from ..engine.loops.calls import LoopCalls
+from ..integrate.steppers import ON_POSITIONS
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
@@ -23,14 +24,17 @@ _SAMPLES = 12
 @dataclass(frozen=True)
 class Closure:
     """Largest gap (m, rad) and slip (m/s, rad/s) of the loops in samples of a run, and the
-    components of loads that rigid bodies leave open, in words."""
+    components of loads that rigid bodies leave open, in words.  Steps `on_positions` leave slips
+    of the size of their errors."""
 
     gap: float
     slip: float
     open_loads: str = ""
+    on_positions: bool = False
 
     def __str__(self) -> str:
         text = f"closed within {self.gap:.1e} (m, rad), slipping by {self.slip:.1e} a second"
+        text += ", which steps on positions leave" if self.on_positions else ""
         return f"{text}; loads left open: {self.open_loads}" if self.open_loads else text
 
 
@@ -43,7 +47,8 @@ def closure(model: Compiled, run: Trajectory) -> Closure | None:
         q, u, t = np.array(run.q[k]), np.array(run.u[k]), float(run.t[k])
         gap = max(gap, _largest(calls, calls.gap, q, u, t))
         slip = max(slip, _largest(calls, calls.slip, q, u, t))
-    return Closure(gap, slip, model.closed.loops.open_loads)
+    alone = run.settings.method.endswith(ON_POSITIONS)
+    return Closure(gap, slip, model.closed.loops.open_loads, alone)
 
 
 def _largest(calls: LoopCalls, level: int, q: Array, u: Array, t: float) -> float:

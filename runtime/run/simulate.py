@@ -15,7 +15,8 @@ from ..host.interruptible import interruptible
 from ..integrate.loop import Run, Samples, Statistics, Status
 from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO, Tableau, check_steps, get
-from ..pack.loops.refusal import refuse_method
+from ..integrate.steppers.implicit import Alpha
+from ..pack.loops.refusal import refuse_beyond_hinges, refuse_method
 from .endings import message_of
 from .method_choice import Choice
 from .notes import endless, unresolved
@@ -41,6 +42,8 @@ def make_run(
     """The integrator at the start of the run, with room for so many samples at a time."""
     tableau = suited(system, settings)
     start = system.begin(settings.t_start, q, u)
+    if _is_on_positions(tableau):
+        system.ask_positions()
     known = system.engine.packed.time_map(settings.t_start, settings.t_end)
     return Run(
         system.engine.ffi, system.engine.lib, system.system, tableau, settings, start,
@@ -54,9 +57,15 @@ def suited(system: SceneSystem, settings: Settings) -> Tableau:
     tableau = get(settings.first_method, settings.radius)
     if tableau.implicit:
         refuse_method(system.engine.packed, settings.method, settings.tangent)
+        if _is_on_positions(tableau):
+            refuse_beyond_hinges(system.engine.packed, f'method "{settings.method}"')
         system.offer_tangent()
     check_steps(tableau, settings.step)
     return tableau
+
+
+def _is_on_positions(tableau: Tableau) -> bool:
+    return isinstance(tableau, Alpha) and tableau.on_positions
 
 
 def tolerances(

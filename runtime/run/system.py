@@ -103,6 +103,11 @@ class SceneSystem:
         if self._code is not None and (implicit := self._code.implicit()) is not None:
             self._implicit_by(implicit, self._code.numbers)
 
+    def ask_positions(self) -> None:
+        """From now on steps of implicit methods, which have been offered a tangent, ask rows of
+        closed loops for positions where they end, and nothing of speeds."""
+        self.engine.lib.mstmm_scene_on_positions(self.run)
+
     def _implicit_by(self, code: FusedLibrary, given: Array) -> None:
         engine, lib = self.engine, self.engine.lib
         numbers = np.array(given)  # where inputs are written as time goes on

@@ -67,6 +67,10 @@ def test_dense_output_is_the_published_polynomial() -> None:
 @pytest.mark.parametrize("radius", [0.0, 0.3, 0.8, 1.0])
 @pytest.mark.parametrize("name", steppers.WITH_RADIUS)
 def test_the_radius_is_what_is_left_of_infinitely_fast_motion(name: str, radius: float) -> None:
+    if radius == 1.0 and name.endswith(steppers.ON_POSITIONS):
+        with pytest.raises(SceneError, match="would damp nothing"):
+            get(name, radius)
+        return
     tableau = get(name, radius)
     assert abs(tableau.amplification(1e5j)) == pytest.approx(radius, abs=3e-3)
     sizes = np.abs(tableau.amplification(1j * np.logspace(-2, 4, 100)))

@@ -104,6 +104,22 @@ static int changes_of(mstmm_tangent *at, const mstmm_parts *parts, int row, real
     return code;
 }
 
+/* The same where rows are asked of positions: in a step those go by accelerations alone. */
+static int changes_at_end(mstmm_tangent *at, const mstmm_parts *parts, int row, real *changes)
+{
+    const size_t speeds = (size_t)at->model->nu * sizeof(real);
+    real *loads = mstmm_across_missing(at);
+    memcpy(parts->still_efforts, parts->d_a, speeds);
+    int code = changes_of(at, parts, row, changes);
+    memcpy(loads, changes, (size_t)n_changes(at) * sizeof(real));
+    memset(parts->d_q, 0, (size_t)at->model->nq * sizeof(real));
+    memset(parts->d_u, 0, speeds);
+    memcpy(parts->d_a, parts->still_efforts, speeds);
+    if (!code) code = changes_of(at, parts, row, changes);
+    memcpy(changes, loads, (size_t)n_changes(at) * sizeof(real));
+    return code;
+}
+
 /* The same along x and increments that are known (NULL: none). */
 static int changes_along(mstmm_tangent *at, const real *x, const mstmm_known *known, int row,
                          real *changes)
@@ -119,7 +135,8 @@ static int changes_along(mstmm_tangent *at, const real *x, const mstmm_known *kn
     }
     for (int i = 0; known && i < model->nq; i++) parts.d_q[i] += known->q[i];
     for (int j = 0; known && j < model->nu; j++) parts.d_a[j] += known->a[j];
-    return changes_of(at, &parts, row, changes);
+    return at->on_positions ? changes_at_end(at, &parts, row, changes)
+                            : changes_of(at, &parts, row, changes);
 }
 
 int mstmm_coupled_along(mstmm_tangent *at, const real *x, const real *d_u, const real *d_a,

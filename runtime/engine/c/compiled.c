@@ -170,11 +170,11 @@ int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y)
     const mstmm_model *model = run->model;
     if (!run->fused)
         return mstmm_close_loops(model, run->workspace, t, y, y + model->nq, run->memory,
-                                 run->n_quaternions, run->quaternions, &run->failure);
+                                 run->n_quaternions, run->quaternions, run->on_positions, &run->failure);
     compiled_state at = {run, t, y};
     mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
-    return mstmm_closed(&(mstmm_closing){&at, compiled_gaps, compiled_slips}, model,
-                        &run->failure);
+    const mstmm_closing by = {&at, compiled_gaps, run->on_positions ? NULL : compiled_slips};
+    return mstmm_closed(&by, model, &run->failure);
 }
 
 /* --- trajectories side by side ---------------------------------------------------------------- */

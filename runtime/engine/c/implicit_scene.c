@@ -1,6 +1,7 @@
 /* A scene as implicit methods see it: its residual, and the tangent of it factored. */
 #include <string.h>
 
+#include "loops.h"
 #include "scene.h"
 #include "sweep_steps.h"
 
@@ -19,6 +20,21 @@ static int beyond(mstmm_scene_run *run, double t, const double *y, const double 
     const int code = mstmm_accelerations(model, run->workspace, t, y, y + model->nq, run->memory,
                                          NULL, qdot, f, balance, &run->failure);
     for (int j = 0; !code && j < model->nu; j++) r[j] = a[j] - f[j];
+    if (!code) mstmm_tangent_free(run->base, r);
+    return code;
+}
+
+/* And than those by which steps end with closed gaps. */
+static int beyond_placing(void *context, double t, const double *y, const double *a,
+                          double closing, double *r)
+{
+    mstmm_scene_run *run = context;
+    const mstmm_model *model = run->model;
+    real *qdot = run->known, *found = qdot + model->nq;
+    const int code = mstmm_placing_accelerations(model, run->workspace, closing, t, y,
+                                                 y + model->nq, a, run->memory, qdot, found,
+                                                 &run->failure);
+    for (int j = 0; !code && j < model->nu; j++) r[j] = a[j] - found[j];
     if (!code) mstmm_tangent_free(run->base, r);
     return code;
 }
@@ -204,4 +220,11 @@ void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system)
         .impose = somebody_imposes(model) ? impose : NULL,
     };
     system->implicit = &run->implicit;
+}
+
+void mstmm_scene_on_positions(mstmm_scene_run *run)
+{
+    if (!run->model->looped) return; /* without rows there is nothing to ask */
+    run->on_positions = run->base->on_positions = 1;
+    run->implicit.placing = beyond_placing;
 }

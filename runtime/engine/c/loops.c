@@ -35,7 +35,9 @@ int mstmm_hook_rows_begun(mstmm_state *state)
                         * sizeof(real));
     for (int r = 0; r < model->n_rows; r++) {
         const mstmm_loop_row *row = &model->rows[r];
-        real *numbers = row_numbers(state, r), told = state->refined ? numbers[MSTMM_ROW_X] : 0;
+        real *numbers = row_numbers(state, r);
+        const int keeps = state->refined && !(state->closing > 0);
+        const real told = keeps ? numbers[MSTMM_ROW_X] : 0;
         memset(numbers, 0, MSTMM_ROW * sizeof(real));
         numbers[MSTMM_ROW_TOLD] = told;
         numbers[MSTMM_ROW_PIVOT] =
@@ -79,6 +81,17 @@ int mstmm_refine(mstmm_state *state, const real *q, const real *u)
     if (state->balance) state->balance->power = state->balance->potential = 0;
     mstmm_ground(state);
     return mstmm_run_accelerations(state);
+}
+
+int mstmm_placing_accelerations(const mstmm_model *model, real *workspace, real closing, real t,
+                                const real *q, const real *u, const real *a, const real *memory,
+                                real *qdot, real *found, mstmm_failure *failure)
+{
+    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q, .u = u,
+                         .memory = memory, .given = a, .qdot = qdot, .udot = found,
+                         .failure = failure, .closing = closing, .residual = 1, .refined = 1};
+    mstmm_ground(&state);
+    return mstmm_run_accelerations(&state);
 }
 
 int mstmm_correction(const mstmm_model *model, real *workspace, int level, real give, real t,
@@ -226,7 +239,7 @@ static int looped_slips(void *context)
 int mstmm_closed(const mstmm_closing *by, const mstmm_model *model, mstmm_failure *failure)
 {
     const real close = model->refines ? CLOSE_REFINED : CLOSE;
-    const int slips = model->refines ? SLIPS_REFINED : 1;
+    const int slips = !by->slips ? 0 : model->refines ? SLIPS_REFINED : 1;
     mstmm_gaps gaps = {.met = 1};
     for (int k = 0; k < STEPS && !(gaps.met < close); k++) {
         gaps = (mstmm_gaps){0};
@@ -248,10 +261,11 @@ int mstmm_closed(const mstmm_closing *by, const mstmm_model *model, mstmm_failur
 
 int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q, real *u,
                       const real *memory, int n_quaternions, const int *quaternions,
-                      mstmm_failure *failure)
+                      int gaps_alone, mstmm_failure *failure)
 {
     const mstmm_state state = {.model = model, .workspace = workspace};
     looped_state at = {model, workspace, q, u, mstmm_spare_udot(&state), t, memory, n_quaternions,
                        quaternions, failure};
-    return mstmm_closed(&(mstmm_closing){&at, looped_gaps, looped_slips}, model, failure);
+    const mstmm_closing by = {&at, looped_gaps, gaps_alone ? NULL : looped_slips};
+    return mstmm_closed(&by, model, failure);
 }

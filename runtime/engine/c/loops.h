@@ -6,6 +6,11 @@
 
 /* Answers once more what the accelerations just found leave over, and adds that to them. */
 int mstmm_refine(mstmm_state *state, const real *q, const real *u);
+/* Accelerations `found`, from those given with their rows: the motion under all that acts whose gaps
+ * would be gone if each coordinate changed by 1 / closing of what its acceleration differs. */
+int mstmm_placing_accelerations(const mstmm_model *model, real *workspace, real closing, real t,
+                                const real *q, const real *u, const real *a, const real *memory,
+                                real *qdot, real *found, mstmm_failure *failure);
 /* How much the rows lack in the sweep that was made last, by row. */
 void mstmm_missing(const mstmm_state *state, real *missing);
 /* What a coupling lacked in the sweep that was made last; 0 where nothing is asked of it. */
@@ -23,7 +28,7 @@ typedef struct {
 } mstmm_gaps;
 
 /* What brings a state back to where its loops are closed: one step of its coordinates, and its
- * speeds; both in place.  Nonzero = failure code. */
+ * speeds (NULL: those stay); both in place.  Nonzero = failure code. */
 typedef struct {
     void *context;
     int (*gaps)(void *context, mstmm_gaps *found);

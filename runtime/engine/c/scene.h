@@ -104,6 +104,7 @@ typedef struct {
      * NULL: not prepared */
     mstmm_tangent *base, *stage;
     mstmm_implicit implicit;
+    int on_positions; /* implicit steps close gaps, and leave slips: index 3 */
     int steady;       /* nothing in the scene goes by time */
     int *coordinates; /* nu: see mstmm_implicit */
     real *known;      /* nq + 3 nu: scratch */
@@ -112,6 +113,9 @@ typedef struct {
 
 /* Lets implicit methods integrate `run`, whose last fields have been given. */
 void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system);
+
+/* From now on their steps ask rows of positions where they end, and nothing of speeds. */
+void mstmm_scene_on_positions(mstmm_scene_run *run);
 
 /* Driven coordinates, unit quaternions and memory put in order at t; as after an accepted step. */
 int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y);

@@ -81,7 +81,7 @@ int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const
                          .planar = model->planar && !balance
                                    && !(model->refines || model->product || model->qr),
                          .observed = 0,
-                         .hinges_known = 0, .level = 0, .give = 0, .refined = 0, .asked = NULL, .strike = NULL};
+                         .hinges_known = 0, .level = 0, .give = 0, .closing = 0, .refined = 0, .asked = NULL, .strike = NULL};
     if (balance) balance->power = balance->potential = 0;
     mstmm_ground(&state);
     const int code = mstmm_run_accelerations(&state);

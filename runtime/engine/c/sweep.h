@@ -312,10 +312,10 @@ int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q
 int mstmm_moved(const mstmm_model *model, real *workspace, real t, real *q, const real *change,
                 const real *memory, int n_quaternions, const int *quaternions,
                 mstmm_failure *failure);
-/* Gaps closed and slips stopped in place; driven coordinates are filled in. */
+/* Gaps closed and, unless `gaps_alone`, slips stopped in place; driven coordinates are filled in. */
 int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q, real *u,
                       const real *memory, int n_quaternions, const int *quaternions,
-                      mstmm_failure *failure);
+                      int gaps_alone, mstmm_failure *failure);
 /* Numbers that a flexible body of n modes, and one of its sections, keep in the workspace. */
 int64_t mstmm_modal_numbers(int n);
 int64_t mstmm_section_numbers(int n);
@@ -369,6 +369,7 @@ typedef struct mstmm_state {
     const struct mstmm_strike *strike; /* see bounce.h; NULL: none */
     const real *asked; /* what the rows lack, in place of gap or slip; NULL: that */
     int refined;      /* `given` is an answer, its multipliers are kept: what is left is answered */
+    real closing;     /* above 0: gaps are asked to close by so many times accelerations */
     int residual;     /* drives give accelerations though others are given */
     struct mstmm_state *slope; /* where derivatives along a direction lie; NULL: none are wanted */
     mstmm_tangents *tangents;

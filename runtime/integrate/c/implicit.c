@@ -24,6 +24,13 @@ int mstmm_step_residual(const mstmm_work *work, double t, const double *row, dou
   return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
 }
 
+int mstmm_step_placing(const mstmm_work *work, double t, const double *row, double closing) {
+  work->run->count.residuals++;
+  const int code = work->implicit->placing(work->system->context, t, row,
+                                           row + work->system->n_state, closing, work->residual);
+  return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
+}
+
 int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const double *u,
                      double *dq) {
   const mstmm_implicit *at = work->implicit;

@@ -18,6 +18,10 @@ typedef struct mstmm_implicit {
    * zero; what a drive prescribes is filled in by t, whatever y and a say of it. */
   int (*residual)(void *context, double t, const double *y, const double *a, double *r,
                   double *work);
+  /* R of steps that ask rows of positions where they end: of accelerations, beyond those under which
+   * gaps go, coordinates changing by 1 / closing times theirs.  NULL: rows are of accelerations. */
+  int (*placing)(void *context, double t, const double *y, const double *a, double closing,
+                 double *r);
   /* dR/dt at fixed (q, u, a), drives and their derivatives included */
   int (*residual_rate)(void *context, double t, const double *y, const double *a, double *r_t);
   /* dq = N(q) u, zero where somebody imposes it; NULL: dq = u, entry by entry, nobody does */

@@ -32,6 +32,8 @@ void mstmm_exponential_dense(const mstmm_work *work, double theta, double *y);
 
 int mstmm_step_impose(const mstmm_work *work, double t, double *row);
 int mstmm_step_residual(const mstmm_work *work, double t, const double *row, double *rest);
+/* The same with gaps that an acceleration of one closes by 1 / closing. */
+int mstmm_step_placing(const mstmm_work *work, double t, const double *row, double closing);
 int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const double *u,
                      double *dq);
 /* `laws`: that of laws alone */

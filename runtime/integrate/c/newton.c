@@ -81,7 +81,9 @@ static int hold(const mstmm_work *work, const mstmm_newton_equations *stage) {
 /* One iteration; *size is that of the increment. */
 static int improve(const mstmm_work *work, const mstmm_newton_equations *stage, double *size) {
   work->run->count.iterations++;
-  int status = mstmm_step_residual(work, stage->t, work->y_stage, NULL);
+  int status = work->implicit->placing
+                   ? mstmm_step_placing(work, stage->t, work->y_stage, 1.0 / stage->cq)
+                   : mstmm_step_residual(work, stage->t, work->y_stage, NULL);
   for (int i = 0; i < work->implicit->n_u; i++) work->residual[i] = -work->residual[i];
   if (!status && stage->defect) status = stage->defect(work, stage);
   if (!status) status = mstmm_step_solve(work, stage->t, stage->defect ? work->rho_q : NULL, NULL);

@@ -13,6 +13,7 @@ from importlib import import_module
 
 from mstmm.errors import SceneError
 
+from .implicit import on_positions
 from .tableau import Tableau, from_monomials, frozen, hermite
 
 __all__ = [
@@ -40,11 +41,16 @@ EXPLICIT = ("rk4", "dopri5", "dop853", "pirk13")
 IMPLICIT = (
     "rodas4", "rodas4p2", "rodas5p", "ros34pw2", "rodas4pw", "esdirk436", "kvaerno5",
     "genalpha", "dttmm", "hht", "newmark", "wilson", "houbolt", "exprb32",
+    "genalpha-index3", "hht-index3",
 )  # fmt: skip
 BUILT_IN = EXPLICIT + IMPLICIT
 
 #: Methods that leave a spectral radius to infinitely fast motion, which a run may choose.
-WITH_RADIUS = ("genalpha", "dttmm")
+WITH_RADIUS = ("genalpha", "dttmm", "genalpha-index3")
+
+#: Ending of methods whose steps ask closed loops for positions at their ends: those without it ask
+#: for accelerations, and close the loops behind each step.
+ON_POSITIONS = "-index3"
 
 #: Tangents of the equations of motion that implicit methods may take, in the order of the C loop's
 #: numbers: auto is the exact one for Rosenbrock methods, while iterations try that of laws alone.
@@ -52,7 +58,10 @@ TANGENTS = ("auto", "exact", "laws")
 
 #: Rosenbrock methods whose order does not depend on the tangent, and methods that iterate.
 WITHOUT_EXACT = ("ros34pw2", "rodas4pw")
-ITERATED = ("esdirk436", "kvaerno5", "genalpha", "hht", "newmark", "wilson", "houbolt")
+ITERATED = (
+    "esdirk436", "kvaerno5", "genalpha", "hht", "newmark", "wilson", "houbolt", "genalpha-index3",
+    "hht-index3",
+)  # fmt: skip
 
 #: The name of the choice that a run makes among methods, and the one by which it begins.
 AUTO, AUTO_EXPLICIT = "auto", "dop853"
@@ -62,6 +71,8 @@ _registered: dict[str, Tableau] = {}
 
 @cache
 def _built_in(name: str, radius: float | None = None) -> Tableau:
+    if name.endswith(ON_POSITIONS):
+        return on_positions(_built_in(name.removesuffix(ON_POSITIONS), radius), name)
     module = import_module(f".{name}", __name__)
     tableau: Tableau = module.tableau() if radius is None else module.tableau(radius)
     return tableau
@@ -83,8 +94,22 @@ def names() -> tuple[str, ...]:
     return (*BUILT_IN, *_registered)
 
 
+def check_damped(name: str, radius: float | None) -> None:
+    """SceneError for steps on positions that damp nothing."""
+    if name != f"newmark{ON_POSITIONS}" and not (name.endswith(ON_POSITIONS) and radius == 1.0):
+        return
+    given = f'method "{name}"' if radius is None else f'radius = {radius:g}: method "{name}"'
+    raise SceneError(
+        f"{given} would damp nothing, and errors of multipliers, which on rows of positions go by "
+        f"1/step^2, would grow from step to step; take genalpha{ON_POSITIONS} with a radius below "
+        f"1, or {name.removesuffix(ON_POSITIONS)}, which asks for accelerations"
+    )
+
+
 def check_radius(name: str, radius: float | None) -> None:
-    """SceneError for a spectral radius outside 0 to 1, or for a method that does not take one."""
+    """SceneError for a spectral radius outside 0 to 1, for a method that does not take one, or for
+    one that would damp nothing where it must."""
+    check_damped(name, radius)
     if radius is None:
         return
     if not 0.0 <= radius <= 1.0:

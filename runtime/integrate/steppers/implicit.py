@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
@@ -269,6 +269,8 @@ class Alpha(Implicit):
             up to there (Wilson); 1 for others.
         backward: Houbolt's differences over three steps; the constants serve the first two.
         one_iteration: one linearised equation a step, at the predictor u'_1 = u'_0.
+        on_positions: rows of closed loops are met by positions at the step's end, with their
+            multipliers as unknowns (index 3); their speeds err by the method's own order.
     """
 
     kind: ClassVar[int] = ALPHA
@@ -279,6 +281,7 @@ class Alpha(Implicit):
     collocation: float = 1.0
     backward: bool = False
     one_iteration: bool = False
+    on_positions: bool = False
 
     def _check_consistency(self) -> None:
         if not (self.beta_n > 0.0 and self.gamma_n > 0.0 and self.collocation >= 1.0):
@@ -335,6 +338,13 @@ def alpha(name: str, source: str, adaptive: bool = True, **constants: Any) -> Al
         error_order=2 if adaptive else 0, dense=hermite([0.0, 1.0, 0.0]), dense_order=2,
         second=frozen(np.zeros((3, 3))), **constants,
     )  # fmt: skip
+
+
+def on_positions(tableau: Tableau, name: str) -> Alpha:
+    """The same method on rows of positions, under another name."""
+    assert isinstance(tableau, Alpha)
+    source = f"{tableau.source}, on index 3 after Arnold and Brüls (2007)"
+    return replace(tableau, name=name, source=source, on_positions=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,9 @@ import mstmm
 from mstmm.runtime.engine.loops.calls import LoopCalls
 from mstmm.runtime.run.fastest import Fastest
 
-from .linkages import four_bar, legs, rod
-from .scenes import andrews
-from .test_four_bar import linkage
+from ..linkages import four_bar, legs, rod
+from ..scenes import andrews
+from ..test_four_bar import linkage
 
 #: Method -> order, and equal steps of the coarser of two runs.
 ORDERS = {

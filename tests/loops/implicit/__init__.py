@@ -1,0 +1,1 @@
+"""Implicit steps on closed loops."""

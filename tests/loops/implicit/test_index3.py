@@ -1,0 +1,211 @@
+"""Generalised alpha on rows of positions: against the equations as they are printed, and beside the
+method whose loops are closed behind its steps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mstmm
+from mstmm.errors import SceneError
+from mstmm.runtime.engine.loops.calls import LoopCalls
+from mstmm.runtime.integrate.steppers.genalpha import constants
+
+from ..linkages import four_bar
+from .test_implicit import scene_of_laws
+
+Array = np.ndarray[Any, Any]
+
+#: A rod that swings about one end: mass, moment about its centre, length to the centre, gravity.
+MASS, MOMENT, ARM, GRAVITY = 1.3, 0.4, 0.7, 9.81
+ANGLE, SPEED = 0.4, 3.0
+
+
+def pendulum() -> mstmm.Scene:
+    """The rod by its centre's place and its angle, and a pin that closes a loop with the ground."""
+    place = [ARM * np.cos(ANGLE), ARM * np.sin(ANGLE), ANGLE]
+    turning = [-SPEED * ARM * np.sin(ANGLE), SPEED * ARM * np.cos(ANGLE), SPEED]
+    rod = {"name": "rod", "mass": MASS, "inertia": [MOMENT] * 3, "ends": {"top": [-ARM, 0, 0]}}
+    plane = {"name": "plane", "type": "planar", "inboard": "ground", "outboard": "rod",
+             "cut": False, "initial": {"q": place, "u": turning}}  # fmt: skip
+    pin = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod.top", "cut": True,
+           "initial": {"q": ANGLE}}  # fmt: skip
+    return mstmm.Scene(gravity=[0, -GRAVITY, 0], body=[rod], hinge=[plane, pin])
+
+
+def printed(radius: float, h: float, steps: int) -> tuple[Array, Array, Array]:
+    """q, u (steps + 1, 3) and multipliers (steps, 2) of equations (12), (18) to (21) of M. Arnold,
+    O. Brüls, Multibody System Dynamics 18 (2007) 185-202, on M q'' + Phi_q^T lambda = f, Phi = 0,
+    by a full Newton matrix; auxiliary accelerations begin with q''."""
+    c = constants(radius)
+    mass, force = np.diag([MASS, MASS, MOMENT]), np.array([0.0, -MASS * GRAVITY, 0.0])
+
+    def rows(q: Array) -> tuple[Array, Array]:
+        cosine, sine = np.cos(q[2]), np.sin(q[2])
+        phi = q[:2] - ARM * np.array([cosine, sine])
+        return phi, np.array([[1, 0, ARM * sine], [0, 1, -ARM * cosine]])
+
+    q = np.array([ARM * np.cos(ANGLE), ARM * np.sin(ANGLE), ANGLE])
+    u = SPEED * np.array([-q[1], q[0], 1.0])
+    phi_q, gamma = rows(q)[1], -(SPEED**2) * q[:2]
+    whole = np.block([[mass, phi_q.T], [phi_q, np.zeros((2, 2))]])
+    rate = np.linalg.solve(whole, [*force, *gamma])[:3]
+    a, lam = rate.copy(), np.zeros(2)
+    found, multipliers = [(q, u)], []
+    part, last = (1 - c["alpha_f"]) / (1 - c["alpha_m"]), 1 / (1 - c["alpha_m"])
+    for _ in range(steps):
+        new = rate.copy()
+        for _ in range(12):
+            aux = part * new + last * (c["alpha_f"] * rate - c["alpha_m"] * a)
+            q_1 = q + h * u + h * h * ((0.5 - c["beta_n"]) * a + c["beta_n"] * aux)
+            phi, phi_q = rows(q_1)
+            turned = np.zeros((3, 3))
+            turned[2, 2] = ARM * (lam @ [np.cos(q_1[2]), np.sin(q_1[2])])
+            cq = h * h * c["beta_n"] * part
+            whole = np.block([[mass + cq * turned, phi_q.T], [cq * phi_q, np.zeros((2, 2))]])
+            step = np.linalg.solve(whole, -np.array([*(mass @ new + phi_q.T @ lam - force), *phi]))
+            new, lam = new + step[:3], lam + step[3:]
+        u = u + h * ((1 - c["gamma_n"]) * a + c["gamma_n"] * aux)
+        q, rate, a = q_1, new, aux
+        found.append((q, u))
+        multipliers.append(lam)
+    return np.array([x for x, _ in found]), np.array([x for _, x in found]), np.array(multipliers)
+
+
+@pytest.fixture(scope="module")
+def swung() -> mstmm.Model:
+    return mstmm.compile(pendulum())
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.6, 0.9])
+def test_printed_equations(radius: float, swung: mstmm.Model) -> None:
+    h, steps = 0.02, 60
+    q, u, _ = printed(radius, h, steps)
+    result = swung.simulate(
+        h * steps, "genalpha-index3", step=h, radius=radius, rtol=1e-12, atol=1e-13,
+        output_times=np.linspace(0.0, h * steps, steps + 1),
+    )  # fmt: skip
+    assert result.success, result.message
+    # Iterations with fixed steps end at 1e-3 of a step's error.
+    assert np.abs(result.q[:, :3] - q).max() < 3e-6
+    assert np.abs(result.u[:, :3] - u).max() < 2e-5
+    exact = swung.simulate(h * steps, rtol=1e-11, output_times=[0.0, h * steps]).q[-1, :3]
+    assert np.abs(exact - q[-1]).max() > 1e-4
+    assert np.abs(result.q[:, 3] - result.q[:, 2]).max() < 1e-12  # the pin's own angle
+
+
+def test_multipliers_are_of_second_order(swung: mstmm.Model) -> None:
+    """Those of the printed equations, and the load of the pin at states of the run."""
+    end = 0.8
+    wanted = swung.simulate(end, rtol=1e-12, atol=1e-13, output_times=[0.0, end]).force("pin")[-1]
+    errors = []
+    for steps in (80, 160):
+        run = swung.simulate(
+            end, "genalpha-index3", step=end / steps, rtol=1e-11, output_times=[0.0, end]
+        )
+        lam = printed(0.8, end / steps, steps)[2][-1]
+        errors.append([
+            np.abs(run.force("pin")[-1] - wanted).max(), np.abs(-lam - wanted[:2]).max()
+        ])  # fmt: skip
+    print(errors)
+    assert np.all(np.log2(np.array(errors[0]) / errors[1]) > 1.8)
+    assert np.max(errors) < 0.1 * np.abs(wanted).max()
+
+
+def test_beside_loops_that_are_closed_behind_steps() -> None:
+    """Springs, dampers, an effort of time and rotors: one limit, order 2, no gap; a slip of order
+    2, which the certificate tells."""
+    model, end = mstmm.compile(mstmm.Scene(**scene_of_laws())), 0.8
+    wanted = model.simulate(end, rtol=1e-12, atol=1e-13, output_times=[0.0, end])
+    calls, errors, slips = LoopCalls(model.looped, wanted.q[-1]), [], []
+    for method in ("genalpha-index3", "hht-index3", "genalpha"):
+        for steps in (80, 160):
+            run = model.simulate(end, method, step=end / steps, output_times=[0.0, end])
+            assert run.success, run.message
+            closure = run.certificate.closure
+            assert closure is not None and closure.gap < 1e-14
+            assert ("which steps on positions leave" in str(closure)) == ("index3" in method)
+            errors.append(float(np.abs(run.q[-1] - wanted.q[-1]).max()))
+            slip = calls.correction(calls.slip, run.q[-1], run.u[-1], t=end)[1]
+            slips.append(float(np.abs(slip).max()))
+    print(errors, slips)
+    assert max(errors) < 1e-3 and errors[1] < 2 * errors[5]
+    assert np.all(np.log2(np.divide(errors[::2], errors[1::2])) > 1.85)
+    assert np.all(np.log2(np.divide(slips[:4:2], slips[1:4:2])) > 1.85) and max(slips[4:]) < 1e-14
+
+
+def test_energy_falls_as_slowly() -> None:
+    """A four-bar that turns for 20 s: both methods lose the more the less they leave of fast
+    motion, and nothing blows up."""
+    model = mstmm.compile(mstmm.Scene(**four_bar(speed=8.0) | {"gravity": [0, 0, 0]}))
+    lost = {}
+    for method in ("genalpha", "genalpha-index3"):
+        for radius in (0.5, 0.9):
+            run = model.simulate(20.0, method, step=5e-3, radius=radius, output_times=[0.0, 20.0])
+            assert run.success, run.message
+            energy = run.energies()["kinetic"]
+            lost[method, radius] = 1 - float(energy[1] / energy[0])
+    print(lost)
+    for radius in (0.5, 0.9):
+        assert abs(lost["genalpha-index3", radius]) < 0.05
+    assert abs(lost["genalpha-index3", 0.9]) < abs(lost["genalpha-index3", 0.5])
+
+
+def test_steps_that_choose_themselves() -> None:
+    model = mstmm.compile(mstmm.Scene(**four_bar(speed=3.0)))
+    wanted = model.simulate(1.0, rtol=1e-11, output_times=[0.0, 1.0])
+    errors = []
+    for rtol in (1e-4, 1e-6):
+        run = model.simulate(1.0, "genalpha-index3", rtol=rtol, output_times=[0.0, 1.0])
+        assert run.success, run.message
+        errors.append(float(np.abs(run.q[-1] - wanted.q[-1]).max()))
+    print(errors)
+    assert errors[1] < 0.1 * errors[0] < 1e-2
+
+
+def test_driven_and_in_sessions() -> None:
+    """A crank that is driven; ticks of a session are the steps of one run."""
+    scene = four_bar(foot={"drive": "0.9 + 0.5*sin(3*t)"})
+    del scene["hinge"][0]["initial"]
+    model = mstmm.compile(mstmm.Scene(**scene))
+    run = model.simulate(0.4, "genalpha-index3", step=1e-3, output_times=[0.0, 0.4])
+    wanted = model.simulate(0.4, rtol=1e-10, output_times=[0.0, 0.4])
+    assert np.abs(run.q[-1] - wanted.q[-1]).max() < 1e-12
+    assert np.abs(run.u[-1] - wanted.u[-1]).max() < 1e-4
+    session = model.session(method="genalpha-index3", step=1e-3)
+    for _ in range(4):
+        session.advance(0.1)
+    assert np.abs(session.q - run.q[-1]).max() < 1e-12  # code for the scene may have come between
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"method": "genalpha-index3", "radius": 1.0}, "radius = 1: .* would damp nothing"),
+        ({"method": "newmark-index3"}, "newmark-index3.* would damp nothing.*, or newmark, which"),
+        ({"method": "rk4-index3"}, 'method "rk4-index3" is not known'),
+    ],
+)
+def test_refused(asked: dict[str, Any], words: str, swung: mstmm.Model) -> None:
+    with pytest.raises(SceneError, match=words):
+        swung.simulate(0.1, step=1e-2, **asked)
+
+
+def test_constraints_are_refused() -> None:
+    scene = four_bar()
+    scene["coupling"] = [{"name": "gear", "expression": "foot.q - end.q", "equals": "0"}]
+    scene["hinge"] = [one for one in scene["hinge"] if one["name"] != "tip"]
+    model = mstmm.compile(mstmm.Scene(**scene))
+    with pytest.raises(SceneError, match='coupling "gear" closes a loop, and method "genalpha-'):
+        model.simulate(0.1, "genalpha-index3", step=1e-2)
+
+
+def test_a_tree_has_nothing_to_ask() -> None:
+    scene = four_bar()
+    scene["hinge"] = scene["hinge"][:2]
+    scene["body"] = scene["body"][:2]
+    model = mstmm.compile(mstmm.Scene(**scene))
+    runs = [model.simulate(0.2, method, step=1e-2) for method in ("genalpha", "genalpha-index3")]
+    assert np.array_equal(runs[0].q, runs[1].q)
