@@ -7,7 +7,7 @@ Losses of elastic parts are i (K' - K) besides, K' that of a scene with so much 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mstmm.arrays import Array, Integers
 
-from .tangent import Tangent
+from .tangent import Tangent, count_negative
 
 if TYPE_CHECKING:
     from .engine import Engine
@@ -115,34 +115,19 @@ class Response:
         """How many pivots are negative at every s^2 (k,) < 0 of a symmetric Z: as many as
         eigenvalues (see `Tangent.count_negative`); -1 where a pivot is zero."""
         sizes = self._sizes
-        pivots = np.zeros((len(squares), sum(n * n for n in sizes)))
+        pivots = np.zeros((len(squares), int(np.square(sizes).sum())))
         record, points = self._record, np.sqrt(squares.astype(np.complex128))
         record.pivots, record.n_pivots = self.engine.pointer(pivots), pivots.shape[1]
         _, growth, _ = self.amplitudes(points, np.zeros((0, self.engine.nu)))
         record.pivots = self.engine.ffi.NULL
-        found = np.zeros(len(squares), dtype=np.int64)
-        for blocks in _by_size(pivots, sizes):
-            regular = np.where(np.isfinite(growth)[:, None, None, None], blocks, 0.0)
-            found += (np.linalg.eigvalsh(regular) < 0).sum(axis=(1, 2))
-        return np.where(np.isfinite(growth), found, -1)
+        regular = np.isfinite(growth)
+        found = count_negative(np.where(regular[:, None], pivots, 0.0), sizes)
+        return np.where(regular, found, -1)
 
     @cached_property
-    def _sizes(self) -> list[int]:
+    def _sizes(self) -> Integers:
         """Sizes of the pivots one after the other."""
-        engine = self.engine
-        block = np.zeros(max([6, *(body.n for body in engine.packed.flexible.values())]) ** 2)
-        pivot, pointer = engine.lib.mstmm_tangent_pivot, engine.pointer(block)
-        bodies = range(engine.packed.system.count)
-        return [pivot(self.tangent.record, k, part, pointer) for k in bodies for part in (1, 0)]
-
-
-def _by_size(pivots: Array, sizes: list[int]) -> Iterator[Array]:
-    """(k, blocks, n, n) for each n among the sizes."""
-    squares = np.square(sizes)
-    firsts = np.cumsum(squares) - squares
-    for n in sorted(set(sizes) - {0}):
-        places = firsts[np.array(sizes) == n][:, None] + np.arange(n * n)
-        yield pivots[:, places].reshape(len(pivots), -1, n, n)
+        return self.tangent.pivots()[0]
 
 
 def _aligned(count: int) -> Array:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.arrays import Array, Integers
 from mstmm.errors import SceneError
 
 if TYPE_CHECKING:
@@ -116,17 +116,18 @@ class Tangent:
         """
         if self.coupled:
             return None
-        sizes = [body.n for body in self.engine.packed.flexible.values()]
-        block = np.zeros(max([6, *sizes]) ** 2)
-        pivot, pointer, found = self.engine.lib.mstmm_tangent_pivot, self.engine.pointer(block), 0
-        for body in range(self.engine.packed.system.count):
-            for shapes in (0, 1):
-                n = pivot(self.record, body, shapes, pointer)
-                if n == 1:
-                    found += bool(block[0] < 0)
-                elif n:
-                    found += int((np.linalg.eigvalsh(block[: n * n].reshape(n, n)) < 0).sum())
-        return found
+        sizes, pivots = self.pivots()
+        return int(count_negative(pivots[None], sizes)[0])
+
+    def pivots(self) -> tuple[Integers, Array]:
+        """Sizes n (2 bodies,) of the pivots of the last factorisation, of each body those of its
+        shapes and its hinge, and their numbers (sum of n^2,), of hinges those of the inverse."""
+        engine, find = self.engine, self.engine.lib.mstmm_tangent_pivots
+        sizes = np.zeros(2 * engine.packed.system.count, dtype=np.int32)
+        places = engine.ffi.from_buffer("int[]", sizes)
+        pivots = np.zeros(find(self.record, places, engine.ffi.NULL))
+        find(self.record, places, engine.pointer(pivots))
+        return sizes.astype(np.int64), pivots
 
     def allow_negative(self) -> None:
         """From now on negative pivots are no failure: somebody counts them."""
@@ -163,6 +164,20 @@ def tangent_of(engine: Engine) -> Tangent:
         kept.tangent = Tangent(engine)
         kept.tangent_of = engine.packed.workspace
     return cast(Tangent, kept.tangent)
+
+
+def count_negative(pivots: Array, sizes: Integers) -> Integers:
+    """(k,) how many eigenvalues of rows of pivots (k, sum of n^2) are negative, in all; zeros count
+    as none."""
+    squares = np.square(sizes)
+    firsts = np.cumsum(squares) - squares
+    found = np.zeros(len(pivots), dtype=np.int64)
+    for n in sorted(set(sizes.tolist()) - {0}):
+        places = firsts[sizes == n][:, None] + np.arange(n * n)
+        blocks = pivots[:, places].reshape(len(pivots), -1, n, n)
+        values = np.linalg.eigvalsh(blocks) if n > 1 else blocks
+        found += (values < 0).reshape(len(pivots), -1).sum(axis=1)
+    return found
 
 
 def _couplings(engine: Engine) -> tuple[list[Any], int]:

@@ -39,7 +39,9 @@ class Found:
         return cls(np.zeros(0), np.zeros((n, 0)), np.zeros((0, n)))
 
     def joined(self, squares: Array, shapes: Array, pushed: Array) -> Found:
-        """With others."""
+        """With others, that rise."""
+        if not len(self.squares):
+            return Found(squares, shapes, pushed)
         every = np.concatenate([self.squares, squares])
         order = np.argsort(every, kind="stable")
         return Found(

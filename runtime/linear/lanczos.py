@@ -10,6 +10,7 @@ uncounted.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,8 +27,12 @@ from .pencil import Pencil
 
 #: Motions looked for beyond those asked for, so that the count has a gap behind the last one.
 _BEYOND = 2
-#: Parts of the fastest omega^2 by which a scene that nothing holds is shifted.
-_SHIFT = 1e-12
+#: Parts of the fastest omega^2 by which a scene that nothing holds may be shifted.
+_SHIFTS = tuple(10.0**-k for k in range(24, 1, -1))
+#: Which of them is taken where motions are not counted.
+_UNCOUNTED = 12
+#: Efforts that a solution leaves, in parts, where the factors are no rounding.
+_NOISE = 1e-6
 #: Parts of that shift that are rounding: omega^2 of motions that nothing holds.
 _ROUNDING = 1e-2
 #: Searches at most; each finds one more of motions with equal frequencies.
@@ -48,8 +53,8 @@ class Slowest:
 
 def undamped(pencil: Pencil, count: int) -> Slowest:
     """The `count` motions of least omega^2 of M and a symmetric K."""
-    n, sigma = len(pencil), _shift(pencil)
-    wanted, counting = min(count + _BEYOND, n - 1), Counting(pencil)
+    n, counting = len(pencil), Counting(pencil)
+    wanted, sigma = min(count + _BEYOND, n - 1), _shift(pencil, counting)
     found, edge, values = Found.none(n), np.inf, np.zeros(0)
     for trial in range(_TRIALS):
         found = slowest(pencil, wanted, sigma, edge, trial, found)
@@ -77,18 +82,29 @@ def _gap(values: Array, count: int) -> tuple[int, float]:
     return len(values), last + _GAP * abs(last)
 
 
-def _shift(pencil: Pencil) -> float:
-    """0 where something holds the scene, else a little below: by the pivots, where they count."""
+def _shift(pencil: Pencil, counting: Counting) -> float:
+    """0 where something holds the scene, else below 0: by so much that a factorisation is more than
+    rounding, and by as much more as no motion that something holds is as slow."""
+    if _told(pencil, 0.0):
+        return 0.0
+    shifts = (np.array(_SHIFTS) * _fastest(pencil)).tolist()
+    first = next((k for k in range(0, len(shifts), 4) if _told(pencil, shifts[k])), _UNCOUNTED)
+    still = counting.below(shifts[first])
+    more = [shift for shift in shifts[first:] if still is not None]
+    found = bisect_left(more, True, key=lambda shift: counting.below(shift) != still)
+    return -more[found - 1] if more else -shifts[_UNCOUNTED]
+
+
+def _told(pencil: Pencil, shift: float) -> bool:
+    """Whether K + shift M is more than rounding: what it solves, it solves."""
     try:
-        pencil.factor(0.0)
+        pencil.factor(shift)
     except NumericalFailure:
-        return -_SHIFT * _fastest(pencil)
-    x = np.random.default_rng(0).standard_normal(len(pencil))
-    once = pencil.solve(pencil.mass(x))
-    twice = pencil.solve(pencil.mass(once))
-    slowest = float(np.linalg.norm(once)) / max(float(np.linalg.norm(twice)), 1e-300)
-    fastest = _fastest(pencil)
-    return -_SHIFT * fastest if slowest < _SHIFT * fastest else 0.0
+        return False
+    b = pencil.mass(np.random.default_rng(0).standard_normal(len(pencil)))
+    x = pencil.solve(b)
+    left = pencil.stiffness(x) + shift * pencil.mass(x) - b
+    return float(np.linalg.norm(left)) <= _NOISE * float(np.linalg.norm(b))
 
 
 def _fastest(pencil: Pencil) -> float:
@@ -108,7 +124,7 @@ def damped(pencil: Pencil, count: int, with_c: bool) -> Slowest:
         pencil.factor(0.0)
         sigma = 0.0
     except NumericalFailure:
-        sigma = np.sqrt(_SHIFT * _fastest(pencil))
+        sigma = np.sqrt(_SHIFTS[_UNCOUNTED] * _fastest(pencil))
         pencil.factor(sigma**2, sigma if with_c else 0.0)
 
     def inverse(b: Array) -> Array:

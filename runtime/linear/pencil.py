@@ -28,6 +28,7 @@ class Pencil:
         self._no_q = np.zeros(engine.nq)
         self._inertia = engine.inertia_alone
         self._strained = self._required(self._nothing)
+        self._factored: tuple[float, float] | None = None
         self._begin()
 
     def __len__(self) -> int:
@@ -70,8 +71,11 @@ class Pencil:
 
     def factor(self, square: float, rate: float = 0.0) -> None:
         """Factor square M + rate C + K.  NumericalFailure where that is singular."""
-        self._begin()
-        self.tangent.factor(square, 1.0, 0.0, rate)
+        if self._factored != (square, rate):
+            self._factored = None
+            self._begin()
+            self.tangent.factor(square, 1.0, 0.0, rate)
+            self._factored = square, rate
 
     def solve(self, r: Array) -> Array:
         """x of the last factorisation: (square M + rate C + K) x = r."""

@@ -39,7 +39,7 @@ int mstmm_response_begin(mstmm_response *of);
 /* Amplitudes x (count, n, nu) of n right-hand sides (n, nu) at every s (count), x and s pairs of
  * real and imaginary parts; how many times larger the elimination made inertia, and the body where
  * (-1: none).  What is singular has infinite growth, and zeros.  Pivots go by bodies: those of
- * shapes, then inverses of those of hinges, as mstmm_tangent_pivot has them. */
+ * shapes, then inverses of those of hinges, as mstmm_tangent_pivots has them. */
 void mstmm_response_many(mstmm_response *of, int64_t count, const real *s, int64_t n,
                          const real *columns, real *x, real *growth, int *grown);
 /* cdef end */

@@ -270,21 +270,27 @@ int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kap
     return code || !at->n_coupled ? code : mstmm_across_factor(at, negative);
 }
 
-int mstmm_tangent_pivot(const mstmm_tangent *at, int body, int shapes, real *pivot)
+int64_t mstmm_tangent_pivots(const mstmm_tangent *at, int *sizes, real *pivots)
 {
-    const mstmm_body *one = &at->model->bodies[body];
-    int columns[6];
-    if (one->idle) return 0;
-    if (shapes) {
+    int64_t place = 0;
+    for (int i = 0; i < at->model->n_bodies; i++) {
+        const mstmm_body *one = &at->model->bodies[i];
         const mstmm_modal *modal = mstmm_modal_of(one);
-        const int n = one->modal ? mstmm_modes_of(modal) : 0;
-        if (n) memcpy(pivot, at->numbers + modal->tangent + MSTMM_BEND_D(n), sizeof(real) * (size_t)(n * n));
-        return n;
+        int columns[6];
+        const int shapes = one->idle || !one->modal ? 0 : mstmm_modes_of(modal);
+        const int speeds =
+            one->idle || one->section ? 0 : mstmm_free_speeds(at->memory, one, columns);
+        const int64_t from[] = {shapes ? modal->tangent + MSTMM_BEND_D(shapes) : 0,
+                                one->tangent + MSTMM_TANGENT_INVERSE(one->nu, one->nq)};
+        sizes[2 * i] = shapes;
+        sizes[2 * i + 1] = speeds;
+        for (int part = 0; part < 2; part++) {
+            const int count = sizes[2 * i + part] * sizes[2 * i + part];
+            if (pivots) memcpy(pivots + place, at->numbers + from[part], sizeof(real) * (size_t)count);
+            place += count;
+        }
     }
-    const int n = one->section ? 0 : mstmm_free_speeds(at->memory, one, columns);
-    const real *tangent = at->numbers + one->tangent;
-    memcpy(pivot, tangent + MSTMM_TANGENT_INVERSE(one->nu, one->nq), sizeof(real) * (size_t)(n * n));
-    return n;
+    return place;
 }
 
 /* Unknown are accelerations: of the increments they are what carries the others along. */

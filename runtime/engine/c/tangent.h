@@ -75,9 +75,10 @@ int mstmm_tangent_brought(mstmm_tangent *at, real rate, real s, real sq);
 /* Change of every coupling along x for the coordinates, d_u and d_a (nu). */
 int mstmm_coupled_along(mstmm_tangent *at, const real *x, const real *d_u, const real *d_a,
                         real *changes);
-/* What the last factorisation divided by: the pivot (n, n) of a body's shapes, or the inverse of
- * that of its hinge; returns n. */
-int mstmm_tangent_pivot(const mstmm_tangent *at, int body, int shapes, real *pivot);
+/* What the last factorisation divided by: of each body the pivot (n, n) of its shapes, then the
+ * inverse of that of its hinge; both n in `sizes` (2 n_bodies).  Returns how many numbers these are,
+ * and keeps them in `pivots` unless it is NULL. */
+int64_t mstmm_tangent_pivots(const mstmm_tangent *at, int *sizes, real *pivots);
 /* Increments that are there before any x: of coordinates (nq) and accelerations (nu). */
 typedef struct {
     const real *q, *a;
