@@ -181,11 +181,11 @@ class Equations:
         """Names of w."""
         return tuple(one.name for one in self.others)
 
-    @cached_property
+    @property
     def drives(self) -> tuple[int, ...]:
         """Places among the speeds of the drives whose motions are inputs or disturbances."""
-        moved = (speed for one in (*self.controls, *self.others) for speed, _ in one.moves)
-        return tuple(dict.fromkeys(moved))
+        moved = [one.moves for one in (*self.controls, *self.others) if one.moves]
+        return tuple(dict.fromkeys(speed for one in moved for speed, _ in one)) if moved else ()
 
     @property
     def driven(self) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 #: Distance from rest, and acceleration per s^2 of what nothing holds, in sizes of coordinates;
 #: stiffness that counts as none, in parts; matrices that still count as the same, in parts.
-_STILL, _SOFT, _SAME = 1e-6, 1e-13, 1e-6
+_STILL, _SOFT, SAME = 1e-6, 1e-13, 1e-6
 #: Efforts that are rounding, in parts of those that cancel.
 _CANCELLED = 1e-11
 #: How far matrices are compared along the motion, in rad or sizes.
@@ -32,10 +32,10 @@ _NAMED = 4
 
 def warnings_of(linear: Equations, found: Modes) -> Iterator[str]:
     """Sentences, the gravest first."""
-    accelerating = _accelerating(linear)
-    if accelerating:
+    leaving = accelerating(linear)
+    if leaving:
         yield (
-            f"the state does not last: {_some(accelerating)} accelerate there, so that the model "
+            f"the state does not last: {some(leaving)} accelerate there, so that the model "
             "holds beside the motion through it, and only for a moment"
         )
     elif linear.state.u.any() and _changes(linear):
@@ -48,7 +48,7 @@ def warnings_of(linear: Equations, found: Modes) -> Iterator[str]:
             yield f"input {name} moves nothing at this state"
     for one in linear.model.scene.controller:
         yield (
-            f'controller "{one.name}" is left out: its inputs ({_some(list(one.outputs))}) stand '
+            f'controller "{one.name}" is left out: its inputs ({some(list(one.outputs))}) stand '
             "still at the values of the scene"
         )
     for name, why in left_out(linear):
@@ -58,12 +58,12 @@ def warnings_of(linear: Equations, found: Modes) -> Iterator[str]:
     growing = found.eigenvalues.real.max(initial=0)
     if growing > 0:
         k = int(found.eigenvalues.real.argmax())
-        moving = _some(found.moving(k))
+        moving = some(found.moving(k))
         yield f"unstable: a motion of {moving} grows with {growing:.4g} 1/s"
     free = np.flatnonzero(found.omega == 0)
     if len(free):
         moved = dict.fromkeys(name for k in free for name in found.moving(int(k)))
-        yield f"nothing pushes back {_some(list(moved))}: motions of frequency 0"
+        yield f"nothing pushes back {some(list(moved))}: motions of frequency 0"
 
 
 def refuse_unrest(linear: Equations) -> None:
@@ -71,10 +71,10 @@ def refuse_unrest(linear: Equations) -> None:
     that turn is not in their linear models."""
     if linear.mechanism is None:
         return
-    leaving = _accelerating(linear)
+    leaving = accelerating(linear)
     if leaving and not _balanced(linear, linear.mechanism.ways):
         raise SceneError(
-            f"a linear model of closed loops is that of a state at rest, and {_some(leaving)} "
+            f"a linear model of closed loops is that of a state at rest, and {some(leaving)} "
             "would accelerate here; leave q out for the equilibrium, or give one"
         )
 
@@ -88,7 +88,7 @@ def _balanced(linear: Equations, ways: Array) -> bool:
     return bool((left <= _CANCELLED * whole).all())
 
 
-def _accelerating(linear: Equations) -> list[str]:
+def accelerating(linear: Equations) -> list[str]:
     """Coordinates that leave the state: those further from rest than a small part of their sizes,
     and those that accelerate though nothing holds them."""
     free = list(linear.free)
@@ -105,6 +105,13 @@ def _accelerating(linear: Equations) -> list[str]:
 
 def _changes(linear: Equations) -> bool:
     """Whether the matrices are others a little further along the motion."""
+    engine, free = linear.model.looped, list(linear.free)
+    here, there = (matrices(engine, state, free) for state in (linear.state, ahead(linear)))
+    return any(apart(getattr(here, x), getattr(there, x)) > SAME for x in "MCK")
+
+
+def ahead(linear: Equations) -> State:
+    """The state a little further along the motion, with the same speeds."""
     model, state = linear.model, linear.state
     engine, memory = model.looped, model.looped.start_memory()
     dt = _AHEAD / float(np.abs(state.u).max())
@@ -112,17 +119,16 @@ def _changes(linear: Equations) -> bool:
     whole = SceneSystem(engine).start(state.t + dt, q, state.u)
     q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]
     _, a = engine.accelerations(state.t + dt, q[None].copy(), u[None].copy(), memory[None])
-    ahead = State(state.t + dt, q, u, a[0])
-    here = matrices(engine, state, list(linear.free))
-    there = matrices(engine, ahead, list(linear.free))
-    return any(_apart(getattr(here, x), getattr(there, x)) > _SAME for x in "MCK")
+    return State(state.t + dt, q, u, a[0])
 
 
-def _apart(one: Array, other: Array) -> float:
+def apart(one: Array, other: Array) -> float:
+    """Largest difference, in parts of the largest entry."""
     scale = float(np.abs(one).max(initial=0))
     return float(np.abs(one - other).max(initial=0)) / scale if scale else 0.0
 
 
-def _some(names: list[str]) -> str:
+def some(names: list[str]) -> str:
+    """The first few names, and how many more there are."""
     more = len(names) - _NAMED
     return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -90,9 +90,10 @@ def _shift(pencil: Pencil, counting: Counting) -> float:
     shifts = (np.array(_SHIFTS) * _fastest(pencil)).tolist()
     first = next((k for k in range(0, len(shifts), 4) if _told(pencil, shifts[k])), _UNCOUNTED)
     still = counting.below(shifts[first])
-    more = [shift for shift in shifts[first:] if still is not None]
-    found = bisect_left(more, True, key=lambda shift: counting.below(shift) != still)
-    return -more[found - 1] if more else -shifts[_UNCOUNTED]
+    if still is None:
+        return -shifts[_UNCOUNTED]
+    more = bisect_left(shifts, True, first, key=lambda shift: counting.below(shift) != still)
+    return -shifts[max(first, more - 1)]
 
 
 def _told(pencil: Pencil, shift: float) -> bool:

@@ -23,6 +23,7 @@ from mstmm.errors import NumericalFailure, SceneError
 from ..engine.response import Response
 from . import files
 from .channels import Channel, channel, some_names
+from .harmonic.amplitudes import Amplitudes
 from .harmonic.exact import (
     Chosen,
     ExactBeams,
@@ -33,7 +34,7 @@ from .harmonic.exact import (
 from .harmonic.losses import Losses, stiffer
 from .harmonic.prescribed import Ratios, modal_damping
 from .harmonic.refused import given, refuse_drives, refuse_in_motion, refuse_ratios
-from .loops.amplitudes import Amplitudes
+from .harmonic.steady import refuse_turning, refuse_unsteady
 from .loops.mechanism import refuse_motions
 from .matrices import Matrices
 from .output.outputs import outputs_of, read_by, rows_of
@@ -168,13 +169,9 @@ def frequency_response(
 ) -> FrequencyResponse:
     """See `Linear.frequency_response`."""
     frequencies = _frequencies(omega)
-    if linear.turning is not None:
-        raise SceneError(
-            "frequency response: the state turns a ball, a free or another hinge whose rates go by "
-            "its coordinates; ask about a state at rest"
-        )
     beams = None
     if exact is not False:
+        refuse_turning(linear)
         refuse_ratios(modal)
         beams = exact_beams(linear, exact, structural)
         refuse_inner(beams, [*(inputs or ()), *read_by(linear, outputs)])
@@ -193,6 +190,7 @@ def frequency_response(
     if linear.mechanism is not None:
         refuse_motions(pushes)
     shown = outputs_of(linear, None if outputs is None else some_names("outputs", outputs))
+    refuse_unsteady(linear, pushes, shown)
     values = _Sweep(linear, pushes, shown, structural, modal, beams).values(frequencies)
     return FrequencyResponse(
         frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
@@ -319,11 +317,11 @@ class _Sweep:
 def _response(
     linear: Equations, lossy: Engine | None, beams: ExactBeams | None
 ) -> Response | Amplitudes:
-    """What solves for amplitudes: of a tree by elimination, else from matrices."""
+    """What solves for amplitudes: of a tree at rest by elimination, else from matrices."""
     state, loops = linear.state, linear.mechanism
-    if loops is not None:
-        lost = None if lossy is None else loops.matrices(lossy, state)
-        return Amplitudes(loops, Matrices(linear.M, linear.C, linear.K), lost)
+    if loops is not None or linear.turning is not None:
+        lost = None if loops is None or lossy is None else loops.matrices(lossy, state)
+        return Amplitudes(linear.free, Matrices(linear.M, linear.C, linear.K), lost)
     return Response(
         linear.tree, state.t, state.q, state.u, state.a, stiffer=lossy,
         exact=None if beams is None else beams.bodies,

@@ -1,6 +1,8 @@
-"""Amplitudes of mechanisms under harmonic pushes, from matrices: they have few motions."""
+"""Amplitudes under harmonic pushes from matrices: of mechanisms, and of states that turn balls."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,17 +10,16 @@ from numpy.typing import NDArray
 from mstmm.arrays import Array
 
 from ..matrices import Matrices
-from .mechanism import Mechanism
 
 Complex = NDArray[np.complex128]
 
 
 class Amplitudes:
-    """Z(s) x = r of a mechanism, as `Response` solves it of a tree: x and r stand in the places of
-    the independent speeds."""
+    """Z(s) x = r, as `Response` solves it of a tree at rest: x and r stand in `places` among the
+    speeds."""
 
-    def __init__(self, mechanism: Mechanism, whole: Matrices, lossy: Matrices | None) -> None:
-        self._places, self._whole = list(mechanism.places), whole
+    def __init__(self, places: Sequence[int], whole: Matrices, lossy: Matrices | None) -> None:
+        self._places, self._whole = list(places), whole
         self._lost = 0.0 if lossy is None else 1j * (lossy.K - whole.K)
 
     def amplitudes(self, s: Complex, columns: Array) -> tuple[Complex, Array, NDArray[np.int32]]:

@@ -1,0 +1,60 @@
+"""States that turn balls: what a frequency response can be asked there.
+
+Increments go in outboard axes, which turn along with the state.  They answer a push of one
+frequency with that frequency alone where neither the matrices nor the push, nor what is read,
+change along the motion: an effort of a hinge stays what it is, a force with inertial components
+goes round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from mstmm.errors import SceneError
+
+from ..channels import Channel
+from ..judged import SAME, accelerating, ahead, apart, some
+from ..output.outputs import outputs_of, rows_of
+from ..output.seen import Seen
+
+if TYPE_CHECKING:
+    from ..equations import Equations
+
+
+def refuse_turning(linear: Equations) -> None:
+    """SceneError for exact beams beside a state that turns a ball: they have no matrices."""
+    if linear.turning is not None:
+        raise SceneError(
+            "exact: the state turns a ball, a free or another hinge whose rates go by its "
+            "coordinates; ask about a state at rest, or leave beams their shapes"
+        )
+
+
+def refuse_unsteady(linear: Equations, pushes: Sequence[Channel], shown: Sequence[Seen]) -> None:
+    """SceneError where a state turns balls and what is asked changes along its motion."""
+    if linear.turning is None:
+        return
+    changing = list(_changing(linear, pushes, shown))
+    if changing:
+        raise SceneError(
+            f"frequency response: the state turns, and along its motion changes {some(changing)}, "
+            "so that other frequencies answer too; push by efforts of hinges and read their "
+            "speeds, which go in outboard axes, or ask about a state at rest"
+        )
+
+
+def _changing(linear: Equations, pushes: Sequence[Channel], shown: Sequence[Seen]) -> Iterator[str]:
+    later = replace(linear, state=ahead(linear), about=None)
+    if any(apart(getattr(linear, x), getattr(later, x)) > SAME for x in "MCK"):
+        yield "the matrices"
+    yield from accelerating(linear)
+    for push in pushes:
+        if apart(linear.pushed([push]), later.pushed([push])) > SAME:
+            yield push.name
+    names = [one.name for one in shown]
+    for one, other in zip(shown, outputs_of(later, names), strict=True):
+        here, there = (rows_of(at, [it], ()).orders for at, it in ((linear, one), (later, other)))
+        if any(apart(here[order], there[order]) > SAME for order in here):
+            yield one.name
