@@ -145,15 +145,9 @@ def columns(name: str, value: ArrayLike, width: int) -> tuple[bool, Array]:
     return False, array
 
 
-def one_state(*given: tuple[str, ArrayLike, int]) -> list[Array] | None:
-    """Copies of (name, value, width) where each is an array (width,): one state, as most calls give
-    it; None for anything else, and SceneError for what is no finite number."""
-    found = list[Array]()
-    for name, value, width in given:
-        if not _ready(value) or value.shape != (width,):
-            return None
-        found.append(numbers(name, value))
-    return found
+def plain(value: ArrayLike, width: int) -> TypeGuard[Array]:
+    """Whether it is one state as C reads it, which most calls give: so many doubles in a row."""
+    return _ready(value) and value.shape == (width,) and value.flags.c_contiguous
 
 
 #: How many numbers there are per state: one, a row of so many, or an array of such a shape.

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arrays import Array, batch, one_state
+from mstmm.arrays import Array, batch, plain
 from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.live import LiveInputs
@@ -100,9 +100,8 @@ class Differentiation:
     ) -> Derivatives:
         """`Model.derivatives`; `accelerations` gives those of all its states, or refuses them."""
         nq, nu, names = self._model.nq, self._model.nu, self.names
-        if self._undriven and isinstance(t, float) and efforts is None:
-            state = one_state(("q", q, nq), ("u", u, nu))
-            one = None if state is None else self._one(t, *state)
+        if self._undriven and type(t) is float and efforts is None:
+            one = self._one(t, q, u) if plain(q, nq) and plain(u, nu) else None
             if one is not None:
                 return one
         lead, (coordinates, speeds, times, extra) = batch(

@@ -33,9 +33,10 @@ _TOLERANCE = 1e-10
 
 
 class Linearising:
-    """Makes one model linear, at many states."""
+    """Makes one model linear, at many states.  SceneError for loops that it cannot follow."""
 
     def __init__(self, model: Compiled) -> None:
+        refuse_bending(model.packed, "a linear model")
         self._model = model
         system, layout = model.packed.system, model.layout
         twists = any(law.twist >= 0 for law in system.laws)
@@ -52,7 +53,6 @@ class Linearising:
         disturbances: Sequence[str] | None,
     ) -> Linear:
         """See `Model.linearize`."""
-        refuse_bending(self._model.packed, "a linear model")
         pushes, others = self._inputs, self._ground
         if inputs is not None:
             pushes = pushes_of(self._model, "inputs", inputs)

@@ -393,11 +393,10 @@ class Model(Compiled):
         NumericalFailure where `accelerations` does and where a derivative does not exist.
         """
         names = tuple(parameters)
-        if names not in self._differentiations:
-            self._differentiations[names] = self._differentiated_by(names)
-        return self._differentiations[names](
-            q, u, t, efforts, lambda: self.accelerations(q, u, t, efforts)
-        )
+        differentiation = self._differentiations.get(names)
+        if differentiation is None:
+            differentiation = self._differentiations[names] = self._differentiated_by(names)
+        return differentiation(q, u, t, efforts, lambda: self.accelerations(q, u, t, efforts))
 
     def _differentiated_by(self, names: tuple[str, ...]) -> Differentiation:
         from .derivatives import Differentiation

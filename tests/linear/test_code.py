@@ -101,3 +101,14 @@ def test_a_state_that_code_refuses_is_named_by_the_sweep() -> None:
     for made in (model.linearize, lambda q: model.derivatives(np.array(q), np.zeros(1))):
         with pytest.raises(mstmm.NumericalFailure, match='spring "rope"'):
             made([0.0])
+
+
+def test_a_state_that_is_no_number_is_named_though_nothing_depends_on_it() -> None:
+    data = {"name": "cart", "mass": 2.0, "inertia": [1, 1, 1]}
+    rail = {"name": "rail", "type": "prismatic", "inboard": "ground", "outboard": "cart"}
+    model = mstmm.compile(mstmm.Scene(gravity=(0, 0, 0), body=[data], hinge=[rail]), engine="fused")
+    assert model.derivatives(np.array([1.0]), np.zeros(1)).efforts[0, 0] == 0.5
+    with pytest.raises(mstmm.errors.SceneError, match=r"q\[0\] = nan"):
+        model.derivatives(np.array([np.nan]), np.zeros(1))
+    with pytest.raises(mstmm.errors.SceneError, match="t = inf"):
+        model.derivatives(np.array([1.0]), np.zeros(1), np.inf)

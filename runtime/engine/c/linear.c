@@ -31,6 +31,7 @@ int mstmm_linear_at(const mstmm_linear_code *code, real t, const real *q, const 
     const mstmm_fused *fused = code->fused;
     const int64_t n = code->n, square = n * n, count = mstmm_linear_numbers(code);
     real *a = found, *m = a + fused->nu, *r_t = m + 4 * square, *qdot = r_t + n;
+    if (!isfinite(t) || !finite(fused->nq, q) || !finite(fused->nu, u)) return 1;
     mstmm_renew_inputs(&code->live, t, code->memory, code->p);
     int failed = fused->accelerations(code->p, &t, q, u, code->memory, efforts, qdot, a);
     if (!failed)

@@ -21,8 +21,8 @@ typedef struct {
 
 /* Numbers that it finds: udot (nu), M, C, K, G (n x n each), r_t (n), qdot (nq). */
 int64_t mstmm_linear_numbers(const mstmm_linear_code *code);
-/* Fills them at a state under efforts (nu).  Returns 0; else a guard failed or a number is not
- * finite, nothing is meant, and the looped engine tells what is wrong. */
+/* Fills them at a state under efforts (nu).  Returns 0; else a guard failed or a number, of the
+ * state too, is not finite, nothing is meant, and the looped engine tells what is wrong. */
 int mstmm_linear_at(const mstmm_linear_code *code, real t, const real *q, const real *u,
                     const real *efforts, real *found);
 /* M, C, K (n x n each) of the speeds `free` by the looped engine, behind one another.  `work` has
