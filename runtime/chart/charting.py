@@ -19,7 +19,7 @@ from ..result.measure import Measure
 from .budget import EARLY, REFERENCE, SETTINGS, Budget
 from .chart import Chart
 from .converged import Converged, Tell, converged
-from .families import PROMISING, checked_methods
+from .families import PROMISING, checked_methods, without_twins
 from .front import judged, shared
 from .measure import measure_of
 from .models import Variant, ladder
@@ -113,6 +113,8 @@ class _Charting:
         self, model: Model, asked: Request, compile: Callable[[Scene], Model], tell: Tell,
         state: Callable[[str], None], budget: Budget,
     ) -> None:  # fmt: skip
+        if model.closed is None:
+            asked = replace(asked, methods=without_twins(asked.methods))
         self.model, self.asked, self.compile = model, asked, compile
         self.tell, self.state, self.budget = tell, state, budget
         self.times = even(asked.t_end, asked.samples)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from mstmm.errors import SceneError
 from mstmm.scene.rules.messages import near
 
-from ..integrate.steppers import AUTO, get, names
+from ..integrate.steppers import AUTO, ON_POSITIONS, get, names
 from ..integrate.steppers.implicit import ALPHA, DIRK, EXPONENTIAL, ROSENBROCK
 from ..run import classical, second_opinion, sundials
 from .point import Setting
@@ -47,6 +47,15 @@ def checked_methods(methods: Sequence[str] | None) -> tuple[str, ...]:
     if not len(methods):
         raise SceneError("methods = []: expected one name or more; leave it out for all methods")
     return tuple(dict.fromkeys(methods))
+
+
+def without_twins(methods: Sequence[str]) -> tuple[str, ...]:
+    """For trees: without the methods on positions whose plain ones are there, which do the same."""
+    return tuple(
+        name
+        for name in methods
+        if not name.endswith(ON_POSITIONS) or name.removesuffix(ON_POSITIONS) not in methods
+    )
 
 
 def family(method: str) -> str:

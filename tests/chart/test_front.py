@@ -10,6 +10,7 @@ import pytest
 
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.chart.chart import Chart
+from mstmm.runtime.chart.families import every_method, without_twins
 from mstmm.runtime.chart.front import front, judged, recommended
 from mstmm.runtime.chart.point import Level, Point, Reference, Setting
 
@@ -128,3 +129,9 @@ def test_json_says_why_nothing_is_recommended() -> None:
     met = json.loads(replace(chart, wanted=0.5).to_json())
     assert met["recommended"]["setting"] == {"rtol": 1e-3, "atol": 1e-5}
     assert met["not_recommended"] is None
+
+
+def test_trees_are_charted_without_methods_that_do_the_same_there() -> None:
+    left = without_twins(every_method())
+    assert set(every_method()) - set(left) == {"genalpha-index3", "hht-index3"}
+    assert without_twins(("dop853", "hht-index3")) == ("dop853", "hht-index3")

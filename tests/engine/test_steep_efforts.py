@@ -16,7 +16,10 @@ from mstmm.runtime.model.model import Model
 
 #: They linearise where a step begins; the others iterate, and do with the slopes of inertia there.
 LINEAR = ["rodas4", "rodas4p2", "rodas5p", "ros34pw2", "rodas4pw", "exprb32"]
-ITERATED = ["esdirk436", "kvaerno5", "genalpha", "hht", "newmark", "wilson", "houbolt"]
+ITERATED = [
+    "esdirk436", "kvaerno5", "genalpha", "hht", "newmark", "wilson", "houbolt", "genalpha-index3",
+    "hht-index3",
+]  # fmt: skip
 ENGINES = ["looped", "fused"]
 
 

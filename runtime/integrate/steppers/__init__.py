@@ -22,6 +22,7 @@ __all__ = [
     "BUILT_IN",
     "EXPLICIT",
     "IMPLICIT",
+    "ON_POSITIONS",
     "TANGENTS",
     "WITH_RADIUS",
     "Tableau",
