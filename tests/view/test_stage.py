@@ -107,3 +107,18 @@ def test_refusals() -> None:
             run.view(speed=speed)
     with pytest.raises(SceneError, match=r"expected a name ending in \.html"):
         run.view("run.avi")
+
+
+def test_many_bodies_are_seen_with_fewer_pictures() -> None:
+    rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0, 0.084, 0.084],
+           "ends": {"tip": [1, 0, 0]}}  # fmt: skip
+    chain = {"name": "rope", "count": 600, "inboard": "ground", "end": "tip", "body": [rod],
+             "hinge": [{"type": "pin", "axis": [0, 1, 0]}]}  # fmt: skip
+    scene = mstmm.Scene(gravity=[0, 0, -9.81], chain=[chain])
+    run = mstmm.compile(scene, engine="looped").simulate(0.2, "dopri5", rtol=1e-3)
+    stage = staged(run, "rope", speed=0.02)
+    assert len(stage.times) == 150  # 301 of fewer bodies
+    assert not [solid for solid in stage.solids if solid.owner.startswith("hinges/")]
+    assert stage.notes == ("more than 300 hinges: they are not drawn",)
+    look = camera(stage)
+    assert abs(look.axes[2] @ (0, 1, 0)) > 0.9  # almost along the pins

@@ -12,8 +12,8 @@ from mstmm.scene.tables.body import BodyTable
 from .solids import Colour, Surface, bar, box, ellipsoid, joined
 from .stage import Solid
 
-#: Radius of a bar by its length, and its bounds by the size of the scene.
-_SLENDER, _THINNEST, _THICKEST = 0.035, 0.0025, 0.012
+#: Radius of a bar by its length, usual and at most, and its bounds by the size of the scene.
+_SLENDER, _STOUT, _THINNEST, _THICKEST = 0.035, 0.15, 0.0025, 0.012
 #: Radius of the ball at the mass centre beside that of a bar.
 _BALL = 1.9
 #: Points closer than this by the size of the scene are one.
@@ -49,7 +49,15 @@ def rigid(name: str, body: BodyTable, hub: bool, size: float, colour: Colour) ->
 
 def thickness(length: float, size: float) -> float:
     """Radius in m of a bar of this length in a scene of this size."""
-    return float(np.clip(_SLENDER * length, _THINNEST * size, _THICKEST * size))
+    usual = float(np.clip(_SLENDER * length, _THINNEST * size, _THICKEST * size))
+    return min(usual, _STOUT * length)
+
+
+def girth(body: BodyTable, size: float) -> float:
+    """Radius in m of the thickest bar of a body, or of the thickest there is where it has none."""
+    ends = [np.linalg.norm(body.end_position(end)) for end in body.ends]
+    longest = float(max(ends, default=0.0))
+    return thickness(longest, size) if longest > 0 else _THICKEST * size
 
 
 def equal_inertia(body: BodyTable, size: float) -> Surface | None:

@@ -56,10 +56,10 @@ def _toward(stage: Stage) -> Array:
     side, ahead = _level(up)
     clouds = [pose.position[:: max(1, len(pose.position) // 40)] for pose in stage.poses.values()]
     cloud = np.concatenate(clouds) if clouds else np.zeros((1, 3))
-    spread = np.linalg.svd(cloud - cloud.mean(axis=0), full_matrices=True)
-    sizes = np.append(spread[1], np.zeros(3))[:3]
-    if sizes[1] > 0 and sizes[2] <= _FLAT * sizes[1]:
-        normal = spread[2][2]
+    cloud = cloud - cloud.mean(axis=0)
+    squares, axes = np.linalg.eigh(cloud.T @ cloud)  # ascending
+    if squares[1] > 0 and squares[0] <= _FLAT**2 * squares[1]:
+        normal = axes[:, 0]
         normal = normal * (1.0 if normal[int(np.argmax(np.abs(normal)))] > 0 else -1.0)
         way = normal + 0.28 * up + 0.22 * np.cross(up, normal)
     else:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from mstmm.arrays import Array
@@ -11,7 +9,7 @@ from mstmm.scene import Hinge
 from mstmm.scene.tables.hinge_frames import hinge_frames
 
 from .solids import Colour, Surface, along, box, cylinder, ellipsoid, joined
-from .stage import Poses, Solid
+from .stage import Solid
 
 HINGE: Colour = (60, 66, 74)
 GROUND: Colour = (120, 126, 134)
@@ -88,17 +86,3 @@ def coil(start: Array, end: Array, radius: float) -> Array:
         local = np.stack([wide * np.cos(turn), wide * np.sin(turn), s * length], axis=1)
         points.append(a + local @ axes.T)
     return np.array(points)
-
-
-def held_by_ground(scene_hinges: Iterator[Hinge]) -> Iterator[Array]:
-    """Places on the ground at which hinges begin."""
-    for hinge in scene_hinges:
-        if hinge.inboard_body == "ground" and not (
-            hinge.facts is not None and hinge.facts.free_body
-        ):
-            yield np.array(hinge.position)
-
-
-def still(at: Array) -> Poses:
-    """Axes that stay where they are."""
-    return Poses(np.atleast_2d(at), np.array([[1.0, 0.0, 0.0, 0.0]]))

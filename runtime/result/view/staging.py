@@ -30,6 +30,8 @@ _TRAIL: Colour = (150, 160, 175)
 
 #: Hinges of a scene of more are not drawn.
 _HINGES = 300
+#: Radius of a hinge's glyph, and of a foot, by that of the bars that it joins.
+_GLYPH, _FOOT = 1.6, 1.2
 #: Samples by which the size of the scene is taken.
 _LOOKS = 40
 
@@ -84,7 +86,8 @@ class _Staging:
             places = Poses(pose.position[some], pose.quaternion[some]).of(ends)
             low = np.minimum(low, places.min(axis=(0, 1)))
             high = np.maximum(high, places.max(axis=(0, 1)))
-        for at in hinges.held_by_ground(iter(self.hinges)):
+        for hinge in self._held():
+            at = np.array(hinge.position)
             low, high = np.minimum(low, at), np.maximum(high, at)
         size = float(np.linalg.norm(high - low)) if len(self.names) else 1.0
         return size if size > 0 else 1.0
@@ -128,16 +131,32 @@ class _Staging:
 
     def _joints(self) -> Iterator[Solid]:
         for hinge in self.hinges:
-            shown = hinges.glyph(hinge, 1.6 * self.radius)
+            shown = hinges.glyph(hinge, _GLYPH * self._girth(hinge))
             if shown is not None:
                 owner = f"hinges/{hinge.name}"
                 self.poses[owner] = self.when.poses(self.run, hinge.outboard)
                 yield Solid(owner, "glyph", shown, hinges.HINGE)
 
+    def _held(self) -> Iterator[Hinge]:
+        """Hinges that hold something to the ground."""
+        for hinge in self.hinges:
+            free = hinge.facts is not None and hinge.facts.free_body
+            if hinge.inboard_body == GROUND and not free:
+                yield hinge
+
+    def _girth(self, hinge: Hinge) -> float:
+        """Radius in m of the thinner of the two bodies that a hinge joins."""
+        found = [self.radius]
+        for name in (hinge.inboard_body, hinge.outboard_body):
+            number = self.skeleton.bodies.find(name)
+            if number is not None:
+                found.append(bodies.girth(self.skeleton.bodies[number], self.size))
+        return min(found)
+
     def _feet(self) -> Iterator[Solid]:
-        places = {tuple(at): at for at in hinges.held_by_ground(iter(self.hinges))}
-        for number, at in enumerate(places.values(), 1):
-            foot = hinges.foot(at, 1.2 * self.radius)
+        places = {hinge.position: self._girth(hinge) for hinge in self._held()}
+        for number, (at, girth) in enumerate(places.items(), 1):
+            foot = hinges.foot(np.array(at), _FOOT * girth)
             yield Solid(foot.owner, f"{number}", foot.surface, foot.colour)
 
     # --- lines ------------------------------------------------------------------------------------
