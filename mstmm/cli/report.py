@@ -22,6 +22,8 @@ def sizes(result: Result) -> str:
     model, bodies = result.model, len(result.model.scene.skeleton.bodies)
     free, driven = len(model.free_speeds), len(model.packed.system.driven)
     held = model.nu - free - driven
+    if model.closed is not None:  # loops leave fewer free, of all speeds together
+        free, held = model.closed.loops.mobility, 0
     parts = [
         f"{count(bodies, 'body', 'bodies')} on {count(len(model.scene.hinges), 'hinge')}",
         f"{count(free, 'degree')} of freedom",

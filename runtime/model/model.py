@@ -52,12 +52,16 @@ class Model(Compiled):
     """
 
     def __repr__(self) -> str:
-        free = len(self.free_speeds)
-        return f"<Model: {self.scene.summary}, {free} degrees of freedom; {self.engine}>"
+        return f"<Model: {self.scene.summary}, {self._freedom} degrees of freedom; {self.engine}>"
 
     def _repr_html_(self) -> str:
-        rows = [("degrees of freedom", len(self.free_speeds)), ("engine", self.engine_choice)]
+        rows = [("degrees of freedom", self._freedom), ("engine", self.engine_choice)]
         return table(rows) + self.scene._repr_html_()
+
+    @property
+    def _freedom(self) -> int:
+        """How many speeds are free, of those that loops leave."""
+        return len(self.free_speeds) if self.closed is None else self.closed.loops.mobility
 
     @cached_property
     def _differentiations(self) -> dict[tuple[str, ...], Differentiation]:

@@ -61,7 +61,7 @@ def _duplicates(scene: SceneTables) -> Iterator[Problem]:
                     f'"{element.name}" is also the name of {table} number {first + 1}; rename one',
                 )
     taken: dict[str, str] = {}
-    for table in ("body", "hinge", "beam", "elastic", "chain", "bushing", "constraint"):
+    for table in ("body", "hinge", "beam", "elastic", "chain", "bushing", "constraint", "coupling"):
         word = _WORDS.get(table, f"a {table}")
         for i, element in enumerate(getattr(scene, table)):
             other = taken.setdefault(element.name, word)

@@ -96,7 +96,7 @@ class Freedom:
         """All speeds (nu,) for a unit of one that is imposed, the others of these at rest; nan
         where the loops do not let it move alone."""
         moved = self._allowed(q, np.eye(1, len(self.sizes), speed)[0])
-        slips = self._calls.correction(self._calls.slip, q, moved)[1]
+        slips = self._slips(q, moved)[1]
         return moved if np.abs(slips).max(initial=0.0) < _ROUNDING else np.full_like(moved, np.nan)
 
     def moved(self, q: Array, speeds: Array) -> Array:
@@ -117,4 +117,11 @@ class Freedom:
 
     def _allowed(self, q: Array, speeds: Array) -> Array:
         """Speeds less their slips."""
-        return speeds + self._calls.correction(self._calls.slip, q, speeds)[0]
+        return speeds + self._slips(q, speeds)[0]
+
+    def _slips(self, q: Array, speeds: Array) -> tuple[Array, Array]:
+        """The correction (nu,) of speeds and the slips, without what rows ask of a scene at rest:
+        couplings that go by time."""
+        correction, slips = self._calls.correction(self._calls.slip, q, speeds)
+        still, asked = self._calls.correction(self._calls.slip, q, np.zeros_like(speeds))
+        return correction - still, slips - asked

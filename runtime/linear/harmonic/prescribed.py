@@ -77,5 +77,7 @@ def modal_damping(linear: Equations, ratios: Ratios) -> ModalDamping:
         )
     rates = 2 * zeta * found.omega
     damped = np.flatnonzero(rates)
+    if linear.mechanism is not None:  # the sweep's own mass is that of the tree, torn open
+        return ModalDamping(linear.M @ found.shapes[:, damped], rates[damped])
     mass = [linear.pencil.mass(found.shapes[:, k]) for k in damped]
     return ModalDamping(np.array(mass).reshape(len(damped), len(linear)).T, rates[damped])

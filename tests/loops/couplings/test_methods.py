@@ -218,3 +218,29 @@ def test_a_rack_that_bounces_throws_its_pinion_back(method: str) -> None:
     up = 0.6 * speed - fall * after
     assert np.abs(result.u[-1] - [up / 0.2, up]).max() < 1e-6
     assert abs(result.q[-1, 1] - (0.6 * speed * after - fall * after**2 / 2)) < 1e-6
+
+
+#: A takes half the turns of B, backwards; of the pair's wheels 0.02 + 0.3 / 4 kg m^2 are felt at A.
+_GEAR, _FELT = {"expression": "A.q + 2*B.q"}, 0.095
+
+
+def test_couplings_that_go_by_time_leave_one_speed_free() -> None:
+    model = pair(_GEAR | {"equals": "0.1*t"})
+    q, u = model.initial_state()
+    assert model.loops.independent == ("A.angle_rate",)
+    assert model.mass_matrix(q) == pytest.approx(np.array([[_FELT]]), rel=1e-12)
+    pushed = model.inverse_dynamics(q, u, np.zeros(2), actuators=["A"])
+    assert pushed == pytest.approx(np.zeros(2), abs=1e-12)
+
+
+def test_modal_damping_of_a_pair_is_that_of_the_pair() -> None:
+    """1 / response = K - M w^2 + i 2 zeta w sqrt(K M) of the one motion that is left."""
+    model = pair(_GEAR, a={"law": {"stiffness": 20.0}})
+    found = model.frequency_response([2.0], ["A.effort"], ["A.angle"], modal=0.02)
+    stiff = 20.0 - _FELT * 4 + 2j * 0.02 * 2.0 * np.sqrt(20.0 * _FELT)
+    assert 1 / found.values[0, 0, 0] == pytest.approx(stiff, rel=1e-10)
+
+
+def test_a_coupling_has_a_name_of_its_own() -> None:
+    with pytest.raises(mstmm.SceneError, match='"A" is also the name of a hinge'):
+        pair(_GEAR | {"name": "A"})
