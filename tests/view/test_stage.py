@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from view import scenes
@@ -122,3 +124,76 @@ def test_many_bodies_are_seen_with_fewer_pictures() -> None:
     assert stage.notes == ("more than 300 hinges: they are not drawn",)
     look = camera(stage)
     assert abs(look.axes[2] @ (0, 1, 0)) > 0.9  # almost along the pins
+
+
+def test_a_ball_that_bounces_is_drawn_on_both_sides_of_the_blow() -> None:
+    """Let go at 2 m, thrown back by 0.8 of its speed: y = 2 - g t^2 / 2, then up from the floor."""
+    scene = mstmm.Scene(
+        gravity=[0, -9.81, 0],
+        body=[{"name": "ball", "mass": 0.2, "inertia": [1e-4, 1e-4, 1e-4]}],
+        hinge=[{"name": "fall", "type": "prismatic", "inboard": "ground", "outboard": "ball",
+                "axis": [0, 1, 0], "initial": {"q": [2.0]}}],
+        event=[{"when": "ball.y <= 0", "do": "bounce", "restitution": 0.8}],
+    )  # fmt: skip
+    stage = staged(mstmm.compile(scene, engine="looped").simulate(1.0), "ball", speed=0.1)
+    blow = np.sqrt(4 / 9.81)
+    after = stage.times - blow
+    rising = 0.8 * 9.81 * blow * after - 9.81 * after**2 / 2
+    expected = np.where(after < 0, 2 - 9.81 * stage.times**2 / 2, rising)
+    assert stage.poses["bodies/ball"].position[:, 1] == pytest.approx(expected, abs=1e-9)
+
+
+def test_an_elastic_body_spans_its_ends() -> None:
+    link = {"name": "link", "box": {"size": [0.5, 0.04, 0.04], "divisions": [4, 1, 1]},
+            "young": 2e9, "density": 1000.0, "poisson": 0.3, "modes": 1,
+            "ends": {"root": {"plane": [1, 0, 0, 0]},
+                     "tip": {"plane": [1, 0, 0, 0.5]}}}  # fmt: skip
+    pin = {"name": "pin", "type": "pin", "axis": [0, 1, 0], "inboard": "ground",
+           "outboard": "link.root"}  # fmt: skip
+    scene = mstmm.Scene(gravity=[0, 0, -9.81], elastic=[link], hinge=[pin])
+    run = mstmm.compile(scene, engine="looped").simulate(0.0)
+    stage = staged(run, "link")
+    [line] = stage.lines
+    assert line.points[0] == pytest.approx(
+        np.array([run.position("link.root")[0], run.position("link.tip")[0]])
+    )
+    [block] = [solid for solid in stage.solids if solid.part == "block"]
+    assert np.ptp(block.surface.vertices, axis=0) == pytest.approx([0.5, 0.04, 0.04])
+    assert stage.size > 0.5
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e4])
+def test_pages_of_small_and_large_scenes_are_drawn_at_a_size_that_is_seen(size: float) -> None:
+    stage = staged(scenes.run(), "x", most=3).scaled(size)
+    again = stage.scaled(10.0 / stage.size)
+    assert again.size == pytest.approx(10.0)
+    pose, other = stage.poses["bodies/rod"], again.poses["bodies/rod"]
+    assert other.position / again.size == pytest.approx(pose.position / stage.size)
+    assert again.told["bodies/rod"].values is stage.told["bodies/rod"].values
+
+
+def test_the_rail_of_a_slide_stays_behind() -> None:
+    scene = mstmm.Scene(
+        gravity=[0, 0, 0], body=[{"name": "cart", "mass": 1.0, "inertia": [0.1, 0.1, 0.1]}],
+        hinge=[{"name": "rail", "type": "prismatic", "inboard": "ground", "outboard": "cart",
+                "axis": [1, 0, 0], "position": [0, 1, 0], "initial": {"u": [1.0]}}],
+    )  # fmt: skip
+    stage = staged(mstmm.compile(scene, engine="looped").simulate(2.0), "slide")
+    assert stage.poses["hinges/rail"].position == pytest.approx(np.tile([0.0, 1, 0], (61, 1)))
+    assert stage.poses["bodies/cart"].position[-1] == pytest.approx([2, 1, 0])
+
+
+def test_wrong_kinds_of_arguments(tmp_path: Path) -> None:
+    run = scenes.run()
+    with pytest.raises(SceneError, match="title and trails are texts"):
+        run.view(trails=[3])  # type: ignore[list-item]
+    view = run.view(trails="rod.tip", speed=20.0)
+    assert [line.name for line in view.stage.lines if line.name.startswith("trails")] == [
+        "trails/rod.tip"
+    ]
+    with pytest.raises(SceneError, match="expected the name of a file"):
+        view.save("")
+    with pytest.raises(SceneError, match="moments = 0"):
+        view.save(tmp_path / "a.png", moments=0)
+    with pytest.raises(SceneError, match="it cannot be written"):
+        view.save(tmp_path / "missing" / "a.png")

@@ -41,6 +41,7 @@ def report(
     if path.suffix.lower() not in (".html", ".htm"):
         raise SceneError(f'report "{path}": expected a name ending in .html')
     title = title or path.stem
+    quantities = (quantities,) if isinstance(quantities, str) else quantities
     seen = result.view(title=title, trails=trails) if len(result.t) else None
     style, formulas = equations(result.model.scene)
     sections = (

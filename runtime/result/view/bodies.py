@@ -18,8 +18,9 @@ _SLENDER, _STOUT, _THINNEST, _THICKEST = 0.035, 0.15, 0.0025, 0.012
 _BALL = 1.9
 #: Points closer than this by the size of the scene are one.
 _SAME = 1e-6
-#: A box of equal inertia is drawn if its edges are below this by the size of the scene.
-_FITS = 0.6
+#: A box of equal inertia is drawn if its edges are below this by the size of the scene: beside
+#: bars, and where nothing else is known of a body.
+_FITS, _ALONE = 0.6, 4.0
 
 
 def rigid(name: str, body: BodyTable, hub: bool, size: float, colour: Colour) -> Iterator[Solid]:
@@ -38,7 +39,7 @@ def rigid(name: str, body: BodyTable, hub: bool, size: float, colour: Colour) ->
         bars = [bar(root, p, r) for p, r in zip(reached, radii, strict=True)]
         yield Solid(owner, "bars", joined(bars), colour)
     radius = _BALL * (max(radii) if radii else _THICKEST * size)
-    block = equal_inertia(body, size)
+    block = equal_inertia(body, size, _FITS if reached else _ALONE)
     if block is not None:
         clear = bool(reached)
         yield Solid(owner, "inertia", block, colour, 0.3 if clear else 1.0, hidden=clear)
@@ -60,9 +61,9 @@ def girth(body: BodyTable, size: float) -> float:
     return thickness(longest, size) if longest > 0 else _THICKEST * size
 
 
-def equal_inertia(body: BodyTable, size: float) -> Surface | None:
+def equal_inertia(body: BodyTable, size: float, most: float = _FITS) -> Surface | None:
     """The homogeneous box with the same mass, mass centre and inertia; None where there is none or
-    it would hide the scene.
+    it would hide the scene, larger than `most` times its size.
 
     Edges a, b, c have moments m (b^2 + c^2) / 12 and so on, so a^2 = 6 (Jy + Jz - Jx) / m.
     """
@@ -71,7 +72,7 @@ def equal_inertia(body: BodyTable, size: float) -> Surface | None:
     moments, axes = np.linalg.eigh(np.array(body.inertia_matrix))
     squares = 6 * (moments.sum() - 2 * moments) / body.mass
     edges = np.sqrt(np.clip(squares, 0.0, None))
-    if not edges.max() > _THICKEST * size or edges.max() > _FITS * size:
+    if not edges.max() > _THICKEST * size or edges.max() > most * size:
         return None
     edges = np.maximum(edges, _THINNEST * size)
     if np.linalg.det(axes) < 0:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.scene import Elastic
 
 from ..flexible import motion as observed
 from .bodies import thickness
 from .moments import Moments
-from .solids import Colour, tube_faces
-from .stage import Bent, Poses
+from .solids import Colour, box, tube_faces
+from .stage import Bent, Poses, Solid
 
 if TYPE_CHECKING:
     from ..record import Record
@@ -35,6 +37,14 @@ def tube(run: Record, name: str, when: Moments, poses: Poses, size: float, colou
     local = axis[:, :, None] + np.einsum("fmij,maj->fmai", sections, rings)
     inertial = observed_outward(poses, local.reshape(len(local), -1, 3))
     return Bent(f"beams/{name}", inertial, tube_faces(_STATIONS, _AROUND), colour)
+
+
+def block(name: str, elastic: Elastic, colour: Colour) -> Iterator[Solid]:
+    """The block of an elastic body as it was made, clear: how it bends is seen at its ends."""
+    if elastic.box is not None:
+        size, corner = np.array(elastic.box.size), np.array(elastic.box.corner)
+        shown = box(size).placed(corner + size / 2)
+        yield Solid(f"bodies/{name}", "block", shown, colour, 0.45)
 
 
 def observed_outward(poses: Poses, local: Array) -> Array:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,7 +36,8 @@ class Moments:
     """The moments of a film of a run.
 
     Attributes:
-        kept: samples of the run that can be drawn, no two at the same time.
+        kept: samples of the run that can be drawn; two at the same time stand before and behind an
+            event.
         t: (n,) s, their times.
         times: (f,) s, the moments.
         speed: seconds of the run per second of film.
@@ -55,9 +58,7 @@ class Moments:
         finite = np.flatnonzero(np.isfinite(run.q).all(axis=1))
         if not len(finite):
             raise SceneError("there is nothing to look at: the run has no sample with numbers")
-        t = run.t[finite]
-        last = np.append(np.diff(t) > 0, True)  # of an event's two samples the one behind it
-        kept, t = finite[last], t[last]
+        kept, t = finite, run.t[finite]
         lasts = float(t[-1] - t[0])
         if lasts == 0:
             return cls(kept[-1:], t[-1:], t[-1:], 1.0)
@@ -78,7 +79,46 @@ class Moments:
             return values
         from scipy.interpolate import CubicHermiteSpline
 
-        return np.asarray(CubicHermiteSpline(self.t, values, rates)(self.times))
+        def between(part: slice, at: Array) -> Array:
+            return np.asarray(CubicHermiteSpline(self.t[part], values[part], rates[part])(at))
+
+        return self._pieces(values, between)
+
+    def straight(self, values: Array) -> Array:
+        """Values (n, k) at the moments, straight between samples."""
+
+        def between(part: slice, at: Array) -> Array:
+            columns = [np.interp(at, self.t[part], column) for column in values[part].T]
+            return np.array(columns).reshape(len(columns), len(at)).T
+
+        return self._pieces(values, between)
+
+    def turned(self, quaternions: Array) -> Array:
+        """Quaternions (n, 4) at the moments, w first, at even rates between samples."""
+        from scipy.spatial.transform import Rotation, Slerp
+
+        def between(part: slice, at: Array) -> Array:
+            turns = Rotation.from_quat(quaternions[part][:, [1, 2, 3, 0]])
+            found: Array = Slerp(self.t[part], turns)(at).as_quat()[:, [3, 0, 1, 2]]
+            return found
+
+        return self._pieces(quaternions, between)
+
+    def _pieces(self, values: Array, between: Callable[[slice, Array], Array]) -> Array:
+        """`between` on each stretch of samples without an event; what an event changes at one time
+        is what it is behind it."""
+        if len(self.t) == 1:
+            return np.repeat(values[:1], len(self.times), axis=0)
+        found = np.empty((len(self.times), *values.shape[1:]))
+        bounds = [0, *(np.flatnonzero(np.diff(self.t) <= 0) + 1), len(self.t)]
+        for first, behind in pairwise(bounds):
+            inside = (self.times >= self.t[first]) & (self.times <= self.t[behind - 1])
+            part = slice(first, behind)
+            if behind - first == 1:
+                found[inside] = values[first]
+            elif inside.any():
+                found[inside] = between(part, self.times[inside])
+        return found
 
     def way(self, run: Record, reference: str) -> Array:
         """(n, 3) m, the way of a body's origin or an end, in steps of time finer than a film's."""
@@ -95,12 +135,7 @@ class Moments:
         points = run._observed.points(reference)[self.kept]
         position = self.smooth(points[:, 0:3], points[:, 3:6])
         turned = quaternions(points[:, 15:24])
-        if not self._exact:
-            from scipy.spatial.transform import Rotation, Slerp
-
-            between = Slerp(self.t, Rotation.from_quat(turned[:, [1, 2, 3, 0]]))(self.times)
-            turned = between.as_quat()[:, [3, 0, 1, 2]]
-        return Poses(position, turned)
+        return Poses(position, turned if self._exact else self.turned(turned))
 
 
 def natural_speed(lasts: float) -> float:

@@ -24,6 +24,8 @@ from .stage import Bent, Line, Poses, Solid, Stage
 
 #: Places closer than this by the size of the scene, and quaternions closer than this, are the same.
 _SAME = 1e-5
+#: Sizes (m) between which viser shows all of a scene, and the one that others are drawn at.
+_SMALL, _LARGE, _SHOWN = 0.5, 100.0, 10.0
 #: Spacing of the ground's grid, and its width, by the size of the scene.
 _WIDE = 1.3
 _THIN, _THICK = (186, 190, 196), (150, 154, 160)
@@ -31,6 +33,8 @@ _THIN, _THICK = (186, 190, 196), (150, 154, 160)
 
 def page(stage: Stage) -> str:
     """The whole page.  EnvironmentFailure without the extra."""
+    if not _SMALL < stage.size < _LARGE:
+        stage = stage.scaled(_SHOWN / stage.size)
     with _server() as server:
         recorder = server.get_scene_serializer()
         moving = _Moving(server.scene, stage)

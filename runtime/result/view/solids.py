@@ -25,6 +25,10 @@ class Surface:
     vertices: Array
     faces: Faces
 
+    def scaled(self, factor: float) -> Surface:
+        """So many times as large, about the origin of its axes."""
+        return replace(self, vertices=factor * self.vertices)
+
     def placed(self, at: ArrayLike = (0.0, 0.0, 0.0), axes: ArrayLike | None = None) -> Surface:
         """Turned by `axes` (3, 3) and moved by `at` (3,)."""
         turned = self.vertices if axes is None else self.vertices @ np.asarray(axes).T

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -114,6 +114,16 @@ class Stage:
     lines: tuple[Line, ...]
     told: Mapping[str, Told]
     notes: tuple[str, ...] = ()
+
+    def scaled(self, factor: float) -> Stage:
+        """The same so many times as large; what is told stays what it is."""
+        grown = {owner: replace(pose, position=factor * pose.position)
+                 for owner, pose in self.poses.items()}  # fmt: skip
+        solids = tuple(replace(one, surface=one.surface.scaled(factor)) for one in self.solids)
+        bent = tuple(replace(one, vertices=factor * one.vertices) for one in self.bent)
+        lines = tuple(replace(one, points=factor * one.points) for one in self.lines)
+        told = {owner: replace(one, anchor=factor * one.anchor) for owner, one in self.told.items()}
+        return replace(self, poses=grown, solids=solids, bent=bent, lines=lines, told=told)
 
     @cached_property
     def cloud(self) -> Array:

@@ -10,12 +10,12 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.numbers.rotations import IDENTITY
-from mstmm.scene import Bushing, Hinge, Spring, split
+from mstmm.scene import Body, Bushing, Hinge, Spring, split
 from mstmm.scene.rules.values import GROUND
 
 from . import bodies, flexible, hinges, shapes
 from .moments import Moments
-from .solids import Colour
+from .solids import Colour, ellipsoid
 from .stage import Bent, Line, Poses, Solid, Stage, Told
 
 if TYPE_CHECKING:
@@ -60,6 +60,7 @@ class _Staging:
         self.hinges: Sequence[Hinge] = self.scene.hinges if drawn else ()
         self.when = Moments.of(run, len(self.names) + len(self.hinges), speed, most)
         self.trails = tuple(trails)
+        self.elastic = {one.name: one for one in self.scene.elastic if one.name in self.names}
         run._observed.fetch(self.names)
         self.poses = {f"bodies/{name}": self.when.poses(run, name) for name in self.names}
         self.size = self._size()
@@ -71,7 +72,8 @@ class _Staging:
         return Stage(
             title=title, times=self.when.times, speed=self.when.speed, up=self._up(),
             poses=self.poses, solids=tuple(solids), bent=tuple(self._bent()),
-            lines=(*self._coils(), *self._ways()), told=dict(self._told()), notes=self.notes,
+            lines=(*self._coils(), *self._spans(), *self._ways()), told=dict(self._told()),
+            notes=self.notes,
         )  # fmt: skip
 
     # --- what is there ----------------------------------------------------------------------------
@@ -84,6 +86,8 @@ class _Staging:
             pose = self.poses[f"bodies/{name}"]
             ends = np.array([(0.0, 0.0, 0.0), *(body.end_position(end) for end in body.ends)])
             places = Poses(pose.position[some], pose.quaternion[some]).of(ends)
+            if name in self.elastic:
+                places = np.stack([way[some] for way in self._ways_of(name)], axis=1)
             low = np.minimum(low, places.min(axis=(0, 1)))
             high = np.maximum(high, places.max(axis=(0, 1)))
         for hinge in self._held():
@@ -107,7 +111,9 @@ class _Staging:
         joined = {hinge.inboard for hinge in self.scene.hinges}
         joined |= {hinge.outboard for hinge in self.scene.hinges}
         for i, (name, body) in enumerate(zip(self.names, self.skeleton.bodies, strict=True)):
-            if name not in drawn:
+            if name in self.elastic and name not in drawn:
+                yield from flexible.block(name, self.elastic[name], _COLOURS[i % len(_COLOURS)])
+            elif name not in drawn:
                 colour = _COLOURS[i % len(_COLOURS)]
                 yield from bodies.rigid(name, body, name in joined, self.size, colour)
 
@@ -134,8 +140,25 @@ class _Staging:
             shown = hinges.glyph(hinge, _GLYPH * self._girth(hinge))
             if shown is not None:
                 owner = f"hinges/{hinge.name}"
-                self.poses[owner] = self.when.poses(self.run, hinge.outboard)
+                self.poses[owner] = self._axes_of(hinge)
                 yield Solid(owner, "glyph", shown, hinges.HINGE)
+        for force in self.scene.bushing:
+            owner = f"bushings/{force.name}"
+            held = force.from_ if split(force.to)[0] == GROUND else force.to
+            self.poses[owner] = self.when.poses(self.run, held)
+            r = _GLYPH * self.radius
+            yield Solid(owner, "glyph", ellipsoid((r, r, 0.6 * r), 10), hinges.SPRING)
+
+    def _axes_of(self, hinge: Hinge) -> Poses:
+        """Where a glyph is: with the outboard end; the rail of what slides alone stays behind."""
+        outer = self.when.poses(self.run, hinge.outboard)
+        if hinge.facts is None or hinge.facts.turns or not hinge.facts.slides:
+            return outer
+        if hinge.inboard_body == GROUND:
+            start = np.tile(np.array(hinge.position), (len(self.when.times), 1))
+        else:
+            start = self.when.poses(self.run, hinge.inboard).position
+        return Poses(start, outer.quaternion)
 
     def _held(self) -> Iterator[Hinge]:
         """Hinges that hold something to the ground."""
@@ -169,6 +192,19 @@ class _Staging:
                 points = hinges.coil(start, end, min(0.08 * reach, 1.6 * self.radius))
                 yield Line(f"springs/{force.name}", points, hinges.SPRING)
 
+    def _ways_of(self, name: str) -> list[Array]:
+        """(f, 3) where the ends of an elastic body are, each over the moments."""
+        ends = self.elastic[name].ends
+        return [self.when.poses(self.run, f"{name}.{end}").position for end in ends]
+
+    def _spans(self) -> Iterator[Line]:
+        """From the first end of an elastic body to its others."""
+        for name in self.elastic:
+            first, *others = self._ways_of(name)
+            for end, way in zip(list(self.elastic[name].ends)[1:], others, strict=True):
+                points = np.stack([first, way], axis=1)
+                yield Line(f"elastic/{name}/{end}", points, self._colour(name), 8.0)
+
     def _place(self, force: Spring | Bushing, reference: str) -> Array:
         """(f, 3) where an end of a force is."""
         if split(reference)[0] == GROUND:
@@ -182,6 +218,13 @@ class _Staging:
             way = self.when.way(self.run, reference)
             yield Line(f"trails/{reference}", way[None], _TRAIL, 2.0)
 
+    def _centre(self, name: str, body: Body) -> Array:
+        """Where a body is pointed at, in its axes."""
+        known = self.run.model.flexible.get(name)
+        if known is None or not known.ports:
+            return bodies.centre_of(body)
+        return np.mean([port.position for port in known.ports.values()], axis=0)
+
     # --- what the page says -----------------------------------------------------------------------
 
     def _told(self) -> Iterator[tuple[str, Told]]:
@@ -193,19 +236,17 @@ class _Staging:
             )
             pose = self.poses[f"bodies/{name}"]
             labels = (("x", "m"), ("y", "m"), ("z", "m"))
-            yield f"bodies/{name}", Told(name, text, bodies.centre_of(body), labels, pose.position)
+            centre = self._centre(name, body)
+            where = pose.of(centre[None])[:, 0]
+            told = (*text, "its mass centre is at" if body.mass else "its middle is at")
+            yield f"bodies/{name}", Told(name, told, centre, labels, where)
         for hinge in self.hinges:
             if f"hinges/{hinge.name}" in self.poses:
                 slots = self.run.layout(hinge.name)
                 q = self.run.coordinate(hinge.name)
                 named = tuple(zip(slots.q_names, slots.q_units, strict=True))
-                values = self._between(q[self.when.kept])
+                values = self.when.straight(q[self.when.kept])
                 yield (
                     f"hinges/{hinge.name}",
                     Told(hinge.name, (hinge.type,), np.zeros(3), named, values),
                 )
-
-    def _between(self, values: Array) -> Array:
-        """(f, k) coordinates at the moments, straight between samples."""
-        columns = [np.interp(self.when.times, self.when.t, column) for column in values.T]
-        return np.stack(columns, axis=1) if columns else np.zeros((len(self.when.times), 0))

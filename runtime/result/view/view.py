@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
+from mstmm.arrays import whole
 from mstmm.errors import SceneError
 
 from .film import FILMS, STRIPS, film, frames, strip
@@ -45,7 +46,16 @@ class View:
 
         SceneError for another ending, EnvironmentFailure for what is not installed.
         """
-        path = Path(path)
+        if not isinstance(path, str | Path) or not str(path):
+            raise SceneError(f"view {path!r:.60}: expected the name of a file or of a folder")
+        path, moments = Path(path), whole("moments", moments, 1, "a whole number, 1 or more")
+        try:
+            self._write(path, moments)
+        except OSError as error:
+            raise SceneError(f'view "{path}": it cannot be written ({error.strerror})') from None
+        return path
+
+    def _write(self, path: Path, moments: int) -> None:
         ending = path.suffix.lower()
         if ending == ".html":
             path.write_text(self.html, encoding="utf-8")
@@ -60,7 +70,6 @@ class View:
                 f'view "{path}": expected a name ending in {", ".join(ENDINGS)}, or a folder for '
                 "frames, without an ending"
             )
-        return path
 
     def draw_strip(self, file: IO[str], moments: int = 6) -> None:
         """The same strip as SVG into an open file."""
@@ -81,4 +90,8 @@ def view(
     most: int | None = None,
 ) -> View:
     """See `Result.view`."""
+    if isinstance(trails, str):
+        trails = (trails,)
+    if not isinstance(title, str) or not all(isinstance(one, str) for one in trails):
+        raise SceneError("view: title and trails are texts, such as trails=['rod2.tip']")
     return View(staged(run, title, trails, speed, most))
