@@ -161,6 +161,8 @@ class _Loop:
         self.rows: list[tuple[float, Array, Array, int]] = []
         self.outputs = None if settings.output_times is None else deque(settings.output_times)
         self.steps = self.fired = 0
+        #: The last event, and how long before it another was, s.
+        self.met, self.apart = settings.t_start, 0.0
         self.sizes: list[float] = []
         self.t, self.last = settings.t_start, np.zeros(0)
         self.flag = [False]
@@ -244,6 +246,7 @@ class _Loop:
             self.t, self.last = float(end), self.system.remember(end, y)
             self.tell(end)
             if event is not None:
+                self.met, self.apart = self.t, self.t - self.met
                 self.crossed(event)
                 return np.array(self.last)
             self.sample(end, solver.y)
@@ -298,6 +301,8 @@ class _Loop:
         method = self.settings.method
         name, longest = METHODS[method], self.longest_step()
         first = self.settings.first_step if self.t == self.settings.t_start else 0.0
+        if self.apart:  # events that follow ever faster are not to be stepped over
+            first = min(self.apart / 2, stop - self.t)
         first = min(first, stop - self.t)
         common = {"rtol": max(self.settings.rtol, 2.3e-14), "atol": self.atol}
         if method in sundials.METHODS:

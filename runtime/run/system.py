@@ -59,7 +59,7 @@ class SceneSystem:
         self.run = run = ffi.new("mstmm_scene_run *")
         run.model = model
         works = bool(system.laws or system.driven or system.loads or system.forces)
-        works = works or bool(system.couplings)
+        works = works or bool(system.couplings) or bool(packed.watched.bounces)
         works = works or any(
             body.D.any() or body.drag is not None for body in packed.flexible.values()
         )

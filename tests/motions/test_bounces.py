@@ -151,3 +151,17 @@ def test_nothing_gives_way() -> None:
     result = model(scene).simulate(2.0)
     assert not result.success
     assert 'event "floor"' in result.message and "nothing can give way" in result.message
+
+
+@pytest.mark.parametrize("wall", ["0", "0.2*sin(3*t)"])
+def test_blows_do_work_and_balances_are_kept(wall: str) -> None:
+    """What a blow takes, and a wall that moves brings, is work: the energy's balance is closed."""
+    event = {"when": f"ball.y <= {wall}", "do": "bounce", "restitution": 0.8}
+    ball = {"name": "ball", "mass": 0.2, "inertia": [1e-4, 1e-4, 1e-4]}
+    fall = {"name": "fall", "type": "prismatic", "inboard": "ground", "outboard": "ball",
+            "axis": [0, 1, 0], "initial": {"q": [2.0]}}  # fmt: skip
+    scene = mstmm.Scene(gravity=[0, -9.81, 0], body=[ball], hinge=[fall], event=[event])
+    run = mstmm.compile(scene, engine="looped").simulate(1.5, certify=True)
+    assert run.certificate.energy.relative < 1e-9
+    if wall == "0":  # 1 - 0.8^2 of what it fell with
+        assert run.work[-1] == pytest.approx(-0.36 * 0.2 * 9.81 * 2.0, rel=1e-9)

@@ -141,6 +141,10 @@ int mstmm_bounce(mstmm_scene_run *run, int event, real t, real *y)
     if (code) return -code;
     const real push = -(1 + action->restitution) * before / (behind - before);
     for (int j = 0; j < run->model->nu; j++) u[j] += at.before[j] + push * at.answer[j];
+    /* An impulse does its size times the mean of the speeds along it before and behind, which are
+     * the rates but for what the event itself moves by. */
+    if (run->with_power)
+        u[run->model->nu] += push * ((1 - action->restitution) * before / 2 - at.slopes[0]);
     *fastest = fmax(*fastest, before);
     const int rests = action->restitution * before < AT_REST * *fastest;
     return rests ? MSTMM_FIRE_STOP : MSTMM_FIRE_RESTART;
