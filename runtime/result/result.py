@@ -116,8 +116,9 @@ class Result(Record):
         """
         from .view.view import view
 
-        named = Path(path).stem if title is None and path is not None else title
-        made = view(self, named or "A run", trails, speed)
+        if title is None:
+            title = Path(path).stem if isinstance(path, str | Path) else "A run"
+        made = view(self, title, trails, speed)
         if path is not None:
             made.save(path)
         return made

@@ -302,7 +302,7 @@ class _Loop:
         name, longest = METHODS[method], self.longest_step()
         first = self.settings.first_step if self.t == self.settings.t_start else 0.0
         if self.apart:  # events that follow ever faster are not to be stepped over
-            first = min(self.apart / 2, stop - self.t)
+            first = self.apart / 2
         first = min(first, stop - self.t)
         common = {"rtol": max(self.settings.rtol, 2.3e-14), "atol": self.atol}
         if method in sundials.METHODS:

@@ -1,4 +1,4 @@
-"""`mstmm view`: what it writes and prints, and what it refuses."""
+"""`mstmm view` and `mstmm report`: what they write and print, and what they refuse."""
 
 from __future__ import annotations
 
@@ -48,3 +48,12 @@ def test_refusals(mstmm: Command, arguments: tuple[str, ...], message: str) -> N
     done = mstmm("view", *arguments)
     assert done.code == 2
     assert message in " ".join(done.err.split())
+
+
+def test_a_report(mstmm: Command, folder: Path) -> None:
+    assert mstmm("simulate", "pendulum.toml", "--t-end", "0.5", "-o", "run.nc").code == 0
+    done = mstmm("report", "run.nc", "-o", "read.html", "-q", "rod.tip.position")
+    assert done.code == 0, done.err
+    assert "read.html: a page" in done.out
+    assert (folder / "read.html").stat().st_size > 100_000
+    assert mstmm("report", "pendulum.toml").code == 2

@@ -53,11 +53,10 @@ def test_an_mp4_without_its_program(
 ) -> None:
     monkeypatch.setattr(shutil, "which", lambda _: None)
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(EnvironmentFailure, match=r"ffmpeg.*or take film\.gif"):
+    with pytest.raises(EnvironmentFailure, match=r"ffmpeg.*or take a name ending in \.gif"):
         view.save(tmp_path / "film.mp4")
 
 
-@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_an_mp4(view: View, tmp_path: Path) -> None:
     view.save(tmp_path / "film.mp4")
     assert (tmp_path / "film.mp4").read_bytes()[4:8] == b"ftyp"
@@ -69,3 +68,23 @@ def test_what_is_near_hides_what_is_far(view: View) -> None:
     assert len(corners) == len(colours) > 100
     assert (corners >= low - 1e-9).all()
     assert (corners <= high + 1e-9).all()
+
+
+def test_endings_of_any_case_and_nobody_else_s_settings(view: View, tmp_path: Path) -> None:
+    import matplotlib as mpl
+
+    before = dict(mpl.rcParams)
+    view.save(tmp_path / "FILM.GIF")
+    assert (tmp_path / "FILM.GIF").read_bytes()[:4] == b"GIF8"
+    assert dict(mpl.rcParams) == before
+
+
+@pytest.mark.parametrize("name", ["film.gif", "strip.png", "frames"])
+def test_without_the_extra_it_is_named(
+    view: View, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in [*(m for m in sys.modules if m.startswith("matplotlib")), "matplotlib"]:
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(EnvironmentFailure, match=r"mstmm\[plot\]"):
+        view.save(tmp_path / name)
+    assert not [path for path in tmp_path.iterdir() if path.is_file()]

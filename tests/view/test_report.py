@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cli.commands import Command, folder, mstmm  # noqa: F401  (fixtures)
 from PIL import Image
 from view import browser, scenes
 
@@ -66,12 +65,3 @@ def test_everything_is_escaped() -> None:
     assert "<i>" not in made
     assert "<b>" not in made
     assert "a &amp; b" in made
-
-
-def test_the_command(mstmm: Command, folder: Path) -> None:  # noqa: F811
-    assert mstmm("simulate", "pendulum.toml", "--t-end", "0.5", "-o", "run.nc").code == 0
-    done = mstmm("report", "run.nc", "-o", "read.html", "-q", "rod.tip.position")
-    assert done.code == 0, done.err
-    assert "read.html: a page" in done.out
-    assert (folder / "read.html").stat().st_size > 100_000
-    assert mstmm("report", "pendulum.toml").code == 2

@@ -9,7 +9,7 @@ import pytest
 from view import scenes
 
 import mstmm
-from mstmm.errors import SceneError
+from mstmm.errors import EnvironmentFailure, SceneError
 from mstmm.runtime.result.view import bodies
 from mstmm.runtime.result.view.camera import FIELD, camera
 from mstmm.runtime.result.view.moments import natural_speed
@@ -195,5 +195,5 @@ def test_wrong_kinds_of_arguments(tmp_path: Path) -> None:
         view.save("")
     with pytest.raises(SceneError, match="moments = 0"):
         view.save(tmp_path / "a.png", moments=0)
-    with pytest.raises(SceneError, match="it cannot be written"):
+    with pytest.raises(EnvironmentFailure, match="cannot be written"):
         view.save(tmp_path / "missing" / "a.png")

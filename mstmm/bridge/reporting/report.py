@@ -40,6 +40,8 @@ def report(
     path = Path(path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise SceneError(f'report "{path}": expected a name ending in .html')
+    from ...runtime.host.files import replacing
+
     title = title or path.stem
     quantities = (quantities,) if isinstance(quantities, str) else quantities
     seen = result.view(title=title, trails=trails) if len(result.t) else None
@@ -53,7 +55,8 @@ def report(
         ("provenance", "Where it comes from", words.provenance(result)),
     )
     page = document(title, style, sections, words.verdict(result))
-    path.write_text(page, encoding="utf-8")
+    with replacing(path) as part:
+        part.write_text(page, encoding="utf-8")
     return path
 
 

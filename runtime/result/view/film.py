@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
@@ -24,8 +25,8 @@ _STRIP, _FRAME, _LINE, _DOTS = 7.2, 6.4, 0.28, 100
 _GIF_RATE, _ROW = 15.0, 6
 
 
-def strip(stage: Stage, path: Path | IO[str], count: int = 6) -> None:
-    """A picture of `count` moments side by side, for papers; SVG into an open file."""
+def strip(stage: Stage, file: Path | IO[str], kind: str, count: int = 6) -> None:
+    """A picture of `count` moments side by side, for papers; `kind` is png, svg or pdf."""
     flat = Flat(stage)
     some = np.unique(np.linspace(0, len(stage.times) - 1, max(1, count)).round().astype(int))
     columns = _columns(len(some), flat.shape)
@@ -37,7 +38,7 @@ def strip(stage: Stage, path: Path | IO[str], count: int = 6) -> None:
         flat.draw(axis, int(k))
         axis.set_title(f"t = {stage.times[k]:.3g} s", fontsize=8.5, pad=2)
     figure.subplots_adjust(0.01, 0.01, 0.99, 1 - 0.8 * _LINE / figure.get_figheight(), 0.04, 0.14)
-    figure.savefig(path, dpi=200, format=None if isinstance(path, Path) else "svg")
+    figure.savefig(file, dpi=200, format=kind)
 
 
 def _columns(count: int, shape: float) -> int:
@@ -48,24 +49,24 @@ def _columns(count: int, shape: float) -> int:
 
 
 def film(stage: Stage, path: Path) -> None:
-    """A GIF or an MP4.  EnvironmentFailure where an MP4 lacks ffmpeg."""
-    from matplotlib import animation
+    """A GIF or an MP4, by the ending.  EnvironmentFailure where an MP4 lacks ffmpeg."""
+    figure, axis, flat = _frame(stage)
+    from matplotlib import animation, rc_context
 
-    _, plot = _parts()
     lasts = _seconds(stage)
     rate = max(1, round((len(stage.times) - 1) / lasts)) if lasts else 1
-    every = max(1, round(rate / _GIF_RATE)) if path.suffix == ".gif" else 1
-    shown = range(0, len(stage.times), every)
-    figure, axis, flat = _frame(stage)
-    if path.suffix == ".gif":
-        writer: Any = animation.PillowWriter(fps=max(1, round(rate / every)))
-    else:
-        plot["animation.ffmpeg_path"] = _ffmpeg(path)
-        writer = animation.FFMpegWriter(fps=rate, codec="h264", extra_args=_PLAYABLE)
-    with writer.saving(figure, str(path), dpi=_DOTS):
-        for k in shown:
-            _show(axis, flat, k)
-            writer.grab_frame(facecolor="white")
+    gif = path.suffix.lower() == ".gif"
+    every = max(1, round(rate / _GIF_RATE)) if gif else 1
+    with rc_context({} if gif else {"animation.ffmpeg_path": _ffmpeg()}):
+        writer: Any = (
+            animation.PillowWriter(fps=max(1, round(rate / every)))
+            if gif
+            else animation.FFMpegWriter(fps=rate, codec="h264", extra_args=_PLAYABLE)
+        )
+        with writer.saving(figure, str(path), dpi=_DOTS):
+            for k in range(0, len(stage.times), every):
+                _show(axis, flat, k)
+                writer.grab_frame(facecolor="white")
 
 
 #: Every player takes this kind of colours; sizes must be even.
@@ -99,7 +100,9 @@ def _show(axis: Any, flat: Flat, k: int) -> None:
     flat.draw(axis, k)
     stage = flat.stage
     rate = "" if stage.speed == 1 else f"   ({stage.speed:g} s in a second)"
-    axis.set_title(f"{stage.title}   t = {stage.times[k]:.3f} s{rate}", fontsize=9, pad=4)
+    axis.set_title(
+        f"{stage.title}   t = {stage.times[k]:.{stage.digits}f} s{rate}", fontsize=9, pad=4
+    )
 
 
 def _seconds(stage: Stage) -> float:
@@ -107,38 +110,25 @@ def _seconds(stage: Stage) -> float:
 
 
 def _figure(wide: float, tall: float) -> Any:
-    figure, _ = _parts()
-    made = figure(figsize=(wide, tall), facecolor="white")
-    return made
-
-
-def _parts() -> tuple[Any, Any]:
-    """Figure, and the settings of matplotlib."""
     try:
-        import matplotlib as mpl
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError as error:
         raise missing("plot", "a film or a strip", error) from None
-
-    def figure(**given: Any) -> Any:
-        made = Figure(**given)
-        FigureCanvasAgg(made)
-        return made
-
-    return figure, mpl.rcParams
+    made = Figure(figsize=(wide, tall), facecolor="white")
+    FigureCanvasAgg(made)
+    return made
 
 
-def _ffmpeg(path: Path) -> str:
+def _ffmpeg() -> str:
     """The program that writes an MP4: ffmpeg, or the one that imageio-ffmpeg brings."""
     found = shutil.which("ffmpeg")
     if found is None:
         try:
-            import imageio_ffmpeg  # type: ignore[import-not-found]
+            found = import_module("imageio_ffmpeg").get_ffmpeg_exe()
         except ImportError:
             raise EnvironmentFailure(
-                f"{path}: an MP4 needs the program ffmpeg, which is not on this machine; install "
-                f"it, or pip install imageio-ffmpeg, or take {path.stem}.gif"
+                "an MP4 needs the program ffmpeg, which is not on this machine; install it, or "
+                "pip install imageio-ffmpeg, or take a name ending in .gif"
             ) from None
-        found = imageio_ffmpeg.get_ffmpeg_exe()
     return str(found)

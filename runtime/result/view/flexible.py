@@ -35,7 +35,7 @@ def tube(run: Record, name: str, when: Moments, poses: Poses, size: float, colou
     sections = observed.section_rotations(observed.turns(shown, x))
     axis = np.column_stack([x, 0 * x, 0 * x]) + observed.deflection(shown, x)
     local = axis[:, :, None] + np.einsum("fmij,maj->fmai", sections, rings)
-    inertial = observed_outward(poses, local.reshape(len(local), -1, 3))
+    inertial = poses.position[:, None] + shown.outward(local.reshape(len(local), -1, 3))
     return Bent(f"beams/{name}", inertial, tube_faces(_STATIONS, _AROUND), colour)
 
 
@@ -45,11 +45,6 @@ def block(name: str, elastic: Elastic, colour: Colour) -> Iterator[Solid]:
         size, corner = np.array(elastic.box.size), np.array(elastic.box.corner)
         shown = box(size).placed(corner + size / 2)
         yield Solid(f"bodies/{name}", "block", shown, colour, 0.45)
-
-
-def observed_outward(poses: Poses, local: Array) -> Array:
-    """(f, n, 3) inertial places of points given in the floating frame."""
-    return poses.position[:, None] + np.einsum("fij,fnj->fni", poses.rotation(), local)
 
 
 def _at(run: Record, name: str, when: Moments, poses: Poses) -> observed.Motion:

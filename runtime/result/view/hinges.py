@@ -1,4 +1,4 @@
-"""Glyphs of hinges by what they leave free, springs and bushings as coils, the ground."""
+"""Glyphs of hinges by what they leave free, coils of springs, feet on the ground."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.scene import Hinge
-from mstmm.scene.tables.hinge_frames import hinge_frames
+from mstmm.scene.tables.hinge_frames import hinge_frames, start_motion
 
 from .solids import Colour, Surface, along, box, cylinder, ellipsoid, joined
 from .stage import Solid
@@ -15,7 +15,7 @@ HINGE: Colour = (60, 66, 74)
 GROUND: Colour = (120, 126, 134)
 SPRING: Colour = (150, 110, 30)
 
-#: Turns of a coil, points in each, its radius by its length at the start.
+#: Turns of a coil, points in each, its radius by its greatest length.
 _TURNS, _FINE, _WIDE = 8, 10, 0.08
 
 
@@ -50,8 +50,6 @@ def glyph(hinge: Hinge, r: float) -> Surface | None:
 
 def _motions(hinge: Hinge) -> list[tuple[Array, Array]]:
     """(translation, rotation) of each speed at the start, axes of the outboard end."""
-    from mstmm.scene.tables.hinge_frames import start_motion
-
     return [(np.array(t), np.array(w)) for t, w in start_motion(hinge) or ()]
 
 
@@ -73,8 +71,9 @@ def foot(at: Array, r: float) -> Solid:
     return Solid("ground", "", box((2.6 * r, 2.6 * r, 2.6 * r)).placed(at), GROUND)
 
 
-def coil(start: Array, end: Array, radius: float) -> Array:
-    """(f, n, 3) points of a coil between two points (f, 3) that move."""
+def coil(start: Array, end: Array, widest: float) -> Array:
+    """(f, n, 3) points of a coil between points (f, 3) that move; radius `widest` (m) at most."""
+    radius = min(_WIDE * float(np.linalg.norm(end - start, axis=1).max()), widest)
     s = np.linspace(0.0, 1.0, _TURNS * _FINE + 1)
     turn = 2 * np.pi * _TURNS * np.clip((s - 0.12) / 0.76, 0.0, 1.0)
     wide = radius * np.clip(np.minimum(s - 0.08, 0.92 - s) / 0.06, 0.0, 1.0)

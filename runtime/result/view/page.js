@@ -83,8 +83,6 @@
     const pointer = { x: -1e6, y: -1e6 };
     addEventListener("pointermove", (e) => { pointer.x = e.clientX; pointer.y = e.clientY; });
     const rate = told.speed === 1 ? "" : `, ${number(told.speed, 3)} s in a second`;
-    const lasts = times[times.length - 1] - times[0] || 1;
-    const digits = Math.min(12, Math.max(0, 3 - Math.floor(Math.log10(lasts))));
     let last = null, ticks = 0;
     const tick = () => {
       requestAnimationFrame(tick);
@@ -93,7 +91,7 @@
       if (view.nodePoseData["/clock"] && ++ticks === SETTLED) fit(view);
       const pose = view.nodePoseData["/clock"];
       const moment = Math.min(times.length - 1, Math.round(pose ? pose.position[0] : 0));
-      clock.textContent = times.length > 1 ? `t = ${times[moment].toFixed(digits)} s${rate}` :
+      clock.textContent = times.length > 1 ? `t = ${times[moment].toFixed(told.digits)} s${rate}` :
         `t = ${number(times[0], 6)} s`;
       const at = pick.value ? place(view, pick.value) : null;
       if (at && last) {

@@ -26,8 +26,8 @@ from .stage import Bent, Line, Poses, Solid, Stage
 _SAME = 1e-5
 #: Sizes (m) between which viser shows all of a scene, and the one that others are drawn at.
 _SMALL, _LARGE, _SHOWN = 0.5, 100.0, 10.0
-#: Spacing of the ground's grid, and its width, by the size of the scene.
-_WIDE = 1.3
+#: The grid: its width, and how far it lies below everything, by the size of the scene; its colours.
+_WIDE, _BELOW = 1.3, 0.04
 _THIN, _THICK = (186, 190, 196), (150, 154, 160)
 
 
@@ -99,9 +99,8 @@ class _Moving:
         self.lines = [(line, self._draw(line)) for line in stage.lines]
 
     def _add(self, solid: Solid) -> None:
-        name = "/".join(part for part in ("", solid.owner, solid.part) if part or not solid.owner)
         self.scene.add_mesh_simple(
-            name if name.startswith("/") else f"/{name}",
+            f"/{solid.owner}/{solid.part}",
             vertices=solid.surface.vertices.astype(np.float32),
             faces=solid.surface.faces.astype(np.uint32), color=solid.colour,
             opacity=None if solid.opacity == 1 else solid.opacity, visible=not solid.hidden,
@@ -154,8 +153,7 @@ def _grid(scene: Any, stage: Stage) -> None:
     """A grid normal to up, below everything."""
     low, high = stage.corners()
     up, middle = stage.up, (low + high) / 2
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    floor = float(((low + corners * (high - low)) @ up).min()) - 0.04 * stage.size
+    floor = float((stage.cloud @ up).min()) - _BELOW * stage.size
     cell = 10.0 ** np.floor(np.log10(stage.size / 2))
     wide = float(np.ceil(_WIDE * stage.size / cell) * cell)
     axes = along(up)
@@ -192,7 +190,7 @@ def _told(stage: Stage) -> dict[str, Any]:
     }  # fmt: skip
     return {
         "title": stage.title, "speed": stage.speed, "times": _packed(stage.times),
-        "notes": stage.notes, "owners": owners,
+        "digits": stage.digits, "notes": stage.notes, "owners": owners,
     }  # fmt: skip
 
 

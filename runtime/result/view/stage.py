@@ -145,6 +145,12 @@ class Stage:
         """Least and largest inertial coordinates (3,) of all that is drawn, in all moments."""
         return self.cloud.min(axis=0), self.cloud.max(axis=0)
 
+    @property
+    def digits(self) -> int:
+        """Decimals by which its moments are told apart, in s."""
+        lasts = float(self.times[-1] - self.times[0]) or 1.0
+        return int(np.clip(3 - np.floor(np.log10(lasts)), 0, 12))
+
     @cached_property
     def size(self) -> float:
         """The diagonal (m) of the box that holds everything; 1 of a scene that is a point."""

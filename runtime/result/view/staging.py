@@ -10,7 +10,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.numbers.rotations import IDENTITY
-from mstmm.scene import Body, Bushing, Hinge, Spring, split
+from mstmm.scene import Body, Hinge, Spring, split
 from mstmm.scene.rules.values import GROUND
 
 from . import bodies, flexible, hinges, shapes
@@ -185,12 +185,10 @@ class _Staging:
     # --- lines ------------------------------------------------------------------------------------
 
     def _coils(self) -> Iterator[Line]:
-        for force in self.scene.forces:
-            start, end = self._place(force, force.from_), self._place(force, force.to)
-            reach = float(np.linalg.norm(end - start, axis=1).max())
-            if isinstance(force, Spring) and reach > 0:
-                points = hinges.coil(start, end, min(0.08 * reach, 1.6 * self.radius))
-                yield Line(f"springs/{force.name}", points, hinges.SPRING)
+        for spring in self.scene.spring:
+            start, end = self._place(spring, spring.from_), self._place(spring, spring.to)
+            points = hinges.coil(start, end, _GLYPH * self.radius)
+            yield Line(f"springs/{spring.name}", points, hinges.SPRING)
 
     def _ways_of(self, name: str) -> list[Array]:
         """(f, 3) where the ends of an elastic body are, each over the moments."""
@@ -205,10 +203,10 @@ class _Staging:
                 points = np.stack([first, way], axis=1)
                 yield Line(f"elastic/{name}/{end}", points, self._colour(name), 8.0)
 
-    def _place(self, force: Spring | Bushing, reference: str) -> Array:
-        """(f, 3) where an end of a force is."""
+    def _place(self, spring: Spring, reference: str) -> Array:
+        """(f, 3) where an end of a spring is."""
         if split(reference)[0] == GROUND:
-            return np.tile(np.array(force.position), (len(self.when.times), 1))
+            return np.tile(np.array(spring.position), (len(self.when.times), 1))
         return self.when.poses(self.run, reference).position
 
     def _ways(self) -> Iterator[Line]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Sequence
 from functools import cached_property
 from html import escape
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO, TYPE_CHECKING
 
 from mstmm.arrays import whole
 from mstmm.errors import SceneError
 
+from ...host.files import replacing
 from .film import FILMS, STRIPS, film, frames, strip
 from .page import page
 from .stage import Stage
@@ -44,36 +47,39 @@ class View:
         """Write a page (.html, extra: view), a strip of so many `moments` (.png, .svg, .pdf), a
         film (.gif, .mp4) or, into a folder, every frame (extra: plot); returns the path.
 
-        SceneError for another ending, EnvironmentFailure for what is not installed.
+        A file appears under its name when it is whole.  SceneError for another ending,
+        EnvironmentFailure for what is not installed or cannot be written.
         """
         if not isinstance(path, str | Path) or not str(path):
             raise SceneError(f"view {path!r:.60}: expected the name of a file or of a folder")
         path, moments = Path(path), whole("moments", moments, 1, "a whole number, 1 or more")
-        try:
-            self._write(path, moments)
-        except OSError as error:
-            raise SceneError(f'view "{path}": it cannot be written ({error.strerror})') from None
-        return path
-
-    def _write(self, path: Path, moments: int) -> None:
         ending = path.suffix.lower()
-        if ending == ".html":
-            path.write_text(self.html, encoding="utf-8")
-        elif ending in STRIPS:
-            strip(self.stage, path, moments)
-        elif ending in FILMS:
-            film(self.stage, path)
-        elif not ending:
+        if not ending:
             frames(self.stage, path)
-        else:
+            return path
+        if ending not in ENDINGS:
             raise SceneError(
                 f'view "{path}": expected a name ending in {", ".join(ENDINGS)}, or a folder for '
                 "frames, without an ending"
             )
+        with replacing(path) as part:
+            self._write(part, ending, moments)
+        return path
+
+    def _write(self, part: Path, ending: str, moments: int) -> None:
+        if ending == ".html":
+            part.write_text(self.html, encoding="utf-8")
+        elif ending in STRIPS:
+            strip(self.stage, part, ending[1:], moments)
+        else:  # writers of films go by the ending
+            with TemporaryDirectory() as folder:
+                made = Path(folder) / f"film{ending}"
+                film(self.stage, made)
+                shutil.copyfile(made, part)
 
     def draw_strip(self, file: IO[str], moments: int = 6) -> None:
         """The same strip as SVG into an open file."""
-        strip(self.stage, file, moments)
+        strip(self.stage, file, "svg", moments)
 
     def _repr_html_(self) -> str:
         return (
@@ -87,11 +93,10 @@ def view(
     title: str,
     trails: Sequence[str],
     speed: float | None,
-    most: int | None = None,
 ) -> View:
     """See `Result.view`."""
     if isinstance(trails, str):
         trails = (trails,)
     if not isinstance(title, str) or not all(isinstance(one, str) for one in trails):
         raise SceneError("view: title and trails are texts, such as trails=['rod2.tip']")
-    return View(staged(run, title, trails, speed, most))
+    return View(staged(run, title, trails, speed))
