@@ -21,9 +21,9 @@ XYZ, WXYZ = ("x", "y", "z"), ("w", "x", "y", "z")
 
 #: Quantities of a body or an end, in the order of `Observation.points`.
 BODY = {
-    "position": Kind("m", "position of the origin", XYZ, XYZ),
-    "velocity": Kind("m/s", "velocity of the origin", XYZ, ("vx", "vy", "vz")),
-    "acceleration": Kind("m/s2", "acceleration of the origin", XYZ, ("ax", "ay", "az")),
+    "position": Kind("m", "position", XYZ, XYZ),
+    "velocity": Kind("m/s", "velocity", XYZ, ("vx", "vy", "vz")),
+    "acceleration": Kind("m/s2", "acceleration", XYZ, ("ax", "ay", "az")),
     "orientation": Kind("", "quaternion, body to inertial axes", WXYZ, ("qw", "qx", "qy", "qz")),
     "angular_velocity": Kind("rad/s", "angular velocity", XYZ, ("wx", "wy", "wz")),
     "angular_acceleration": Kind(

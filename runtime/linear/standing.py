@@ -19,7 +19,7 @@ from ..kernels.tape import TapeKernel
 from ..pack.pack import packed_system
 from ..pack.system import ForceNumbers, LoadNumbers, System
 from ..pack.values import constant_kernel
-from ..result.bushings import deflection_of
+from ..result.owners.bushings import deflection_of
 from .matrices import State
 
 INERTIAL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)

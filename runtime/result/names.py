@@ -16,7 +16,9 @@ Values = Callable[[], Array]
 class Quantity:
     """Values (n,) or (n, k) over time; `labels` has one entry per column.
 
-    `rates` are their time derivatives where these are quantities themselves.
+    `rates` are their time derivatives where these are quantities themselves.  `what` of an `owner`
+    it is: "angle" of "hinge elbow"; "" where there is no owner.  `note` is a sentence on what to
+    know when they are read.
     """
 
     name: str
@@ -25,44 +27,76 @@ class Quantity:
     long_name: str
     labels: tuple[str, ...] = ()
     rates: Callable[[], Array] | None = field(default=None, compare=False)
+    what: str = ""
+    owner: str = ""
+    note: str = ""
 
 
 @dataclass
 class Table:
-    """Names of one owner: how to get each quantity, and one name for every number."""
+    """Names of one owner: how to get each quantity, one name for every number, and the `whole`
+    quantities, vectors undivided, that files hold.  Of equal names the first one counts."""
 
     entries: dict[str, Callable[[], Quantity]]
     scalars: list[str]
+    whole: list[str] = field(default_factory=list)
 
     def scalar(
-        self, name: str, unit: str, long_name: str, get: Values, k: int | None = None,
-        rates: Values | None = None, listed: bool = True,
+        self, name: str, unit: str, what: str, get: Values, k: int | None = None,
+        rates: Values | None = None, listed: bool = True, owner: str = "",
     ) -> None:  # fmt: skip
         """One number, column k of what `get` gives."""
-        slope = None if rates is None else (lambda: _pick(rates(), k))
-        self.entries[name] = lambda: Quantity(name, _pick(get(), k), unit, long_name, rates=slope)
-        if listed:
-            self.scalars.append(name)
+        long_name = f"{what} of {owner}" if owner else what
+        if name not in self.entries and listed:
+            self.whole.append(name)
+        self._one(name, unit, long_name, get, k, rates, listed, what, owner)
 
     def vector(
         self, name: str, owner: str, about: Kind, get: Values, rates: Values | None = None,
-        listed: bool = True,
+        listed: bool = True, note: Callable[[Array], str] | None = None, base: str = "",
     ) -> None:  # fmt: skip
-        """The vector under its name, each component under name.x, and short as in rod1.tip.vx.
+        """The vector under its name, each component under name.x, and short as in rod1.tip.vx, of
+        `base` where the owner has another name than "hinge shoulder".
 
-        What is not `listed` has names but no column in a wide table.
+        What is not `listed` has names but no column in a wide table.  `note` gives a sentence on
+        the values.
         """
-        long_name = f"{about.long_name} of {owner}"
-        self.entries[name] = lambda: Quantity(
-            name, get(), about.unit, long_name, about.labels, rates
-        )
+        what, long_name = about.long_name, f"{about.long_name} of {owner}"
+
+        def whole() -> Quantity:
+            values = get()
+            said = "" if note is None else note(values)
+            return Quantity(
+                name, values, about.unit, long_name, about.labels, rates, what, owner, said
+            )
+
+        if name not in self.entries and listed:
+            self.whole.append(name)
+        self.entries.setdefault(name, whole)
         for k, label in enumerate(about.labels):
             text = f"{long_name}, {label}"
-            short = f"{owner}.{about.short[k]}" if about.short else ""
-            taken = not short or short in self.entries
-            self.scalar(f"{name}.{label}", about.unit, text, get, k, rates, listed and taken)
-            if not taken:
-                self.scalar(short, about.unit, text, get, k, rates, listed)
+            short = f"{base or owner}.{about.short[k]}" if about.short else ""
+            free = bool(short) and short not in self.entries
+            full = f"{name}.{label}"
+            self._one(full, about.unit, text, get, k, rates, listed and not free, what, owner, note)
+            if free:
+                self._one(short, about.unit, text, get, k, rates, listed, what, owner, note)
+
+    def _one(
+        self, name: str, unit: str, long_name: str, get: Values, k: int | None,
+        rates: Values | None, listed: bool, what: str, owner: str,
+        note: Callable[[Array], str] | None = None,
+    ) -> None:  # fmt: skip
+        slope = None if rates is None else (lambda: _pick(rates(), k))
+
+        def one() -> Quantity:
+            values = get()
+            said = "" if note is None else note(values)
+            return Quantity(name, _pick(values, k), unit, long_name, (), slope, what, owner, said)
+
+        if name not in self.entries and listed:
+            self.scalars.append(name)
+        self.entries.setdefault(name, one)
 
 
 def _pick(values: Array, k: int | None) -> Array:

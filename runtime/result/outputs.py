@@ -32,7 +32,9 @@ def quantity_of(output: Output, t: Array, known: Known) -> Quantity:
         raise SceneError(f'output "{output.name}": of: {error}') from None
     names = np.stack(columns, axis=1)
     values = vectorized.evaluate(kernel_of(output.of), {"names": names})["value"][:, 0]
-    return Quantity(output.name, values, output.unit, _long_name(output))
+    return Quantity(
+        output.name, values, output.unit, _long_name(output), what=f"output {output.name}"
+    )
 
 
 def one_quantity(output: Output) -> str:
@@ -45,12 +47,18 @@ def component_of(quantity: Quantity, label: str) -> Quantity:
     """One column of a vector."""
     values = quantity.values[:, quantity.labels.index(label)]
     long_name = f"{quantity.long_name}, {label}"
-    return Quantity(f"{quantity.name}.{label}", values, quantity.unit, long_name)
+    return replace(
+        quantity, name=f"{quantity.name}.{label}", values=values, long_name=long_name, labels=(),
+        rates=None,
+    )  # fmt: skip
 
 
 def _renamed(output: Output, of: Quantity) -> Quantity:
     long_name = f"{_long_name(output)}, {of.long_name}"
-    return replace(of, name=output.name, unit=output.unit or of.unit, long_name=long_name)
+    return replace(
+        of, name=output.name, unit=output.unit or of.unit, long_name=long_name,
+        what=f"output {output.name}", owner="",
+    )  # fmt: skip
 
 
 def _long_name(output: Output) -> str:

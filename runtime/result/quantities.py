@@ -5,8 +5,7 @@ Every name gives values over time with their unit and one label per column.  Axe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -14,30 +13,29 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
-from mstmm.ir.facts import effort_unit
 from mstmm.scene import Output
 from mstmm.scene.rules.messages import near
 
 from ..engine.shown import (
     BODY,
     COLUMNS,
-    HINGE,
     SUMS,
     WXYZ,
     XYZ,
     Kind,
-    acceleration_name,
-    effort_names,
-    rate_unit,
 )  # fmt: skip
 from ..pack.layout import HingeSlots
-from .bushings import add_bushing
-from .constraints import add_constraint, add_coupling
 from .flexible.names import add_body
 from .names import Quantity, Table, Values
 from .observed import quaternions
 from .outputs import component_of, one_quantity, quantity_of
-from .springs import add_spring
+from .owners.acting import Acting
+from .owners.angles import EULER, euler, gimbal
+from .owners.bushings import add_bushing
+from .owners.constraints import add_constraint, add_coupling
+from .owners.hinges import add_hinge, add_modes
+from .owners.loads import add_load
+from .owners.springs import add_spring
 
 if TYPE_CHECKING:
     from .flexible.quantities import FlexibleResults
@@ -53,21 +51,23 @@ RATES = {
 class Quantities:
     """Every quantity of a run by its name, from the states and what they show.
 
-    Names are made per owner, a hinge, a body, an end, a spring, a bushing, a constraint, a coupling
-    or the scene (""), when they are asked for.
+    Names are made per owner, a hinge, a body, an end, a spring, a load, a bushing, a constraint, a
+    coupling or the scene (""), when they are asked for.
     """
 
     def __init__(self, observed: Observed, flexible: FlexibleResults) -> None:
         self.observed, self.run = observed, observed.run
-        self._flexible = flexible
+        self._flexible, self.acting = flexible, Acting(observed)
         self.layout = observed.engine.packed.layout
         self._orientations: dict[str, Array] = {}
         self._tables: dict[str, Table] = {}
-        #: What adds the quantities of springs, bushings and what closes loops, by their names.
+        #: What adds the quantities of whatever else acts or closes loops, by its name.
         self._more: dict[str, list[Callable[[Table], None]]] = {}
         scene, closing = observed.references.scene, observed.engine.packed.described
         for spring in scene.spring:
-            self._owned(spring.name, partial(add_spring, observed=observed, spring=spring))
+            self._owned(spring.name, partial(add_spring, acting=self.acting, spring=spring))
+        for k, load in enumerate(scene.load):
+            self._owned(load.name, partial(add_load, acting=self.acting, load=load, number=k))
         for bushing in scene.bushing:
             self._owned(bushing.name, partial(add_bushing, observed=observed, bushing=bushing))
         for one in closing.constraint:
@@ -144,6 +144,15 @@ class Quantities:
         owners = (".".join(parts[:k]) for k in range(1, len(parts)))
         return [owner for owner in owners if self._owns(owner)]
 
+    def acting_wholes(self) -> Iterator[Quantity]:
+        """What springs, loads, bushings and what closes loops do, vectors undivided; of a name that
+        is also that of a hinge or body, what those do stands elsewhere."""
+        for owner in self._more:
+            table = Table({}, [])
+            for add in self._more[owner]:
+                add(table)
+            yield from (table.entries[name]() for name in table.whole)
+
     def names(self) -> list[str]:
         """Every name there is."""
         return list(self._every())
@@ -161,10 +170,11 @@ class Quantities:
         return [one.name for one in self.observed.references.scene.output if one.name in there]
 
     def owners(self) -> Iterator[str]:
-        """Hinges, bodies and ends, springs, bushings, constraints, couplings, the scene itself."""
+        """Hinges, bodies and ends, springs, loads, bushings, constraints, couplings, the scene."""
         yield from self.layout.hinges
         yield from self.observed.references
-        yield from self._more
+        bodies = (self.layout.hinges, self.observed.references)
+        yield from (name for name in self._more if not any(name in known for known in bodies))
         yield ""
 
     def of(self, owner: str) -> Table:
@@ -172,7 +182,7 @@ class Quantities:
         if owner not in self._tables:
             table = Table({}, [])
             if owner in self.layout.hinges and owner not in self.layout.modal:
-                self._hinge(table, self.layout.hinges[owner])
+                add_hinge(table, self.acting, self.layout.hinges[owner])
             elif owner in self.observed.references:
                 self._body(table, owner)
             elif not owner:
@@ -196,26 +206,13 @@ class Quantities:
                 f"{reference}.{kind}", reference, about, self._bound(self.of_body, reference, kind),
                 None if rates is None else self._bound(self.of_body, reference, rates),
             )  # fmt: skip
+        table.vector(
+            f"{reference}.euler", reference, EULER,
+            lambda: euler(self.observed.points(reference)[:, 15:24]), note=gimbal,
+        )  # fmt: skip
         if reference in self.layout.modal:
-            self._modal(table, self.layout.modal[reference])
+            add_modes(table, self.acting, self.layout.modal[reference])
         add_body(table, self._flexible, reference)
-
-    def _modal(self, table: Table, body: HingeSlots) -> None:
-        """Modal coordinates of a flexible body, their speeds and accelerations: blade.y1."""
-        q, u = body.q_slice, body.u_slice
-        group = _Group(table, body.name, "flexible body")
-        rates = [rate_unit(unit) for unit in body.u_units]
-        accelerations = [acceleration_name(name) for name in body.u_names]
-
-        def udot() -> Array:
-            return self.observed.columns("udot", (u,))
-
-        def speeds() -> Array:
-            return self.run.u[:, u]
-
-        group.add("q", "coordinate", body.q_names, body.q_units, lambda: self.run.q[:, q], speeds)
-        group.add("u", "speed", body.u_names, body.u_units, speeds, udot)
-        group.add("udot", "acceleration", accelerations, rates, udot)
 
     def _scene(self, table: Table) -> None:
         for name, (unit, long_name, columns) in SUMS.items():
@@ -234,8 +231,8 @@ class Quantities:
         place = self.observed.engine.packed.system.held.first
         for controller in scene.controller:
             for k in range(len(controller.A)):
-                name, about = f"{controller.name}.x[{k}]", f"state {k} of controller"
-                table.scalar(name, "", f"{about} {controller.name}", self._kept(place + 1 + k))
+                name, owner = f"{controller.name}.x[{k}]", f"controller {controller.name}"
+                table.scalar(name, "", f"state {k}", self._kept(place + 1 + k), owner=owner)
             place += 1 + len(controller.A) + len(controller.outputs)
         for output in scene.output:
             self._output(table, output)
@@ -264,30 +261,6 @@ class Quantities:
             table.entries[f"{output.name}.{label}"] = component(label)
         table.scalars += [f"{output.name}.{label}" for label in labels] or [output.name]
 
-    def _hinge(self, table: Table, hinge: HingeSlots) -> None:
-        """q, u, their rates and efforts by the hinge's own names and by number; loads."""
-        q, u = hinge.q_slice, hinge.u_slice
-        efforts = effort_names(hinge.u_names)
-        units = [effort_unit(unit) for unit in hinge.u_units]
-        rate_units = [rate_unit(unit) for unit in hinge.u_units]
-        accelerations = [acceleration_name(name) for name in hinge.u_names]
-
-        def udot() -> Array:
-            return self.observed.columns("udot", (u,))
-
-        def speeds() -> Array:
-            return self.run.u[:, u]
-
-        group = _Group(table, hinge.name)
-        group.add("q", "coordinate", hinge.q_names, hinge.q_units, lambda: self.run.q[:, q],
-                  speeds if hinge.straight else None)  # fmt: skip
-        group.add("u", "speed", hinge.u_names, hinge.u_units, speeds, udot)
-        group.add("udot", "acceleration", accelerations, rate_units, udot)
-        group.add("effort", "effort", efforts, units, lambda: self.effort(hinge.name))
-        for kind, about in HINGE.items():
-            get = self._bound(self.of_hinge, hinge.name, kind)
-            table.vector(f"{hinge.name}.{kind}", hinge.name, about, get)
-
     def _summed(self, name: str) -> Values:
         return lambda: self.sum(name)
 
@@ -305,24 +278,3 @@ class Quantities:
     @staticmethod
     def _bound(method: Callable[[str, str], Array], name: str, kind: str) -> Values:
         return lambda: method(name, kind)
-
-
-@dataclass
-class _Group:
-    """Columns of one hinge under their own names and by number: shoulder.angle, shoulder.q[0]."""
-
-    table: Table
-    hinge: str
-    word: str = "hinge"
-
-    def add(
-        self, short: str, word: str, names: Sequence[str], units: Sequence[str], get: Values,
-        rates: Values | None = None,
-    ) -> None:  # fmt: skip
-        """One kind of quantity, one name and unit per column."""
-        for k, (name, unit) in enumerate(zip(names, units, strict=True)):
-            full, long_name = f"{self.hinge}.{name}", f"{word} {name} of {self.word} {self.hinge}"
-            self.table.scalar(full, unit, long_name, get, k, rates)
-            self.table.entries[f"{self.hinge}.{short}[{k}]"] = self.table.entries[full]
-        if len(names) == 1 and names[0] != short:
-            self.table.entries[f"{self.hinge}.{short}"] = self.table.entries[full]

@@ -24,7 +24,7 @@ from ...engine.calls import Probe
 from ...engine.references import References
 from ...engine.shown import BODY, COLUMNS, acceleration_name, rate_unit
 from ...pack.layout import HingeSlots
-from ...result.springs import SPRING, motion_of
+from ...result.owners.springs import SPRING, motion_of
 from ..channels import Channel
 from .seen import Part, Seen, formula, scaled
 

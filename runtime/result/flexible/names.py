@@ -70,8 +70,8 @@ def add_body(table: Table, results: FlexibleResults, reference: str) -> None:
     modes = Kind("J", "energy by modes, strain and motion against the frame", flexible.modes, ())
     table.vector(f"{body}.modal_energy", body, modes, partial(results.modal_energy, body))
     table.scalar(
-        f"{body}.strain_energy", "J", f"strain energy of {body}",
-        partial(results.strain_energy, body),
+        f"{body}.strain_energy", "J", "strain energy", partial(results.strain_energy, body),
+        owner=body,
     )  # fmt: skip
 
 

@@ -11,10 +11,12 @@ from mstmm.ir.facts import effort_unit
 
 from ...engine.shown import BODY, HINGE, SUMS, acceleration_name, rate_unit
 from ..flexible import dataset as flexible
+from ..owners.angles import EULER
 from . import provenance
 from .table import flat
 
 if TYPE_CHECKING:
+    from ..names import Quantity
     from ..record import Record
 
 
@@ -24,7 +26,8 @@ _EVERYTHING = ("body", "hinge", "flexible", "mode")
 
 
 def dataset(result: Record) -> Any:
-    """`xarray.Dataset` with dimensions time, coordinate, speed, hinge, body, axis, component.
+    """`xarray.Dataset` with dimensions time, coordinate, speed, hinge, body, axis, component,
+    angle, and spring, load and so on where there are some.
 
     `body` holds bodies and their ends ("rod1", "rod1.tip"), `coordinate` and `speed` the entries of
     q and u ("shoulder.angle", "shoulder.angle_rate"), whose units differ and stand beside them.
@@ -38,6 +41,7 @@ def dataset(result: Record) -> Any:
     variables, labels = _states(result), _labels(result)
     if result.model.nu <= MOST_SPEEDS:
         variables |= _bodies(result) | _hinges(result) | flexible.variables(result)
+        variables |= _acting(result)
     else:
         labels = {key: label for key, label in labels.items() if key not in _EVERYTHING}
     variables |= _sums(result) | _given(result) | provenance.variables(result)
@@ -77,6 +81,7 @@ def _labels(result: Record) -> dict[str, Variable]:
         "body": ("body", list(result._observed.references), "body or end of a body"),
         "axis": ("axis", ["x", "y", "z"], "inertial axis"),
         "component": ("component", ["w", "x", "y", "z"], "component of a quaternion"),
+        "angle": ("angle", list(EULER.labels), EULER.long_name),
         **flexible.labels(result),
     }
     found: dict[str, Variable] = {"time": (("time",), result.t, _about("s", "time"))}
@@ -108,6 +113,9 @@ def _bodies(result: Record) -> dict[str, Variable]:
         values = np.stack(columns, axis=1) if columns else np.zeros((len(result.t), 0, 3))
         last = "component" if kind == "orientation" else "axis"
         found[kind] = (("time", "body", last), values, _about(about.unit, about.long_name))
+    angles = [result.quantity(f"{name}.euler").values for name in names]
+    values = np.stack(angles, axis=1) if angles else np.zeros((len(result.t), 0, 3))
+    found["euler"] = (("time", "body", "angle"), values, _about("rad", EULER.long_name))
     return found
 
 
@@ -132,21 +140,48 @@ def _given(result: Record) -> dict[str, Variable]:
     }  # fmt: skip
     for word, given in names.items():
         for name in given:
-            known = result.quantity(name)
-            about, key = _about(known.unit, known.long_name), f"{word}_{name}"
-            if known.labels in _DIMENSIONS:
-                found[key] = (("time", *_DIMENSIONS[known.labels]), known.values, about)
-            else:
-                columns = flat([known])
-                ends = [f"_{label}" for label in known.labels] or [""]
-                for end, (_, _, values) in zip(ends, columns, strict=True):
-                    found[f"{key}{end}"] = (("time",), values, about)
+            found |= _variable(f"{word}_{name}", result.quantity(name))
     return found
+
+
+def _acting(result: Record) -> dict[str, Variable]:
+    """What springs, loads, bushings and what closes loops do: "spring_length" by spring; nan for
+    what one of them has not."""
+    named: dict[str, list[str]] = {}
+    kinds: dict[tuple[str, str], dict[str, Quantity]] = {}
+    for quantity in result._quantities.acting_wholes():
+        word, _, owner = quantity.owner.partition(" ")
+        if owner not in named.setdefault(word, []):
+            named[word].append(owner)
+        kinds.setdefault((word, quantity.name.rpartition(".")[2]), {})[owner] = quantity
+    found: dict[str, Variable] = {
+        word: ((word,), _words(owners), {"long_name": word}) for word, owners in named.items()
+    }
+    for (word, kind), some in kinds.items():
+        one = next(iter(some.values()))
+        unknown = np.full(one.values.shape, np.nan)
+        columns = [some[name].values if name in some else unknown for name in named[word]]
+        dims = ("time", word, *(_DIMENSIONS[one.labels] if one.labels else ()))
+        about = _about(_common([x.unit for x in some.values()]), one.what)
+        found[f"{word}_{kind}"] = (dims, np.stack(columns, axis=1), about)
+    return found
+
+
+def _variable(key: str, known: Quantity) -> dict[str, Variable]:
+    """One variable, or one for each column where these are no axes."""
+    about = _about(known.unit, known.long_name)
+    if known.labels in _DIMENSIONS:
+        return {key: (("time", *_DIMENSIONS[known.labels]), known.values, about)}
+    ends = [f"_{label}" for label in known.labels] or [""]
+    return {
+        f"{key}{end}": (("time",), values, about)
+        for end, (_, _, values) in zip(ends, flat([known]), strict=True)
+    }
 
 
 #: Dimensions of vectors by the labels of their components.
 _DIMENSIONS: dict[tuple[str, ...], tuple[str, ...]] = {
-    tuple("xyz"): ("axis",), tuple("wxyz"): ("component",),
+    tuple("xyz"): ("axis",), tuple("wxyz"): ("component",), EULER.labels: ("angle",),
 }  # fmt: skip
 
 

@@ -10,21 +10,21 @@ from mstmm.arrays import Array
 from mstmm.scene.rules.values import GROUND
 from mstmm.scene.tables.closures import CURVE, DISTANCE, ROLLING
 
-from ..engine.shown import XYZ, Kind
-from ..pack.layout import OF_CONSTRAINT
-from .names import Table
+from ...engine.shown import XYZ, Kind
+from ...pack.layout import OF_CONSTRAINT
+from ..names import Table
 
 if TYPE_CHECKING:
     from mstmm.scene import Constraint
 
-    from .observed import Observed
+    from ..observed import Observed
 
 _FORCE = Kind("N", "force on the end `to`", XYZ, ())
 
 
 def add_constraint(table: Table, observed: Observed, one: Constraint) -> None:
     """Its quantities under their names: rod.force, rod.load, road.friction, wire.s."""
-    name = one.name
+    name, owner = one.name, f"constraint {one.name}"
 
     def force() -> Array:
         return _force(observed, one)
@@ -36,22 +36,19 @@ def add_constraint(table: Table, observed: Observed, one: Constraint) -> None:
         along = load()[:, None] * _direction(observed, one)
         return np.asarray(np.linalg.norm(force() - along, axis=1))
 
-    table.vector(f"{name}.force", name, _FORCE, force, listed=False)
+    table.vector(f"{name}.force", owner, _FORCE, force)
     if one.type == CURVE:
         packed = observed.engine.packed
         place = int(packed.system.places["q"][packed.hinge_position[_frame(one)]])
         table.scalar(
-            f"{name}.s", "", f"parameter of the curve of constraint {name}",
-            lambda: observed.run.q[:, place], listed=False,
+            f"{name}.s", "", "parameter of the curve", lambda: observed.run.q[:, place],
+            owner=owner,
         )  # fmt: skip
         return
-    what = (
-        "which pushes the ends apart" if one.type == DISTANCE else "along the normal of its plane"
-    )
-    table.scalar(f"{name}.load", "N", f"load of constraint {name}, {what}", load, listed=False)
+    what = "which pushes the ends apart" if one.type == DISTANCE else "along the normal"
+    table.scalar(f"{name}.load", "N", f"load, {what},", load, owner=owner)
     if one.type == ROLLING:
-        text = f"friction that keeps constraint {name} from slipping"
-        table.scalar(f"{name}.friction", "N", text, friction, listed=False)
+        table.scalar(f"{name}.friction", "N", "friction against slip", friction, owner=owner)
 
 
 def add_coupling(table: Table, observed: Observed, name: str) -> None:
@@ -63,8 +60,8 @@ def add_coupling(table: Table, observed: Observed, name: str) -> None:
         found = observed.part("rows")
         return -found[:, rows[0]] if rows else np.zeros(len(found))
 
-    text = f"load of coupling {name}, by the slopes of its expression"
-    table.scalar(f"{name}.load", "", text, load, listed=False)
+    what = "load, by the slopes of its expression,"
+    table.scalar(f"{name}.load", "", what, load, owner=f"coupling {name}")
 
 
 def _frame(one: Constraint) -> str:

@@ -13,15 +13,15 @@ from mstmm.ir import KernelIR
 from mstmm.ir.stored import kernel_from_json
 from mstmm.scene.rules.symmetric import triangle
 
-from ..engine.calls import Probe
-from ..engine.shown import COLUMNS, XYZ, Kind
-from ..kernels import vectorized
-from .names import Table
+from ...engine.calls import Probe
+from ...engine.shown import COLUMNS, XYZ, Kind
+from ...kernels import vectorized
+from ..names import Table
 
 if TYPE_CHECKING:
     from mstmm.scene import Bushing
 
-    from .observed import Observed
+    from ..observed import Observed
 
 #: Quantities of a bushing: loads in inertial axes, deflections in its own.
 BUSHING = {
@@ -60,16 +60,19 @@ def deflection_of(ends: tuple[Array, Array]) -> Array:
 
 def add_bushing(table: Table, observed: Observed, bushing: Bushing) -> None:
     """Its quantities under their names: mount.force, mount.deflection.x."""
-    both = {"force": (load, 0), "moment": (load, 3), "deflection": (deflection, 0),
-            "turn": (deflection, 3)}  # fmt: skip
+    loaded = cache(lambda: load(observed, bushing))
+    moved = cache(lambda: deflection(observed, bushing))
+    both = {"force": (loaded, 0), "moment": (loaded, 3), "deflection": (moved, 0),
+            "turn": (moved, 3)}  # fmt: skip
+    owner = f"bushing {bushing.name}"
     for kind, about in BUSHING.items():
         of, first = both[kind]
 
         def values(of=of, first=first) -> Array:  # type: ignore[no-untyped-def]
-            found: Array = of(observed, bushing)
+            found: Array = of()
             return found[:, first : first + 3]
 
-        table.vector(f"{bushing.name}.{kind}", bushing.name, about, values, listed=False)
+        table.vector(f"{bushing.name}.{kind}", owner, about, values, base=bushing.name)
 
 
 def _ends(observed: Observed, bushing: Bushing) -> tuple[Array, Array]:

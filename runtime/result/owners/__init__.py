@@ -1,0 +1,1 @@
+"""Quantities of what a scene is made of: hinges, springs, bushings, loads, what closes loops."""

@@ -1,0 +1,83 @@
+"""What the expressions of a scene give over a run: efforts of laws, components of loads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.expression.inputs import INPUTS
+from mstmm.numbers.pieces import COUNT
+
+from ...engine.calls import Probe
+from ...kernels import vectorized
+from ...pack.system import System
+
+if TYPE_CHECKING:
+    from ..observed import Observed
+
+_UNTURNED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+#: Numbers of the motion of all loads together, about 130 MB.
+MOST = 2**24
+
+
+class Acting:
+    """Evaluated over all samples when the first number is asked for, and kept."""
+
+    def __init__(self, observed: Observed) -> None:
+        self.observed = observed
+        self.system: System = observed.engine.packed.system
+
+    @cached_property
+    def given(self) -> dict[str, Array]:
+        """What every expression reads: t, q, u and the inputs, those that are held from memory."""
+        run, held = self.observed.run, self.system.held
+        inputs = np.array([self.system.inputs_at(t) for t in run.t.tolist()])
+        inputs = inputs.reshape(len(run.t), COUNT * len(self.system.inputs))
+        for k, place in enumerate(held.places):
+            if place >= 0:
+                inputs[:, COUNT * k : COUNT * (k + 1)] = 0.0
+                inputs[:, COUNT * k + 1] = run.memory[:, place]
+        return {"t": run.t[:, None], "q": run.q, "u": run.u, INPUTS: inputs}
+
+    @cached_property
+    def _values(self) -> Array:
+        kernel = self.system.values
+        assert kernel is not None
+        return vectorized.evaluate(kernel, self.given)["values"]
+
+    @cached_property
+    def _loads(self) -> Array | None:
+        """(n, 2 loads, 24): of each load the motion of its point, and of its axes; None where this
+        would be too large."""
+        probes = [probe for number in range(len(self.system.loads)) for probe in self._pair(number)]
+        small = len(self.observed.run.t) * 24 * len(probes) <= MOST
+        return self._seen(probes) if small else None
+
+    def load(self, number: int) -> tuple[Array, Array]:
+        """(n, 24) twice: motion of the point of a load and of its axes, see `Observation`."""
+        some, place = self._loads, 2 * number
+        if some is None:
+            some, place = self._seen(self._pair(number)), 0
+        return some[:, place], some[:, place + 1]
+
+    def _pair(self, number: int) -> tuple[Probe, Probe]:
+        load = self.system.loads[number]
+        axes = load.axes_own if load.axes >= 0 else _UNTURNED
+        return Probe(load.body, _UNTURNED, load.offset), Probe(load.axes, axes, (0.0, 0.0, 0.0))
+
+    def _seen(self, probes: Sequence[Probe]) -> Array:
+        run, engine = self.observed.run, self.observed.engine
+        return engine.observe(run.t, run.q, run.u, run.memory, probes, ("points",)).points
+
+    def at(self, places: tuple[int, ...]) -> Array:
+        """(n, places): the values at some places, 0 at place -1."""
+        found = np.zeros((len(self.observed.run.t), len(places)))
+        for k, place in enumerate(places):
+            if place >= 0:
+                found[:, k] = self._values[:, place]
+        return found
