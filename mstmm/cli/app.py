@@ -14,6 +14,7 @@ from .check import check
 from .demo import demo
 from .doctor import doctor
 from .generate import generate
+from .import_robot import import_robot
 from .listing import list_elements
 from .show import show
 from .simulate import simulate
@@ -82,6 +83,7 @@ app.command("linearize")(linearize)
 app.command("modes")(modes)
 app.command("frf")(frf)
 app.command("check")(check)
+app.command("import")(import_robot)
 app.command("list")(list_elements)
 app.command("show")(show)
 app.command("stability")(stability)

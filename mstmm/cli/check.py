@@ -72,8 +72,10 @@ def check(
 
 
 def _checker(what: str) -> Callable[[str], Report]:
+    from mstmm.scene.robots.files import is_robot
+
     ending = os.path.splitext(what)[1].lower()
-    if ending in SCENE_ENDINGS:
+    if ending in SCENE_ENDINGS or is_robot(what):
         return _scene
     if ending == ".py":
         return _file

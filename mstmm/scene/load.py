@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..ir.spec import ElementSpec
 from .files.read import read
+from .robots.files import import_robot, is_robot
 from .scene import Scene
 from .tables.elastic_keys import FOLDER
 
@@ -16,7 +17,7 @@ def load_scene(
     path: str | os.PathLike[str],
     known_types: Mapping[tuple[str, str], ElementSpec] | None = None,
 ) -> Scene:
-    """Read and validate a scene file (.toml or .json).
+    """Read and validate a scene file (.toml or .json), or that of a robot as `import_robot` does.
 
     Relative paths in it start from its folder.  Of the files that it names the numbers of signals
     are read, from no other folder.
@@ -25,6 +26,8 @@ def load_scene(
     types.  When it is given every type must be built in or in it; without it types that are not
     built in are left to `Scene.check_types`.  Raises SceneError.
     """
+    if isinstance(path, str | os.PathLike) and is_robot(path):
+        return import_robot(path).scene
     where, data = read(path)
     token = FOLDER.set(str(Path(os.fsdecode(os.fspath(path))).absolute().parent))
     try:

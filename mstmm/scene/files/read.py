@@ -7,6 +7,7 @@ import os
 import re
 import stat
 import tomllib
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,11 @@ from ..rules.messages import near
 
 #: Largest file in MB by ending: what is read and validated within about half a minute.
 MAX_SIZE = {".toml": 8, ".json": 64}
+_IN_PYTHON = "; build large scenes in Python, repeated bodies with [[chain]]"
+#: What to do with a file that is too large, by ending.
+_LARGER = {
+    ".toml": f"{_IN_PYTHON}, or write JSON, up to {MAX_SIZE['.json']} MB", ".json": _IN_PYTHON,
+}  # fmt: skip
 #: Most parts of a dotted key: tables nest four deep, and each part costs all before it once more.
 MAX_PARTS = 64
 _LONG_KEY = re.compile(
@@ -24,23 +30,34 @@ _LONG_KEY = re.compile(
 
 def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
     """(the path as messages show it, the tables of the file), not yet validated."""
-    try:
-        shown = os.fsdecode(os.fspath(path))
-    except TypeError:
-        raise SceneError(f"expected the path of a scene file, found {path!r:.60}") from None
-    where = shown if shown.isprintable() else ascii(shown)
-    suffix = Path(shown).suffix.lower()
-    if suffix not in (".toml", ".json"):
-        raise SceneError(
-            f"{where}: expected a scene file ending in .toml or .json; rename it if it is one"
-        )
-    text = _text(Path(shown), where)
-    data = _toml(text, where) if suffix == ".toml" else _json(text, where)
+    where, content = content_of(path, MAX_SIZE, "a scene file")
+    text = _text(content, where)
+    data = _json(text, where) if _ending(path) == ".json" else _toml(text, where)
     return where, data
 
 
-def _text(path: Path, where: str) -> str:
-    content = _content(path, where)
+def content_of(
+    path: str | os.PathLike[str], limits: Mapping[str, int], what: str
+) -> tuple[str, bytes]:
+    """(the path as messages show it, the bytes of the file).  `limits` has the endings that are
+    read, and the largest file of each in MB.  Raises SceneError."""
+    try:
+        shown = os.fsdecode(os.fspath(path))
+    except TypeError:
+        raise SceneError(f"expected the path of {what}, found {path!r:.60}") from None
+    where = shown if shown.isprintable() else ascii(shown)
+    if _ending(shown) not in limits:
+        raise SceneError(
+            f"{where}: expected {what} ending in {' or '.join(limits)}; rename it if it is one"
+        )
+    return where, _content(Path(shown), where, limits)
+
+
+def _ending(path: str | os.PathLike[str]) -> str:
+    return Path(os.fsdecode(path)).suffix.lower()
+
+
+def _text(content: bytes, where: str) -> str:
     if not content.strip():
         raise SceneError(f"{where}: the file is empty; a scene begins with gravity = [0, -9.81, 0]")
     if b"\0" in content:
@@ -54,36 +71,33 @@ def _text(path: Path, where: str) -> str:
         ) from None
 
 
-def _content(path: Path, where: str) -> bytes:
+def _content(path: Path, where: str, limits: Mapping[str, int]) -> bytes:
     try:
         status = path.stat()
         if stat.S_ISDIR(status.st_mode):
-            raise SceneError(f"{where}: this is a folder; name the scene file inside it")
+            raise SceneError(f"{where}: this is a folder; name the file inside it")
         if not stat.S_ISREG(status.st_mode):
-            raise SceneError(f"{where}: this is not a regular file; name a scene file")
+            raise SceneError(f"{where}: this is not a regular file; name one")
         ending = path.suffix.lower()
-        limit = MAX_SIZE[ending]
+        limit = limits[ending]
         if status.st_size > limit * 2**20:
-            way_out = "build large scenes in Python, repeated bodies with [[chain]]"
-            if ending == ".toml":
-                way_out += f", or write JSON, up to {MAX_SIZE['.json']} MB"
             raise SceneError(
-                f"{where}: the file has {status.st_size / 2**20:.0f} MB, the limit is {limit} MB; "
-                + way_out
+                f"{where}: the file has {status.st_size / 2**20:.0f} MB, the limit is {limit} MB"
+                + _LARGER.get(ending, "")
             )
         with path.open("rb") as file:
             return file.read(limit * 2**20 + 1)
     except FileNotFoundError:
-        raise SceneError(f"{where}: there is no such file{_neighbour(path)}") from None
+        raise SceneError(f"{where}: there is no such file{_neighbour(path, limits)}") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise SceneError(f"{where}: cannot be read: {reason}") from None
 
 
-def _neighbour(path: Path) -> str:
+def _neighbour(path: Path, endings: Collection[str]) -> str:
     """A file beside the missing one with a similar name."""
     try:
-        names = [p.name for p in path.parent.iterdir() if p.suffix.lower() in (".toml", ".json")]
+        names = [p.name for p in path.parent.iterdir() if p.suffix.lower() in endings]
     except OSError:
         return "; check the folder"
     hint = near(path.name, names)

@@ -1,7 +1,8 @@
-"""A scene as TOML, every default filled in."""
+"""A scene as TOML."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ...ir.facts import builtin_hinges
@@ -17,28 +18,29 @@ def to_toml(scene: SceneTables, evaluated: bool = False) -> str:
     """TOML text that loads back to an equal scene; `evaluated`, numbers that are written as
     expressions of named constants are numbers alone."""
     data = scene.model_dump(by_alias=True)
+    for hinge in data["hinge"]:
+        facts = builtin_hinges().get(hinge["type"])
+        if facts is not None and facts.frame == "plane":
+            hinge["axis"] = None  # it is the normal
+    return as_toml(data, evaluated)
+
+
+def as_toml(data: Mapping[str, Any], evaluated: bool = False) -> str:
+    """TOML text of the keys of a scene, without those that have no value."""
     lines = [
         f"{key} = {_value(value, evaluated)}"
         for key, value in data.items()
-        if (not isinstance(value, tuple) or key == "gravity") and value != {}
+        if key not in TABLES and value not in (None, {}, ())
     ]
     for table in TABLES:
-        for element in data[table]:
-            lines += ["", f"[[{table}]]", f"name = {_value(element['name'], evaluated)}"]
+        for element in data.get(table, ()):
+            named = {"name": element["name"], **element} if "name" in element else element
+            lines += ["", f"[[{table}]]"]
             lines += [
                 f"{key} = {_value(value, evaluated)}"
-                for key, value in element.items()
-                if key != "name" and _is_written(table, element, key, value)
-            ]
+                for key, value in named.items() if value is not None and value != {}
+            ]  # fmt: skip
     return "\n".join(lines) + "\n"
-
-
-def _is_written(table: str, element: dict[str, Any], key: str, value: Any) -> bool:
-    """Leave out what TOML cannot say (nothing) and what a built-in type does not take."""
-    if value is None or value == {}:
-        return False
-    facts = builtin_hinges().get(element["type"]) if table == "hinge" else None
-    return not (key == "axis" and facts is not None and facts.frame == "plane")  # it is the normal
 
 
 def _value(value: Any, evaluated: bool) -> str:

@@ -1,0 +1,73 @@
+"""`mstmm import`: a robot's file as a scene."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .options import Json, output_file, positive
+
+if TYPE_CHECKING:
+    from mstmm.scene.robots.robot import Note
+
+#: So many elements of one note are named.
+_NAMED = 4
+
+
+def import_robot(
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="A robot: .urdf, or MJCF (.xml, .mjcf).")
+    ],
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", metavar="FILE", help="The scene, .toml; by default with "
+                     "the robot's name, here."),
+    ] = None,
+    base: Annotated[
+        str,
+        typer.Option("--base", metavar="fixed|free", help="Whether the base stands on the ground "
+                     "or flies."),
+    ] = "fixed",
+    keep_fixed: Annotated[
+        bool,
+        typer.Option("--keep-fixed", help="Keep links on fixed joints as bodies of their own."),
+    ] = False,
+    stops: Annotated[
+        float | None,
+        typer.Option("--stops", metavar="STIFFNESS", parser=positive, help="Make the limits of "
+                     "joints stops of this stiffness (N m/rad or N/m)."),
+    ] = None,
+    json: Json = False,
+) -> None:  # fmt: skip
+    """Write the scene of a robot, and tell what of the file a scene has not."""
+    import mstmm
+
+    from .output import emit_json, say
+
+    target = output_file(output or f"{Path(robot).stem}.toml", (".toml",))
+    found = mstmm.import_robot(robot, base=base, merge=not keep_fixed, stops=stops)
+    target.write_text(found.to_toml(), encoding="utf-8")
+    if json:
+        notes = [{"where": n.where, "element": n.element, "text": n.text} for n in found.notes]
+        emit_json({"scene": str(target), "names": dict(found.names), "notes": notes})
+        return
+    for line in _together(found.notes):
+        say(line)
+    say(f"{target}: {found.scene.summary}")
+
+
+def _together(notes: Iterable[Note]) -> list[str]:
+    """A line for each text, with what it is about."""
+    about = defaultdict[str, list[str]](list)
+    for note in notes:
+        about[note.text].append(note.element)
+    return [f"{_some(elements)}: {text}" for text, elements in about.items()]
+
+
+def _some(elements: list[str]) -> str:
+    more = len(elements) - _NAMED
+    return ", ".join(elements[:_NAMED]) + (f" and {more} more" if more > 0 else "")

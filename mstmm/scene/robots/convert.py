@@ -1,0 +1,262 @@
+"""A robot -> a scene, with a note for everything that a scene has not, or has otherwise."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ...errors import SceneError
+from ...numbers.rotations import IDENTITY, to_quaternion
+from ..files.write import as_toml
+from ..rules.inertia import triangle_excess
+from ..rules.messages import near
+from ..rules.values import GROUND
+from ..scene import Scene
+from .masses import welded
+from .names import Names
+from .robot import FIXED, IN_PLACE, NOTHING, Joint, Link, Mimic, Note, Pose, Robot
+from .tree import Tree
+
+BASES = (FIXED, "free")
+
+
+@dataclass(frozen=True)
+class Choices:
+    """How a robot becomes a scene.
+
+    base: "fixed" on the ground, or "free".  merge: links on fixed joints become part of the body
+    that holds them; their frames are ends of it.  stops: stiffness (N/m or N m/rad) of the stops at
+    the limits of joints, None: no stops.
+    """
+
+    base: str = FIXED
+    merge: bool = True
+    stops: float | None = None
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A scene, what became of the file's names, and notes.
+
+    `names` has for each link the body or end that it is ("ground" for what is part of it), and for
+    each joint that moves its hinge.
+    """
+
+    scene: Scene
+    names: Mapping[str, str]
+    notes: tuple[Note, ...]
+    tables: Mapping[str, Any]
+
+    def to_toml(self) -> str:
+        """The scene as TOML, without what is as it is by default."""
+        return as_toml(self.tables)
+
+
+def converted(robot: Robot, choices: Choices, folder: Path | None = None) -> Imported:
+    """The scene of a robot; its meshes are beside it in `folder`.  Raises SceneError."""
+    tree = Tree(robot)
+    writer = _Writer(robot, tree, choices)
+    if choices.merge and not writer.bodies():
+        writer = _Writer(robot, tree, replace(choices, merge=False))
+    if not writer.bodies():
+        raise SceneError(f'{robot.where}: nothing in it moves or has mass; try base = "free"')
+    data = writer.tables(folder)
+    return Imported(Scene.from_data(data, robot.where), writer.names, tuple(writer.notes), data)
+
+
+class _Writer:
+    """Tables of the scene of a robot."""
+
+    def __init__(self, robot: Robot, tree: Tree, choices: Choices) -> None:
+        self.robot, self.tree, self.choices = robot, tree, choices
+        self.notes = list(robot.notes)
+        self.mimics = list(self._known_mimics())
+        self.held = {joint.name for joint in tree.weightless()}
+        for name in sorted(self.held, key=list(tree.joints).index):
+            what = "nothing that it carries has mass, so it is held fixed"
+            self._tell(tree.joints[name], f"joint {name!r}", what)
+        #: Link -> the link whose body it is part of, or the ground, and its frame there.
+        self.place = dict[str, tuple[str, Pose]]()
+        for link in tree.outward:
+            self.place[link.name] = self._placed(link)
+        self._names = Names()
+        self._bodies = {name: self._names.take(name, "link") for name in self.bodies()}
+        hinges = Names()
+        self._hinges = {
+            joint.name: hinges.take(joint.name, "joint") for joint in robot.joints
+            if self.place[joint.child][0] == joint.child
+        }  # fmt: skip
+        self._roots = {name: hinges.take(f"{name}_base", "link")
+                       for name in tree.roots if name in self._bodies}  # fmt: skip
+        self._ends: defaultdict[str, dict[str, Any]] = defaultdict(dict)
+        self.names = {link.name: self._frame(link) for link in robot.links} | self._hinges
+
+    def bodies(self) -> list[str]:
+        """Links that are bodies, in the order of the file."""
+        return [link.name for link in self.robot.links if self.place[link.name][0] == link.name]
+
+    def tables(self, folder: Path | None) -> dict[str, Any]:
+        """The keys of the scene."""
+        found: dict[str, Any] = {"gravity": self.robot.gravity}
+        found["hinge"] = [*map(self._root, self._roots), *self._joints()]
+        parts: defaultdict[str, list[tuple[Link, Pose]]] = defaultdict(list)
+        for link in self.robot.links:
+            owner, pose = self.place[link.name]
+            parts[owner].append((link, pose))
+        found["body"] = [self._body(name, parts[name]) for name in self._bodies]
+        if couplings := list(self._couplings()):
+            found["coupling"] = couplings
+        if shapes := list(self._shapes(folder)):
+            found["shape"] = shapes
+        return found
+
+    def _tell(self, one: Link | Joint, element: str, text: str) -> None:
+        self.notes.append(Note(one.where, element, text))
+
+    def _placed(self, link: Link) -> tuple[str, Pose]:
+        joint = self.tree.holder.get(link.name)
+        if joint is None:
+            empty = link.mass == 0 and link.inertia == NOTHING
+            grounded = self.choices.base == FIXED and (empty or self.choices.merge)
+            return (GROUND if grounded else link.name), IN_PLACE
+        if self.choices.merge and (joint.type == FIXED or joint.name in self.held):
+            owner, pose = self.place[joint.parent]
+            return owner, pose.then(joint.pose)
+        return link.name, IN_PLACE
+
+    def _frame(self, link: Link) -> str:
+        """The body or the end that a link is."""
+        owner, pose = self.place[link.name]
+        if owner == GROUND:
+            return GROUND
+        return self._end(owner, pose, link.name)
+
+    def _end(self, owner: str, pose: Pose, name: str) -> str:
+        """The reference of a frame of a body: the body, an end that is there, or a new one."""
+        body, ends = self._bodies[owner], self._ends[owner]
+        if pose == IN_PLACE:
+            return body
+        end = _keys(pose)
+        for known, other in ends.items():
+            if other == end:
+                return f"{body}.{known}"
+        names = Names()
+        for known in ends:
+            names.take(known, "end")
+        taken = names.take(name, "end")
+        ends[taken] = end
+        return f"{body}.{taken}"
+
+    def _body(self, name: str, parts: list[tuple[Link, Pose]]) -> dict[str, Any]:
+        mass, center, m = welded(parts)
+        table: dict[str, Any] = {"name": self._bodies[name], "mass": mass}
+        if any(center):
+            table["center_of_mass"] = center
+        if m != NOTHING:
+            table["inertia"] = (m[0][0], m[1][1], m[2][2], m[0][1], m[0][2], m[1][2])
+            if why := triangle_excess(m):
+                table["allow_unphysical_inertia"] = True
+                self._tell(parts[0][0], f"link {name!r}", f"taken as it is: {why}")
+        if self._ends[name]:
+            table["ends"] = self._ends[name]
+        return table
+
+    def _root(self, name: str) -> dict[str, Any]:
+        body, hinge = self._bodies[name], self._roots[name]
+        return {"name": hinge, "type": self.choices.base, "inboard": GROUND, "outboard": body}
+
+    def _joints(self) -> Iterator[dict[str, Any]]:
+        start = self._starts()
+        for name, hinge in self._hinges.items():
+            joint = self.tree.joints[name]
+            still = joint.name in self.held
+            owner, frame = self.place[joint.parent]
+            pose, grounded = frame.then(joint.pose), owner == GROUND
+            yield {
+                "name": hinge,
+                "type": FIXED if still else joint.type,
+                "inboard": GROUND if grounded else self._end(owner, pose, name),
+                "outboard": self._bodies[joint.child],
+                **(_keys(pose) if grounded else {}),
+                **({} if still else self._motion(joint, start.get(name))),
+            }
+
+    def _motion(self, joint: Joint, start: float | None) -> dict[str, Any]:
+        keys = dict(joint.keys)
+        law = dict(keys.pop("law", {}))
+        if limits := law.pop("limits", None):
+            if self.choices.stops is None:
+                self._tell(joint, f"joint {joint.name!r}", "its limits are no stops here")
+            else:
+                law["limits"] = {**limits, "stiffness": self.choices.stops}
+        if law:
+            keys["law"] = law
+        if start is not None:
+            keys["initial"] = {"q": [start]}
+        return keys
+
+    def _known_mimics(self) -> Iterator[Mimic]:
+        for mimic in self.robot.mimics:
+            if mimic.other in self.tree.joints:
+                yield mimic
+                continue
+            what = f"left free: it mimics {mimic.other!r}, which is not there"
+            what += near(mimic.other, self.tree.joints)
+            self._tell(self.tree.joints[mimic.of], f"joint {mimic.of!r}", what)
+
+    def _couplings(self) -> Iterator[dict[str, Any]]:
+        for mimic, joint in self._mimics():
+            own, other = self._hinges[mimic.of], self._hinges.get(mimic.other)
+            moves = other is not None and mimic.other not in self.held
+            row = f"{own}.q - {mimic.multiplier!r}*{other}.q" if moves else f"{own}.q"
+            row = row.replace("- -", "+ ")
+            yield {"name": f"{own}_mimics", "expression": row, "equals": mimic.offset}
+            what = f"goes with {mimic.other!r}, by a coupling"
+            self._tell(joint, f"joint {mimic.of!r}", what)
+
+    def _mimics(self) -> Iterator[tuple[Mimic, Joint]]:
+        """Those of joints that move."""
+        for mimic in self.mimics:
+            joint = self.tree.joints[mimic.of]
+            if mimic.of in self._hinges and mimic.of not in self.held:
+                yield mimic, joint
+
+    def _starts(self) -> dict[str, float]:
+        """Start values of the joints that go with others, which start at 0."""
+        mimics = {mimic.of: mimic for mimic, _ in self._mimics()}
+
+        def start(name: str, asked: frozenset[str]) -> float:
+            mimic = mimics.get(name)
+            if mimic is None:
+                return 0.0
+            if name in asked:
+                joint = self.tree.joints[name]
+                raise SceneError(f"{joint.where}: joint {name!r} mimics itself in the end")
+            return mimic.multiplier * start(mimic.other, asked | {name}) + mimic.offset
+
+        found = {name: start(name, frozenset()) for name in mimics}
+        return {name: q for name, q in found.items() if q != 0}
+
+    def _shapes(self, folder: Path | None) -> Iterator[dict[str, Any]]:
+        for look in self.robot.looks:
+            owner, frame = self.place[look.link]
+            pose, keys = frame.then(look.pose), dict(look.keys)
+            if file := keys.get("file"):
+                if folder is None or not (folder / file).is_file():
+                    link = self.tree.links[look.link]
+                    self._tell(link, f"link {look.link!r}", f"no mesh {file!r} to draw it with")
+                    continue
+                keys["file"] = str(folder / file)
+            on = GROUND if owner == GROUND else self._bodies[owner]
+            yield {"on": on, **_keys(pose), **keys}
+
+
+def _keys(pose: Pose) -> dict[str, Any]:
+    """A place, and axes where they are turned."""
+    turned = pose.rotation != IDENTITY
+    return {"position": pose.position} | (
+        {"orientation": to_quaternion(pose.rotation)} if turned else {}
+    )

@@ -1,0 +1,48 @@
+"""Files of robots: which endings are read, and by whom."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ...errors import SceneError
+from ..files.read import content_of
+from .convert import BASES, Choices, Imported, converted
+from .mjcf import read_mjcf
+from .urdf import read_urdf
+
+#: Endings, and the largest file of each in MB.
+ENDINGS = {".urdf": 16, ".xml": 16, ".mjcf": 16}
+
+
+def is_robot(path: str | os.PathLike[str]) -> bool:
+    """Whether the name of a file ends as that of a robot."""
+    return os.path.splitext(os.fsdecode(path))[1].lower() in ENDINGS
+
+
+def import_robot(
+    path: str | os.PathLike[str], base: str = "fixed", merge: bool = True,
+    stops: float | None = None,
+) -> Imported:  # fmt: skip
+    """The scene of a robot's file, what became of its names, and notes on what differs.
+
+    URDF is read as it is; MJCF (.xml, .mjcf) by MuJoCo, extra `robot`.
+
+    base: "fixed" on the ground, or "free".  merge: links on fixed joints become part of the body
+    that holds them, and their frames ends of it.  stops: stiffness (N/m or N m/rad) of stops at the
+    limits of joints; without it there are none.  Raises SceneError, and EnvironmentFailure where
+    MuJoCo is needed and not there.
+    """
+    if base not in BASES:
+        raise SceneError(f'base: expected "fixed" or "free", found {base!r:.40}')
+    if stops is not None and not 0 < stops < float("inf"):
+        raise SceneError(f"stops: expected a stiffness above 0 in N m/rad or N/m, found {stops!r}")
+    where, content = content_of(path, ENDINGS, "a robot's file")
+    full = Path(os.fsdecode(path)).absolute()
+    if full.suffix.lower() == ".urdf":
+        robot = read_urdf(content, where)
+    elif base == "free":
+        raise SceneError(f'{where}: base = "free" is for URDF; in MJCF a <freejoint> says so')
+    else:
+        robot = read_mjcf(str(full), where)
+    return converted(robot, Choices(base, merge, stops), full.parent)

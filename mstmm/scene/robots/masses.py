@@ -1,0 +1,47 @@
+"""Links welded into one body: its mass, mass centre and inertia."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...numbers.rotations import Matrix, Vector, product, transpose
+from .robot import IN_PLACE, NOTHING, ZERO, Link, Pose
+
+
+def welded(parts: Sequence[tuple[Link, Pose]]) -> tuple[float, Vector, Matrix]:
+    """Mass (kg), mass centre (m) and inertia about it (kg m^2) of links, each with its frame in
+    the axes of the body, in these axes."""
+    if len(parts) == 1 and parts[0][1] == IN_PLACE:
+        link = parts[0][0]
+        return link.mass, link.center, link.inertia
+    mass = sum(link.mass for link, _ in parts)
+    places = [pose.then(Pose(link.center)).position for link, pose in parts]
+    center = ZERO
+    if mass > 0:
+        x, y, z = (
+            sum(link.mass * place[i] for (link, _), place in zip(parts, places, strict=True)) / mass
+            for i in range(3)
+        )
+        center = (x, y, z)
+    inertia = NOTHING
+    for (link, pose), place in zip(parts, places, strict=True):
+        turned = product(product(pose.rotation, link.inertia), transpose(pose.rotation))
+        arm = [place[i] - center[i] for i in range(3)]
+        inertia = _plus(inertia, turned, link.mass, arm)
+    return mass, center, inertia
+
+
+def _plus(total: Matrix, inertia: Matrix, mass: float, arm: Sequence[float]) -> Matrix:
+    """Steiner: J + m (a.a 1 - a a^T)."""
+    square = sum(a * a for a in arm)
+    rows = [
+        tuple(
+            total[i][j]
+            + (inertia[i][j] + inertia[j][i]) / 2
+            + mass * ((square if i == j else 0.0) - arm[i] * arm[j])
+            for j in range(3)
+        )
+        for i in range(3)
+    ]
+    a, b, c = rows
+    return ((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2]))

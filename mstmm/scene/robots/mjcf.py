@@ -1,0 +1,251 @@
+"""MJCF -> a robot, by the model that MuJoCo compiles from it (extra `robot`).
+
+A body's frame is placed in its parent's; its joints, each about an anchor of its own, move it one
+after the other.  The link of a body has its origin at the anchor of the last one; the joints before
+it move links without mass.  Values of joints are MuJoCo's qpos.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from ...errors import SceneError
+from ...extras import missing
+from ...numbers.rotations import (
+    Matrix,
+    Vector,
+    about,
+    from_quaternion,
+    product,
+    transpose,
+)
+from .robot import (
+    FIXED,
+    IN_PLACE,
+    NOTHING,
+    ZERO,
+    Joint,
+    Link,
+    Look,
+    Mimic,
+    Note,
+    Pose,
+    Robot,
+    color,
+)
+
+_FREE, _BALL, _SLIDE = 0, 1, 2
+_HINGES = ("free", "ball", "prismatic", "pin")
+#: What of a model moves something and is left out, by the name of its count.
+_LEFT = {
+    "nu": "actuators", "ntendon": "tendons", "nsensor": "sensors", "nplugin": "plugins",
+    "nflex": "flexible parts", "npair": "pairs that touch",
+}  # fmt: skip
+_JOINT_EQUALITY = 2
+#: Groups of shapes that are there to be seen.
+_SEEN = 3
+
+
+def read_mjcf(path: str, where: str) -> Robot:
+    """The robot of a file, `where` as messages show its name.
+
+    Raises SceneError for what MuJoCo does not compile, EnvironmentFailure without MuJoCo.
+    """
+    try:
+        import mujoco
+    except ImportError as error:
+        raise missing("robot", f"{where}: MJCF", error) from None
+    try:
+        model = mujoco.MjModel.from_xml_path(path)
+    except (ValueError, OSError) as error:
+        why = " ".join(str(error).split())
+        raise SceneError(f"{where}: MuJoCo does not read it: {why}") from None
+    return _Reader(mujoco, model, where).robot()
+
+
+class _Reader:
+    """Reads a compiled model."""
+
+    def __init__(self, mujoco: Any, model: Any, where: str) -> None:
+        self._mujoco, self._m, self._where = mujoco, model, where
+        self._notes = list[Note]()
+        #: Body -> where its frame is in its link.
+        self._frame = {0: IN_PLACE}
+
+    def robot(self) -> Robot:
+        """The robot of the model."""
+        links, joints = [Link("world", where=self._where)], list[Joint]()
+        for body in range(1, self._m.nbody):
+            for link, joint in self._body(body):
+                links.append(link)
+                joints.append(joint)
+        mimics = tuple(self._mimics())
+        looks = tuple(self._looks())
+        self._leave_out()
+        return Robot(
+            "", self._where, tuple(links), tuple(joints), mimics, looks, tuple(self._notes),
+            _vector(self._m.opt.gravity),
+        )  # fmt: skip
+
+    def _tell(self, element: str, text: str) -> None:
+        self._notes.append(Note(self._where, element, text))
+
+    def _name(self, kind: str, number: int) -> str:
+        found = self._mujoco.mj_id2name(
+            self._m, getattr(self._mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), number
+        )
+        return found or f"{kind}{number}"
+
+    def _link_of(self, body: int) -> str:
+        return "world" if body == 0 else self._name("body", body)
+
+    def _body(self, body: int) -> Iterator[tuple[Link, Joint]]:
+        """The links of a body and the joints that hold them, outward."""
+        m, name = self._m, self._link_of(body)
+        first, count = int(m.body_jntadr[body]), int(m.body_jntnum[body])
+        parent = int(m.body_parentid[body])
+        holder = self._link_of(parent)
+        at = Pose(_vector(m.body_pos[body]), _turn(m.body_quat[body]))
+        pose, anchor = self._frame[parent].then(at), ZERO
+        if count == 0:
+            self._frame[body] = IN_PLACE
+            yield self._mass(body, name), Joint(f"{name}/weld", FIXED, holder, name, pose)
+            return
+        for number in range(first, first + count):
+            kind, last = int(m.jnt_type[number]), number == first + count - 1
+            place = ZERO if kind == _FREE else _vector(m.jnt_pos[number])
+            moved = IN_PLACE if kind == _FREE else pose.then(Pose(_minus(place, anchor)))
+            joint = self._name("joint", number)
+            held = name if last else f"{name}/{joint}"
+            moved = moved.then(self._back(number, kind))
+            if last:
+                self._frame[body] = Pose(_minus(ZERO, place))
+            link = self._mass(body, held) if last else Link(held, where=self._where)
+            keys = self._keys(number, kind, joint)
+            yield link, Joint(joint, _HINGES[kind], holder, held, moved, keys, self._where)
+            holder, pose, anchor = held, IN_PLACE, place
+        if any(anchor):
+            frame = f"{name}/frame"
+            weld = Joint(frame, FIXED, name, frame, self._frame[body])
+            yield Link(frame, where=self._where), weld
+
+    def _mass(self, body: int, name: str) -> Link:
+        """The link with the body's mass, seen from the link's frame."""
+        m, frame = self._m, self._frame[body]
+        mass = float(m.body_mass[body])
+        if mass == 0 and not m.body_inertia[body].any():
+            return Link(name, where=self._where)
+        turn = _turn(m.body_iquat[body])
+        a, b, c = map(float, m.body_inertia[body])
+        principal: Matrix = ((a, 0.0, 0.0), (0.0, b, 0.0), (0.0, 0.0, c))
+        inertia = product(product(turn, principal), transpose(turn))
+        center = frame.then(Pose(_vector(m.body_ipos[body]))).position
+        return Link(name, mass, center, inertia if any((a, b, c)) else NOTHING, self._where)
+
+    def _back(self, number: int, kind: int) -> Pose:
+        """From where a joint is at its reference to where it is at 0."""
+        if kind in (_FREE, _BALL):
+            return IN_PLACE
+        reference = float(self._m.qpos0[self._m.jnt_qposadr[number]])
+        if reference == 0:
+            return IN_PLACE
+        axis = _vector(self._m.jnt_axis[number])
+        if kind == _SLIDE:
+            x, y, z = axis
+            return Pose((-reference * x, -reference * y, -reference * z))
+        return Pose(rotation=about(axis, -reference))
+
+    def _keys(self, number: int, kind: int, joint: str) -> dict[str, Any]:
+        m, dof, at = self._m, int(self._m.jnt_dofadr[number]), int(self._m.jnt_qposadr[number])
+        stop, values = dof + (6, 3, 1, 1)[kind], at + (7, 4, 1, 1)[kind]
+        law: dict[str, Any] = {}
+        for key, numbers in (("damping", m.dof_damping), ("inertia", m.dof_armature)):
+            if (found := [float(x) for x in numbers[dof:stop]]) and any(found):
+                law[key] = found
+        if any(losses := [float(x) for x in m.dof_frictionloss[dof:stop]]):
+            law["friction"] = [{"coulomb": x} for x in losses]
+        stiffness = float(m.jnt_stiffness[number].flat[0])
+        if stiffness and kind in (_FREE, _BALL):
+            self._tell(f"joint {joint!r}", "its spring is left out; give its hinge a law")
+        elif stiffness:
+            law |= {"stiffness": stiffness, "rest": float(m.qpos_spring[at])}
+        if m.jnt_limited[number]:
+            if kind == _BALL:
+                self._tell(f"joint {joint!r}", "its limit is left out")
+            else:
+                lower, upper = map(float, m.jnt_range[number])
+                law["limits"] = {"lower": lower, "upper": upper}
+        keys: dict[str, Any] = {"law": law} if law else {}
+        if kind not in (_FREE, _BALL):
+            keys["axis"] = _vector(m.jnt_axis[number])
+        start = [float(x) for x in m.qpos0[at:values]]
+        return keys | ({"initial": {"q": start}} if any(start) else {})
+
+    def _mimics(self) -> Iterator[Mimic]:
+        """Equalities of joints that are straight lines."""
+        m, others = self._m, 0
+        for number in range(m.neq):
+            line = [float(x) for x in m.eq_data[number][:5]]
+            one, other = int(m.eq_obj1id[number]), int(m.eq_obj2id[number])
+            if m.eq_type[number] != _JOINT_EQUALITY or other < 0 or any(line[2:]):
+                others += 1
+                continue
+            first, second = (float(m.qpos0[m.jnt_qposadr[each]]) for each in (one, other))
+            offset = first + line[0] - line[1] * second
+            yield Mimic(self._name("joint", one), self._name("joint", other), line[1], offset)
+        if others:
+            self._tell("equality", f"left out, {others} of them")
+
+    def _looks(self) -> Iterator[Look]:
+        m, kinds, unseen = self._m, self._mujoco.mjtGeom, 0
+        for number in range(m.ngeom):
+            if m.geom_group[number] >= _SEEN or m.geom_type[number] == kinds.mjGEOM_PLANE:
+                continue
+            keys = _solid(kinds, int(m.geom_type[number]), [float(x) for x in m.geom_size[number]])
+            if keys is None:
+                unseen += 1
+                continue
+            body = int(m.geom_bodyid[number])
+            at = Pose(_vector(m.geom_pos[number]), _turn(m.geom_quat[number]))
+            keys["color"] = color(m.geom_rgba[number][:3])
+            yield Look(self._link_of(body), self._frame[body].then(at), keys)
+        if unseen:
+            self._tell("geom", f"{unseen} of them are not drawn (meshes, ellipsoids, heights)")
+
+    def _leave_out(self) -> None:
+        m = self._m
+        for key, what in _LEFT.items():
+            if count := int(getattr(m, key, 0)):
+                self._tell(what, f"left out, {count} of them")
+        if m.ngeom and (m.geom_contype.any() or m.geom_conaffinity.any()):
+            self._tell("contacts", "left out: bodies go through each other and the ground")
+        if m.body_gravcomp.any():
+            self._tell("gravcomp", "left out")
+        if m.opt.density > 0 or m.opt.viscosity > 0:
+            self._tell("fluid", "its forces are left out")
+
+
+def _solid(kinds: Any, kind: int, size: list[float]) -> dict[str, Any] | None:
+    """The keys of a shape; MuJoCo has half lengths."""
+    if kind == kinds.mjGEOM_SPHERE:
+        return {"type": "sphere", "radius": size[0]}
+    if kind == kinds.mjGEOM_BOX:
+        return {"type": "box", "size": [2 * x for x in size]}
+    for name in ("capsule", "cylinder"):
+        if kind == getattr(kinds, f"mjGEOM_{name.upper()}"):
+            return {"type": name, "radius": size[0], "length": 2 * size[1]}
+    return None
+
+
+def _vector(numbers: Any) -> Vector:
+    x, y, z = map(float, numbers)
+    return (x, y, z)
+
+
+def _turn(quaternion: Any) -> Matrix:
+    return from_quaternion([float(x) for x in quaternion])
+
+
+def _minus(a: Vector, b: Vector) -> Vector:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

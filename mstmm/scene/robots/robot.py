@@ -1,0 +1,105 @@
+"""A robot as the formats of others have it: links joined by joints, in frames of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from ...numbers.rotations import IDENTITY, Matrix, Vector, apply, product
+
+FIXED = "fixed"
+ZERO: Vector = (0.0, 0.0, 0.0)
+NOTHING: Matrix = (ZERO, ZERO, ZERO)
+
+
+class Pose(NamedTuple):
+    """A frame in another one: its origin (m) and its axes."""
+
+    position: Vector = ZERO
+    rotation: Matrix = IDENTITY
+
+    def then(self, inner: Pose) -> Pose:
+        """A frame given in this one, in the one that this one is given in."""
+        x, y, z = apply(self.rotation, inner.position)
+        a, b, c = self.position
+        return Pose((a + x, b + y, c + z), product(self.rotation, inner.rotation))
+
+
+#: The frame itself.
+IN_PLACE = Pose()
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid body: mass (kg), mass centre (m) and inertia about it (kg m^2), in its own axes."""
+
+    name: str
+    mass: float = 0.0
+    center: Vector = ZERO
+    inertia: Matrix = NOTHING
+    where: str = ""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What joins two links, of a type of hinge: `pose` is the child's frame in the parent's at
+    q = 0; `keys` are more of its [[hinge]]."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    pose: Pose = IN_PLACE
+    keys: Mapping[str, Any] = field(default_factory=dict)
+    where: str = ""
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """The joint `of` goes with another one: q = multiplier q_other + offset."""
+
+    of: str
+    other: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a link looks like: a [[shape]] in its axes, without the names."""
+
+    link: str
+    pose: Pose
+    keys: Mapping[str, Any]
+
+
+def color(rgb: Iterable[float]) -> str:
+    """Red, green and blue, 0 to 1, as a scene has them."""
+    return "#" + "".join(f"{round(255 * min(max(float(x), 0.0), 1.0)):02x}" for x in rgb)
+
+
+@dataclass(frozen=True)
+class Note:
+    """What became of something in the file that a scene has not, or has otherwise."""
+
+    where: str
+    element: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.element}: {self.text}"
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Links, joints and looks in the order of the file."""
+
+    name: str
+    where: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    mimics: tuple[Mimic, ...] = ()
+    looks: tuple[Look, ...] = ()
+    notes: tuple[Note, ...] = ()
+    gravity: Vector = (0.0, 0.0, -9.81)

@@ -1,0 +1,222 @@
+"""URDF -> a robot.
+
+A link's axes are those of the joint that holds it; a joint's axis is in these, its origin in the
+parent's; <inertial> has a frame of its own, about whose origin the inertia is.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import PurePosixPath
+from typing import Any, NamedTuple
+
+from ...errors import SceneError
+from ...numbers.rotations import Matrix, Vector, from_rpy, perpendicular, product, transpose
+from ..rules.inertia import negative_moment
+from ..rules.messages import near
+from .markup import Element, parsed
+from .robot import FIXED, IN_PLACE, Joint, Link, Look, Mimic, Note, Pose, Robot, color
+
+
+class _Kind(NamedTuple):
+    """A type of joint: its hinge, the key of the axis if it has one, and the unit of its one
+    coordinate."""
+
+    joint: str
+    hinge: str
+    axis: str = ""
+    unit: str = ""
+
+
+_KINDS = {
+    kind.joint: kind
+    for kind in (
+        _Kind("revolute", "pin", "axis", "rad"), _Kind("continuous", "pin", "axis", "rad"),
+        _Kind("prismatic", "prismatic", "axis", "m"), _Kind("planar", "planar", "normal"),
+        _Kind("fixed", FIXED), _Kind("floating", "free"), _Kind("spherical", "ball"),
+    )
+}  # fmt: skip
+_UNLIMITED = "continuous"
+_READ = ("link", "joint", "material")
+_MATERIAL = "material"
+
+
+def read_urdf(content: bytes, where: str) -> Robot:
+    """The robot of a file, `where` as messages show its name.  Raises SceneError."""
+    root = parsed(content, where)
+    if root.tag != "robot":
+        raise SceneError(f"{root.where}: expected <robot>, found <{root.tag[:40]}>")
+    if any(child.tag.startswith("xacro:") for child in root.children):
+        raise SceneError(f"{where}: this is a xacro file; expand it first: xacro FILE > robot.urdf")
+    reader = _Reader(root)
+    links = tuple(map(reader.link, root.all("link")))
+    joints = tuple(map(reader.joint, root.all("joint")))
+    left = Counter(child.tag for child in root.children if child.tag not in _READ)
+    for tag, count in left.items():
+        reader.note(root, f"<{tag}>", f"left out, {count} of them" if count > 1 else "left out")
+    name = root.attributes.get("name", "")
+    return Robot(
+        name, where, links, joints, tuple(reader.mimics), tuple(reader.looks), tuple(reader.notes)
+    )
+
+
+class _Reader:
+    """Reads links and joints, and gathers what goes beside them."""
+
+    def __init__(self, root: Element) -> None:
+        self.notes, self.looks, self.mimics = list[Note](), list[Look](), list[Mimic]()
+        self._colors = {
+            one.attributes.get("name", ""): found
+            for one in root.all(_MATERIAL) if (found := _color(one))
+        }  # fmt: skip
+
+    def note(self, at: Element, element: str, text: str) -> None:
+        """Tell what became of something."""
+        self.notes.append(Note(at.where, element, text))
+
+    def link(self, one: Element) -> Link:
+        name = one.text("name")
+        for visual in one.all("visual"):
+            self._look(name, visual)
+        inertial = one.first("inertial")
+        if inertial is None:
+            return Link(name, where=one.where)
+        frame, mass = _pose(inertial), inertial.first("mass")
+        kg = 0.0 if mass is None else mass.number("value", 0.0, "kg")
+        if kg < 0:
+            raise SceneError(
+                f"{inertial.where}: link {name!r}: a mass of {kg:g} kg; expected 0 or more"
+            )
+        inertia = _inertia(inertial.first("inertia"))
+        turned = product(product(frame.rotation, inertia), transpose(frame.rotation))
+        link = Link(name, kg, frame.position, _symmetric(turned), one.where)
+        if negative := negative_moment(inertia):
+            self.note(one, f"link {name!r}", f"taken as it is: {negative}")
+        return link
+
+    def joint(self, one: Element) -> Joint:
+        name, given = one.text("name"), one.text("type")
+        kind = _KINDS.get(given)
+        if kind is None:
+            hint = near(given, _KINDS)
+            raise SceneError(f"{one.where}: joint {name!r}: the type {given!r} is unknown{hint}")
+        ends = []
+        for tag in ("parent", "child"):
+            end = one.first(tag)
+            if end is None:
+                raise SceneError(f"{one.where}: joint {name!r} has no <{tag} link=...>")
+            ends.append(end.text("link"))
+        keys = dict[str, Any]()
+        if kind.axis:
+            axis = self._axis(one, name)
+            keys = {kind.axis: axis} | ({} if kind.unit else {"axis2": perpendicular(axis)})
+        if kind.unit:
+            keys |= self._law(one, name, kind.unit, limited=given != _UNLIMITED)
+        if kind.unit and (mimic := one.first("mimic")) is not None:
+            self.mimics.append(Mimic(
+                name, mimic.text("joint"), mimic.number("multiplier", 1.0, "the other's unit"),
+                mimic.number("offset", 0.0, kind.unit),
+            ))  # fmt: skip
+        return Joint(name, kind.hinge, ends[0], ends[1], _pose(one), keys, one.where)
+
+    def _axis(self, one: Element, name: str) -> Vector:
+        axis = one.first("axis")
+        x, y, z = (1.0, 0.0, 0.0) if axis is None else axis.numbers("xyz", (1.0, 0.0, 0.0), "1")
+        size = x * x + y * y + z * z
+        if size == 0:
+            raise SceneError(f"{one.where}: joint {name!r}: its axis has no direction")
+        if abs(size - 1) > 1e-3:
+            self.note(one, f"joint {name!r}", "its axis has not length 1; its direction counts")
+        return (x, y, z)
+
+    def _law(self, one: Element, name: str, unit: str, limited: bool) -> dict[str, Any]:
+        """Damping and friction act; limits are told, for a stop needs a stiffness."""
+        law: dict[str, Any] = {}
+        if (dynamics := one.first("dynamics")) is not None:
+            for key, its_unit in (("damping", "N m s/rad or N s/m"), ("friction", "N m or N")):
+                number = dynamics.number(key, 0.0, its_unit)
+                if number < 0:
+                    self.note(one, f"joint {name!r}", f"{key} below 0 left out")
+                elif number > 0:
+                    law[key] = number if key == "damping" else {"coulomb": number}
+        limit = one.first("limit")
+        if limit is not None and limited:
+            lower, upper = (limit.number(key, 0.0, unit) for key in ("lower", "upper"))
+            if lower < upper:
+                law["limits"] = {"lower": lower, "upper": upper}
+        if limit is not None and {"effort", "velocity"} & set(limit.attributes):
+            self.note(one, f"joint {name!r}", "limits of effort and velocity left out")
+        return {"law": law} if law else {}
+
+    def _look(self, link: str, visual: Element) -> None:
+        """What cannot be read of it is not drawn, for nothing moves otherwise."""
+        try:
+            self._shape(link, visual)
+        except SceneError as error:
+            self.notes.append(Note(visual.where, f"link {link!r}", f"not drawn: {error}"))
+
+    def _shape(self, link: str, visual: Element) -> None:
+        geometry = visual.first("geometry")
+        if geometry is None or not geometry.children:
+            return
+        solid = geometry.children[0]
+        keys = _solid(solid)
+        if keys is None:
+            self.note(visual, f"link {link!r}", f"a <{solid.tag}> is not drawn")
+            return
+        if (material := visual.first(_MATERIAL)) is not None:
+            found = _color(material) or self._colors.get(material.attributes.get("name", ""))
+            keys |= {"color": found} if found else {}
+        self.looks.append(Look(link, _pose(visual), keys))
+
+
+def _pose(one: Element) -> Pose:
+    origin = one.first("origin")
+    if origin is None:
+        return IN_PLACE
+    x, y, z = origin.numbers("xyz", (0.0, 0.0, 0.0), "m")
+    return Pose((x, y, z), from_rpy(origin.numbers("rpy", (0.0, 0.0, 0.0), "rad")))
+
+
+def _inertia(one: Element | None) -> Matrix:
+    keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    numbers = (0.0 if one is None else one.number(key, 0.0, "kg m^2") for key in keys)
+    xx, xy, xz, yy, yz, zz = numbers
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+
+
+def _symmetric(m: Matrix) -> Matrix:
+    """Without the difference that rounding made."""
+    xy, xz, yz = ((m[i][j] + m[j][i]) / 2 for i, j in ((0, 1), (0, 2), (1, 2)))
+    return ((m[0][0], xy, xz), (xy, m[1][1], yz), (xz, yz, m[2][2]))
+
+
+def _solid(one: Element) -> dict[str, Any] | None:
+    """The keys of a shape; None of one that is not drawn."""
+    if one.tag == "box":
+        size = one.numbers("size", (0.0, 0.0, 0.0), "m")
+        return {"type": "box", "size": size} if min(size) > 0 else None
+    if one.tag == "mesh":
+        file = one.attributes.get("filename", "")
+        return _mesh(file, one.numbers("scale", (1.0, 1.0, 1.0), "1"))
+    lengths: dict[str, float] = {
+        key: one.number(key, 0.0, "m") for key in ("radius", "length") if key in one.attributes
+    }
+    known = {"sphere": ("radius",), "cylinder": ("radius", "length")}.get(one.tag)
+    if known is None or set(known) != set(lengths) or min(lengths.values()) <= 0:
+        return None
+    return {"type": one.tag, **lengths}
+
+
+def _mesh(file: str, scale: Vector | tuple[float, ...]) -> dict[str, Any] | None:
+    """A mesh beside the file, or below its folder; others lie in packages that are not here."""
+    beside = "://" not in file and not PurePosixPath(file).is_absolute()
+    readable = file.lower().endswith((".stl", ".obj")) and ".." not in PurePosixPath(file).parts
+    if not beside or not readable or len(set(scale)) != 1 or scale[0] <= 0:
+        return None
+    return {"type": "mesh", "file": file} | ({"scale": scale[0]} if scale[0] != 1 else {})
+
+
+def _color(material: Element) -> str | None:
+    one = material.first("color")
+    return None if one is None else color(one.numbers("rgba", (0.5, 0.5, 0.5, 1.0), "0 to 1")[:3])

@@ -1,0 +1,37 @@
+"""`mstmm import`: the scene it writes, and what it tells."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from robots.test_urdf import ARM
+
+from cli.commands import Command
+
+
+def test_a_robot_becomes_a_scene_that_runs(mstmm: Command) -> None:
+    Path("arm.urdf").write_text(ARM)
+    done = mstmm("import", "arm.urdf", "--stops", "1e4")
+    assert done.code == 0
+    assert "joint 'other jaw': goes with 'jaw', by a coupling" in done.out
+    assert "arm.toml: 3 bodies, 3 hinges" in done.out.splitlines()[-1]
+    assert mstmm("check", "arm.toml").code == 0
+    assert mstmm("check", "arm.urdf").code == 0
+
+
+def test_names_and_notes_for_programs(mstmm: Command) -> None:
+    Path("arm.urdf").write_text(ARM)
+    done = mstmm("import", "arm.urdf", "-o", "robot.toml", "--keep-fixed", "--json")
+    told = json.loads(done.out)
+    assert told["scene"] == "robot.toml" and told["names"]["1st arm"] == "link_1st_arm"
+    assert ("<transmission>", "left out") in {(n["element"], n["text"]) for n in told["notes"]}
+
+
+def test_bad_input(mstmm: Command) -> None:
+    assert mstmm("import", "none.urdf").code == 2
+    Path("arm.urdf").write_text("<robot>")
+    done = mstmm("import", "arm.urdf")
+    assert done.code == 2 and "not valid XML" in done.err
+    done = mstmm("import", "arm.urdf", "--base", "flying")
+    assert done.code == 2 and 'expected "fixed" or "free"' in done.err

@@ -1,0 +1,204 @@
+"""Robots that are published, and what MJCF can say, against Pinocchio and MuJoCo."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from importlib.metadata import files
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import mstmm
+from mstmm.scene.robots.convert import Choices, Imported, converted
+from mstmm.scene.robots.mjcf import read_mjcf
+from mstmm.scene.robots.robot import Robot
+from mstmm.scene.robots.urdf import read_urdf
+
+
+def published() -> list[Path]:
+    """The URDF files of the package example-robot-data."""
+    found = files("example-robot-data") or ()
+    return sorted(Path(str(one.locate())) for one in found if one.suffix == ".urdf")
+
+
+def of_peers(robot: Robot) -> Robot:
+    """Without what Pinocchio's aba leaves out: laws of joints, and joints that mimic others."""
+    bare = (
+        replace(joint, keys={key: x for key, x in joint.keys.items() if key != "law"})
+        for joint in robot.joints
+    )
+    return replace(robot, mimics=(), joints=tuple(bare))
+
+
+@cache
+def compared() -> dict[str, float]:
+    """Robot and base -> how far accelerations differ, in parts of the largest, beside the
+    condition of its mass matrix."""
+    rng = np.random.default_rng(16)
+    found: dict[str, float] = {}
+    for path in published():
+        robot = of_peers(read_urdf(path.read_bytes(), path.name))
+        if not robot.links:
+            continue  # a file that only includes another
+        for base in ("fixed", "free"):
+            one = converted(robot, Choices(base))
+            if any("held fixed" in note.text for note in one.notes):
+                continue  # Pinocchio divides by no mass there
+            if base == "fixed" and not any(h.type != "fixed" for h in one.scene.hinge):
+                continue
+            found[f"{path.parent.name}/{path.name} {base}"] = difference(path, one, base, rng)
+    return found
+
+
+def difference(path: Path, one: Imported, base: str, rng: np.random.Generator) -> float:
+    root = (pin.JointModelFreeFlyer(),) if base == "free" else ()
+    peer = pin.buildModelFromUrdf(str(path), *root)
+    model = mstmm.compile(one.scene)
+    assert model.nu == peer.nv
+    q, u, efforts = np.zeros(model.nq), np.zeros(model.nu), np.zeros(model.nu)
+    ours, theirs = list[int](), list[int]()
+    at, speeds, pushes = pin.neutral(peer), np.zeros(peer.nv), np.zeros(peer.nv)
+    for number in range(1, peer.njoints):
+        joint, name = peer.joints[number], peer.names[number]
+        if name == "root_joint":
+            flying = next(hinge.name for hinge in one.scene.hinge if hinge.inboard == "ground")
+            slots = model.layout.hinges[flying]
+            turn = rng.normal(size=4)
+            turn /= np.linalg.norm(turn)
+            q[slots.q : slots.q + 7] = [0.1, 0.2, 0.3, turn[3], *turn[:3]]
+            at[:7] = [0.1, 0.2, 0.3, *turn]
+            continue
+        slots = model.layout.hinges[one.names[name]]
+        angle, speed, push = rng.uniform(-1, 1, 3)
+        q[slots.q], u[slots.u], efforts[slots.u] = angle, speed, push
+        circle = joint.nq == 2
+        at[joint.idx_q : joint.idx_q + joint.nq] = (
+            [np.cos(angle), np.sin(angle)] if circle else angle
+        )
+        speeds[joint.idx_v], pushes[joint.idx_v] = speed, push
+        ours.append(slots.u)
+        theirs.append(joint.idx_v)
+    data = peer.createData()
+    wanted = pin.aba(peer, data, at, speeds, pushes)[theirs]
+    got = model.accelerations(q, u, efforts=efforts)[ours]
+    upper = np.triu(pin.crba(peer, data, at))
+    condition = np.linalg.cond(upper + np.triu(upper, 1).T)
+    scale = max(1.0, float(np.abs(wanted).max(initial=0.0)))
+    return float(np.abs(got - wanted).max(initial=0.0)) / scale / max(1.0, condition / 1e5)
+
+
+def test_published_robots_move_as_pinocchio_has_them() -> None:
+    found = compared()
+    assert len({name.split()[0] for name in found}) >= 60
+    assert {name: error for name, error in found.items() if not error < 1e-11} == {}
+
+
+MACHINE = """
+<mujoco>
+  <option gravity="0.3 0 -9.6"/>
+  <worldbody>
+    <body name="cart" pos="0 0 1" quat="1 0.2 0 0.1">
+      <joint name="rail" type="slide" axis="1 0.5 0" damping="0.3" ref="0.2"/>
+      <joint name="swing" axis="0 1 0" pos="0.1 0 0.2" armature="0.05" stiffness="3"
+             springref="0.4"/>
+      <joint name="lean" axis="1 0 0" pos="0 0.1 0" ref="0.5"/>
+      <geom type="box" size="0.2 0.1 0.3" mass="3" pos="0.05 0 0" euler="10 20 30"/>
+      <body name="plate" pos="0.2 0 0"><geom type="sphere" size="0.1" mass="1"/>
+        <body name="ball" pos="0 0 -0.3">
+          <joint name="socket" type="ball" pos="0 0.05 0.1" damping="0.02"/>
+          <geom type="capsule" size="0.05 0.2" mass="0.7" pos="0.1 0 0"/>
+        </body>
+      </body>
+    </body>
+    <body name="bird" pos="3 0 0"><freejoint name="sky"/>
+      <geom type="cylinder" size="0.1 0.3" mass="2" pos="0 0.1 0"/>
+      <body name="wing" pos="0.1 0 0"><joint name="flap" axis="1 0 0"/>
+        <geom type="box" size="0.3 0.1 0.01" mass="0.2" pos="0 0.2 0"/></body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def machine(tmp_path: Path, text: str = MACHINE) -> tuple[Path, Imported]:
+    path = tmp_path / "machine.xml"
+    path.write_text(text)
+    return path, converted(read_mjcf(str(path), path.name), Choices())
+
+
+def states(one: Imported, model: mstmm.Model, peer: Any, rng: np.random.Generator) -> Any:
+    """The same state for both, the base of what flies at rest, and the places of its speeds."""
+    data = mujoco.MjData(peer)
+    at, speeds = np.array(peer.qpos0), rng.uniform(-1, 1, peer.nv)
+    mujoco.mj_integratePos(peer, at, rng.uniform(-1, 1, peer.nv), 1.0)
+    q, u, ours, theirs = np.zeros(model.nq), np.zeros(model.nu), list[int](), list[int]()
+    for joint in range(peer.njnt):
+        slots = model.layout.hinges[one.names[peer.joint(joint).name]]
+        a, v = int(peer.jnt_qposadr[joint]), int(peer.jnt_dofadr[joint])
+        q[slots.q : slots.q + slots.nq] = at[a : a + slots.nq]
+        if slots.nu == 6:
+            speeds[v : v + 6] = 0.0
+            continue
+        u[slots.u : slots.u + slots.nu] = speeds[v : v + slots.nu]
+        ours += range(slots.u, slots.u + slots.nu)
+        theirs += range(v, v + slots.nu)
+    data.qpos[:], data.qvel[:] = at, speeds
+    mujoco.mj_forward(peer, data)
+    return q, u, data, ours, theirs
+
+
+def test_joints_in_a_row_anchors_and_references_as_mujoco_has_them(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
+    path, one = machine(tmp_path)
+    peer, model = mujoco.MjModel.from_xml_path(str(path)), mstmm.compile(one.scene)
+    q, u, data, ours, theirs = states(one, model, peer, rng)
+    got, wanted = model.accelerations(q, u)[ours], data.qacc[theirs]
+    assert got == pytest.approx(wanted, rel=1e-11, abs=1e-11 * np.abs(wanted).max())
+    place = mstmm.compile(one.scene).simulate(0.0, initial=(q, u)).position
+    for name in ("cart", "plate", "ball", "wing"):
+        frame = one.names.get(f"{name}/frame", one.names[name])
+        assert place(frame)[0] == pytest.approx(data.body(name).xpos, abs=1e-12)
+
+
+def test_it_runs_as_mujoco_runs_it(tmp_path: Path) -> None:
+    path, one = machine(tmp_path)
+    peer = mujoco.MjModel.from_xml_path(str(path))
+    peer.opt.integrator, peer.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, 1e-3
+    peer.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    data = mujoco.MjData(peer)
+    while data.time < 0.4 - 1e-9:
+        mujoco.mj_step(peer, data)
+    mujoco.mj_forward(peer, data)
+    model = mstmm.compile(one.scene)
+    result = model.simulate(0.4, rtol=1e-11, atol=1e-12)
+    for name in ("cart", "ball", "wing"):
+        frame = one.names.get(f"{name}/frame", one.names[name])
+        assert result.position(frame)[-1] == pytest.approx(data.body(name).xpos, abs=1e-9)
+
+
+def test_equalities_of_joints_become_couplings_and_the_rest_is_told(tmp_path: Path) -> None:
+    extra = """<equality><joint joint1="swing" joint2="lean" polycoef="0.1 2 0 0 0"/>
+      <weld body1="bird" body2="cart"/></equality>
+      <actuator><motor joint="flap"/></actuator></mujoco>"""
+    _, one = machine(tmp_path, MACHINE.replace("</mujoco>", extra))
+    (coupling,) = one.scene.coupling
+    assert [name.text for name in coupling.names] == ["swing.q", "lean.q"]
+    told = [f"{note.element}: {note.text}" for note in one.notes]
+    assert "equality: left out, 1 of them" in told
+    assert "actuators: left out, 1 of them" in told
+
+
+def test_what_mujoco_refuses_is_refused_in_one_message(tmp_path: Path) -> None:
+    path = tmp_path / "machine.xml"
+    path.write_text("<mujoco><worldbody><body><joint type='spring'/></body></worldbody></mujoco>")
+    with pytest.raises(mstmm.SceneError, match="MuJoCo does not read it"):
+        mstmm.import_robot(path)
+    path.write_text(MACHINE)
+    with pytest.raises(mstmm.SceneError, match="in MJCF a <freejoint> says so"):
+        mstmm.import_robot(path, base="free")

@@ -1,0 +1,1 @@
+"""Tests of robots read from the formats of others."""
