@@ -17,11 +17,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.arrays import Array, Integers
 
 from .beam.ports import BeamShapes
 from .modal_port import MassPoint, ModalPort
 from .moments import Moments
+
+
+@dataclass(frozen=True)
+class Skin:
+    """What is seen of a body: nodes (N, 3) m at rest and phi (3, N, n), how its shapes move them,
+    frame axes; faces (m, 3) are triangles of nodes, none where only nodes are known."""
+
+    nodes: Array
+    phi: Array
+    faces: Integers
 
 
 @dataclass(frozen=True)
@@ -44,6 +54,7 @@ class ModalBody(Moments):
     eta: Array = field(default_factory=lambda: np.zeros(0))
     etad: Array = field(default_factory=lambda: np.zeros(0))
     shapes: BeamShapes | None = None
+    skin: Skin | None = None
     frame: str = ""
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

@@ -10,6 +10,8 @@ from view import scenes
 
 import mstmm
 from mstmm.errors import EnvironmentFailure, SceneError
+from mstmm.runtime.flexible.elastic.bodies import model_of
+from mstmm.runtime.flexible.elastic.skin import MOST, skin
 from mstmm.runtime.result.view import bodies
 from mstmm.runtime.result.view.camera import FIELD, camera
 from mstmm.runtime.result.view.moments import natural_speed
@@ -143,23 +145,52 @@ def test_a_ball_that_bounces_is_drawn_on_both_sides_of_the_blow() -> None:
     assert stage.poses["bodies/ball"].position[:, 1] == pytest.approx(expected, abs=1e-9)
 
 
-def test_an_elastic_body_spans_its_ends() -> None:
+def test_an_elastic_body_is_seen_by_its_mesh() -> None:
     link = {"name": "link", "box": {"size": [0.5, 0.04, 0.04], "divisions": [4, 1, 1]},
-            "young": 2e9, "density": 1000.0, "poisson": 0.3, "modes": 1,
+            "young": 2e7, "density": 1000.0, "poisson": 0.3, "modes": 1,
             "ends": {"root": {"plane": [1, 0, 0, 0]},
                      "tip": {"plane": [1, 0, 0, 0.5]}}}  # fmt: skip
     pin = {"name": "pin", "type": "pin", "axis": [0, 1, 0], "inboard": "ground",
            "outboard": "link.root"}  # fmt: skip
-    scene = mstmm.Scene(gravity=[0, 0, -9.81], elastic=[link], hinge=[pin])
-    run = mstmm.compile(scene, engine="looped").simulate(0.0)
-    stage = staged(run, "link")
-    [line] = stage.lines
-    assert line.points[0] == pytest.approx(
-        np.array([run.position("link.root")[0], run.position("link.tip")[0]])
-    )
-    [block] = [solid for solid in stage.solids if solid.part == "block"]
-    assert np.ptp(block.surface.vertices, axis=0) == pytest.approx([0.5, 0.04, 0.04])
-    assert stage.size > 0.5
+    scene = mstmm.Scene(
+        gravity=[0, 0, -9.81], elastic=[link], hinge=[pin],
+        load=[{"on": "link.tip", "force": ["20*t", 0, "-60*t"], "axes": "body"}],
+    )  # fmt: skip
+    model = mstmm.compile(scene, engine="looped")
+    run = model.simulate(0.2, output_times=[0, 0.1, 0.2])
+    stage = staged(run, "link", most=3)
+    [seen] = [bent for bent in stage.bent if bent.name == "elastic/link"]
+    a, b, c = np.moveaxis(seen.vertices[0][seen.faces], 1, 0)
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(0.5 * 0.04**2)
+    assert np.ptp(seen.vertices[0], axis=0) == pytest.approx([0.5, 0.04, 0.04])
+    skin = model.flexible["link"].skin
+    assert skin is not None
+    bent = seen.vertices - run.position("link")[:, None]
+    bent = np.einsum("fji,fnj->fni", stage.poses["bodies/link"].rotation(), bent) - skin.nodes
+    assert np.abs(bent[-1]).max() > 1e-3
+    sum_of_shapes = np.einsum("cNn,fn->fNc", skin.phi, run.coordinate("link"))
+    assert bent == pytest.approx(sum_of_shapes, abs=1e-12)
+    corners = skin.nodes[:, 0] > 0.4999
+    corners &= (np.abs(np.abs(skin.nodes[:, 1:] - 0.02) - 0.02) < 1e-9).all(axis=1)
+    tip = seen.vertices[:, corners].mean(axis=1)  # second-order displacements are not drawn
+    assert tip == pytest.approx(run.position("link.tip"), abs=2e-4)
+
+
+def test_many_nodes_are_seen_by_some() -> None:
+    fine = {"name": "block", "box": {"size": [1, 1, 1], "divisions": [14, 14, 14]}, "order": 1,
+            "young": 2e7, "density": 1000.0, "poisson": 0.3, "modes": 1,
+            "ends": {"root": {"plane": [1, 0, 0, 0]}}}  # fmt: skip
+    elastic = mstmm.Scene(
+        gravity=[0, 0, 0], elastic=[fine],
+        hinge=[{"name": "pin", "type": "pin", "inboard": "ground", "outboard": "block.root"}],
+    ).elastic[0]  # fmt: skip
+    model = model_of(elastic)
+    assert model.faces is not None
+    assert len(np.unique(model.faces)) == 6 * 14 * 14 + 2
+    seen = skin(model, np.zeros((3 * len(model.nodes), 1)))
+    assert 300 < len(seen.nodes) <= MOST
+    a, b, c = np.moveaxis(seen.nodes[seen.faces], 1, 0)
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(1.0, rel=0.15)
 
 
 @pytest.mark.parametrize("size", [1e-3, 1e4])

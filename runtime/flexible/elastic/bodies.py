@@ -32,6 +32,7 @@ from .model import ElasticModel
 from .moments import moments
 from .ports import Port, port, refuse_shared
 from .prestress import SecondOrder, second_order
+from .skin import skin
 
 if TYPE_CHECKING:
     from mstmm.scene import Hinge, Scene
@@ -254,6 +255,7 @@ def elastic_body(
         D=_damping(name, model, damping, K, found.mass, reduction.frequencies),
         ports={p.name: _port(reduction, p, stiff.ends[p.name]) for p in ports},
         eta=_start(model, start, "eta", len(K)), etad=_start(model, start, "etad", len(K)),
+        skin=skin(model, reduction.shapes),
         frame=frame, notes=(*notes, *_notes(model, reduction, stiffening), found.how),
         warnings=model.warnings,
     )  # fmt: skip

@@ -19,6 +19,7 @@ from mstmm.extras import missing
 from ...host.files import refuse_special
 from .mesh_references import refuse_outside
 from .model import ElasticModel
+from .skin import outside
 
 #: Cells of solids as meshio calls them, and the mesh that scikit-fem makes of them.
 SOLIDS = ("tetra", "tetra10", "hexahedron", "hexahedron27")
@@ -172,6 +173,7 @@ def mesh_model(
         scalar_mass=mass.tocsr(),
         sets=_sets(mesh, scalar),
         stress=MeshStress(vector, material),
+        faces=outside(mesh, scalar),
         definite=True,  # sums of squares with positive weights
         notes=(f"{mesh.nelements} elements of degree {order}, {vector.N} unknowns",),
         warnings=(f"{where}: {LOCKING}",) if order == 1 else (),

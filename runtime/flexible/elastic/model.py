@@ -39,6 +39,7 @@ class ElasticModel:
             the mass is of that kind: isoparametric solids, lumped masses.
         sets: named sets of nodes.
         stress: the stiffness under stress, None where the matrices alone are known.
+        faces: (m, 3) nodes of triangles on its outside, where there is a mesh.
         definite: True where no form of the matrices can be negative, by the way they were made.
         notes, warnings: sentences.
     """
@@ -50,6 +51,7 @@ class ElasticModel:
     scalar_mass: Any = None
     sets: Mapping[str, Integers] = field(default_factory=dict)
     stress: StressStiffness | None = None
+    faces: Integers | None = None
     definite: bool = False
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

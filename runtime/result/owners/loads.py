@@ -27,10 +27,10 @@ def add_load(table: Table, acting: Acting, load: Load, number: int) -> None:
     numbers, owner = acting.system.loads[number], f"load {load.name}"
 
     def force() -> Array:
-        return _turned(acting, number, numbers.force)
+        return turned(acting, number, numbers.force)
 
     def moment() -> Array:
-        return _turned(acting, number, numbers.moment)
+        return turned(acting, number, numbers.moment)
 
     def power() -> Array:
         points = acting.load(number)[0]
@@ -44,7 +44,7 @@ def add_load(table: Table, acting: Acting, load: Load, number: int) -> None:
     table.scalar(f"{load.name}.power", "W", "power", power, owner=owner)
 
 
-def _turned(acting: Acting, number: int, places: tuple[int, ...]) -> Array:
+def turned(acting: Acting, number: int, places: tuple[int, ...]) -> Array:
     """(n, 3): three components of a load in inertial axes."""
     axes = acting.load(number)[1][:, 15:24].reshape(-1, 3, 3)
     return np.einsum("nij,nj->ni", axes, acting.at(places))

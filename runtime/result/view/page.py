@@ -90,7 +90,8 @@ class _Moving:
         self.same = _SAME * stage.size
         self.clock = scene.add_frame("/clock", show_axes=False)
         self.frames = {
-            owner: scene.add_frame(f"/{owner}", show_axes=False) for owner in stage.poses
+            owner: scene.add_frame(f"/{owner}", show_axes=False)
+            for owner in {**stage.poses, **stage.told}
         }
         self.shown: dict[str, tuple[Array, Array]] = {}
         for solid in stage.solids:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from mstmm.scene import Body, Hinge, Spring, split
 from mstmm.scene.rules.values import GROUND
 
 from . import bodies, flexible, hinges, shapes
+from .acting import Acting, gravity
 from .moments import Moments
 from .solids import Colour, ellipsoid
 from .stage import Bent, Line, Poses, Solid, Stage, Told
@@ -65,16 +67,24 @@ class _Staging:
         self.poses = {f"bodies/{name}": self.when.poses(run, name) for name in self.names}
         self.size = self._size()
         self.radius = bodies.thickness(self.size, self.size)
+        self.acting = Acting(run, self.when, self.size)
         self.notes = () if drawn else (f"more than {_HINGES} hinges: they are not drawn",)
 
     def stage(self, title: str) -> Stage:
         solids = [*self._shapes(), *self._rigid(), *self._joints(), *self._feet()]
-        return Stage(
+        self.poses |= dict(self.acting.poses())
+        made = Stage(
             title=title, times=self.when.times, speed=self.when.speed, up=self._up(),
-            poses=self.poses, solids=tuple(solids), bent=tuple(self._bent()),
-            lines=(*self._coils(), *self._spans(), *self._ways()), told=dict(self._told()),
-            notes=self.notes,
+            poses=self.poses, solids=tuple(solids),
+            bent=(*self._bent(), *self.acting.bent()),
+            lines=(*self._coils(), *self._ways()),
+            told=dict([*self._told(), *self.acting.told()]), notes=self.notes,
         )  # fmt: skip
+        down = gravity(made, float(np.linalg.norm(self.scene.gravity)))
+        if down is None:
+            return made
+        arrow, told = down
+        return replace(made, solids=(*made.solids, arrow), told={**made.told, arrow.owner: told})
 
     # --- what is there ----------------------------------------------------------------------------
 
@@ -106,14 +116,12 @@ class _Staging:
 
     def _rigid(self) -> Iterator[Solid]:
         known = self.run.model.flexible
-        drawn = {name for name, body in known.items() if body.shapes is not None}
+        drawn = {name for name, body in known.items() if body.shapes or body.skin}
         drawn |= {shape.owner for shape in self.scene.shape}
         joined = {hinge.inboard for hinge in self.scene.hinges}
         joined |= {hinge.outboard for hinge in self.scene.hinges}
         for i, (name, body) in enumerate(zip(self.names, self.skeleton.bodies, strict=True)):
-            if name in self.elastic and name not in drawn:
-                yield from flexible.block(name, self.elastic[name], _COLOURS[i % len(_COLOURS)])
-            elif name not in drawn:
+            if name not in drawn:
                 colour = _COLOURS[i % len(_COLOURS)]
                 yield from bodies.rigid(name, body, name in joined, self.size, colour)
 
@@ -130,10 +138,14 @@ class _Staging:
             yield shapes.solid(shape, place, axes, _COLOURS[number % len(_COLOURS)])
 
     def _bent(self) -> Iterator[Bent]:
+        shaped = {shape.owner for shape in self.scene.shape}
         for name, body in self.run.model.flexible.items():
+            pose, colour = self.poses[f"bodies/{name}"], self._colour(name)
             if body.shapes is not None:
-                pose = self.poses[f"bodies/{name}"]
-                yield flexible.tube(self.run, name, self.when, pose, self.size, self._colour(name))
+                yield flexible.tube(self.run, name, self.when, pose, self.size, colour)
+            elif body.skin is not None and name not in shaped:
+                r = 0.3 * self.radius
+                yield flexible.outside(self.run, name, self.when, pose, r, colour)
 
     def _joints(self) -> Iterator[Solid]:
         for hinge in self.hinges:
@@ -194,14 +206,6 @@ class _Staging:
         """(f, 3) where the ends of an elastic body are, each over the moments."""
         ends = self.elastic[name].ends
         return [self.when.poses(self.run, f"{name}.{end}").position for end in ends]
-
-    def _spans(self) -> Iterator[Line]:
-        """From the first end of an elastic body to its others."""
-        for name in self.elastic:
-            first, *others = self._ways_of(name)
-            for end, way in zip(list(self.elastic[name].ends)[1:], others, strict=True):
-                points = np.stack([first, way], axis=1)
-                yield Line(f"elastic/{name}/{end}", points, self._colour(name), 8.0)
 
     def _place(self, spring: Spring, reference: str) -> Array:
         """(f, 3) where an end of a spring is."""
