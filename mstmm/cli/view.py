@@ -68,7 +68,7 @@ def view(
         need_for(target, "--output")
     use_files(hinge or [])
     result = _result(what, t_end)
-    seen = result.view(title=_title(Path(what)), trails=tuple(trail or ()), speed=speed)
+    seen = result.view(title=title_of(Path(what)), trails=tuple(trail or ()), speed=speed)
     for target in targets:
         seen.save(target, moments)
         terminal.say(f"{target}: {_about(target, result)}")
@@ -103,6 +103,6 @@ def _about(target: Path, result: Result) -> str:
     )
 
 
-def _title(path: Path) -> str:
+def title_of(path: Path) -> str:
     """The name of the file, or of its folder where every such file is called the same."""
     return path.absolute().parent.name if path.stem == "scene" else path.stem

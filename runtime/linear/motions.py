@@ -18,6 +18,7 @@ from ..engine.sizes import scene_length
 from . import files, shares
 
 if TYPE_CHECKING:
+    from ..result.view.view import View
     from .equations import Equations
 
 #: Shapes in a picture unless others are asked for.
@@ -195,15 +196,48 @@ class Modes:
         """
         from .pictures.shapes import shapes
 
+        which = self._which(which)
+        return shapes(self.linear, self.eigenvalues, self.shapes, which, path)
+
+    def _which(self, which: Sequence[int] | None) -> Sequence[int]:
+        """The shapes that are asked for, or the first.  SceneError for one that is not there."""
         if which is None:
-            which = range(min(_PANELS, len(self)))
-        elif isinstance(which, str) or not isinstance(which, Sequence) or not 0 < len(which) <= 12:
+            return range(min(_PANELS, len(self)))
+        if isinstance(which, str) or not isinstance(which, Sequence) or not 0 < len(which) <= 12:
             raise SceneError(
                 f"which = {which!r}: expected a list of 1 to 12 shapes, such as [0, 2]"
             )
         for k in which:
             self._shape(k)
-        return shapes(self.linear, self.eigenvalues, self.shapes, which, path)
+        return which
+
+    def view(
+        self,
+        path: str | Path | None = None,
+        *,
+        which: Sequence[int] | None = None,
+        amplitude: float | None = None,
+        title: str = "Natural motions",
+    ) -> View:
+        """The motions of `which`, counted from 0, as they move: one page on which each can be
+        chosen, and with `path` written there, see `Result.view`.  Unless given they are the first
+        six but for those of frequency 0.
+
+        The point that moves most moves by `amplitude`, 0.08 unless given, times the size of the
+        scene, and nothing turns by more than 0.8 rad; loops stay closed.  SceneError for a shape
+        that is not there, EnvironmentFailure without the extras.
+        """
+        from .pictures.moving import view
+
+        if amplitude is not None and not 0 < real("amplitude", amplitude) <= 1:
+            raise SceneError(f"amplitude = {amplitude:g}: expected a part of the size, 0 to 1")
+        if which is None:
+            which = np.flatnonzero(self.omega > 0)[:_PANELS].tolist() or None
+        which = self._which(which)
+        made = view(self.linear, self.eigenvalues, self.shapes, which, amplitude, title)
+        if path is not None:
+            made.save(path)
+        return made
 
     def plot_eigenvalues(self, path: str | Path | None = None) -> Any:
         """`matplotlib.figure.Figure`: eigenvalues by growth in 1/s and angular frequency in rad/s,

@@ -19,7 +19,7 @@ from mstmm.runtime.result.view.view import View
 
 @pytest.fixture(scope="module")
 def view() -> View:
-    return View(staged(scenes.run(), "a beam and a rod", speed=20.0))
+    return View("", [("", staged(scenes.run(), "a beam and a rod", speed=20.0))])
 
 
 def test_a_strip(view: View, tmp_path: Path) -> None:

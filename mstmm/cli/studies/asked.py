@@ -15,6 +15,7 @@ from mstmm.errors import MstmmError
 from ..extras import need_for
 from ..options import output_file
 from ..simulate import compiled, use_files
+from ..view import ENDINGS, title_of
 
 if TYPE_CHECKING:
     from mstmm.runtime.linear.linear import Linear
@@ -40,7 +41,7 @@ Plot = Annotated[
     str | None,
     typer.Option("--plot", metavar="FILE", help="A picture of it: .png, .svg or .pdf."),
 ]  # fmt: skip
-_ENDINGS, _PICTURES = (".nc", ".csv"), (".png", ".svg", ".pdf")
+_FILES, _PICTURES = (".nc", ".csv"), (".png", ".svg", ".pdf")
 
 
 @dataclass(frozen=True)
@@ -54,21 +55,28 @@ class Asked:
     plot: str | None
     hinge: list[str] | None
     json: bool
+    seen: str | None = None  #: of modes alone: where they are shown as they move
 
     def linear(self, inputs: list[str] | None) -> Linear:
         """The scene made linear; before that every file that it will write is checked."""
         self._file()
         self._picture()
+        _checked(self.seen, ENDINGS, "--view")
         use_files(self.hinge or [])
         model = _changed(self.scene, self.change or [])
         state = model.initial_state() if self.at_start else (None, None)
         return model.linearize(*state, inputs=inputs or None)
 
     def _file(self) -> Path | None:
-        return _checked(self.output, _ENDINGS, "--output")
+        return _checked(self.output, _FILES, "--output")
 
     def _picture(self) -> Path | None:
         return _checked(self.plot, _PICTURES, "--plot")
+
+    def show(self, modes: Modes) -> None:
+        """The motions as they move, into the file that is named."""
+        if self.seen is not None:
+            modes.view(self.seen, title=title_of(Path(self.scene)))
 
     def answered(self, answer: Linear | Modes | FrequencyResponse) -> bool:
         """The files written; with --json the answer told, and nothing is left to say."""
@@ -81,6 +89,8 @@ class Asked:
             answer.plot(picture)
         if self.json:
             files = {"file": self.output, "plot": self.plot}
+            if self.seen is not None:
+                files["view"] = self.seen
             terminal.emit_json({"scene": self.scene, **answer.to_dict(), **files})
         return self.json
 
@@ -92,6 +102,8 @@ class Asked:
             terminal.say(f"written: {self.output}")
         if self.plot is not None:
             terminal.say(f"drawn: {self.plot}")
+        if self.seen is not None:
+            terminal.say(f"shown: {self.seen}")
         if other and self.output is None and self.plot is None:
             terminal.say(other)
 

@@ -77,16 +77,23 @@ def modes(
     change: Set = None,
     output: Output = None,
     plot: Plot = None,
+    seen: Annotated[
+        str | None,
+        typer.Option("--view", metavar="FILE", help="The motions as they move: a page on which "
+                     "each can be chosen, .html; a strip, .png, .svg or .pdf; a film, .gif or "
+                     ".mp4."),
+    ] = None,
     hinge: Elements = None,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Natural motions of a scene near its rest: frequency, damping, and what moves."""
     from .. import output as terminal
 
-    asked = Asked(scene, at_start, change, output, plot, hinge, json)
+    asked = Asked(scene, at_start, change, output, plot, hinge, json, seen)
     linear = asked.linear(None)
     most = None if count is None or not len(linear) else min(count, len(linear))
     found = linear.modes(most, False if undamped else None)
+    asked.show(found)
     if asked.answered(found):
         return
     _tell_of(linear)

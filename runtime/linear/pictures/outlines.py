@@ -62,13 +62,30 @@ class Outline:
 def shown(linear: Equations, shapes: Array, part: float) -> tuple[Outline, list[Outline]]:
     """(at rest, moved by each of the real shapes (n, k)), the largest displacement of a point being
     a `part` of the scene's size."""
-    steps = _STEP / np.maximum(np.abs(shapes).max(axis=0, initial=0), 1e-300)
+    rest, near, scales = _near(linear, shapes, _steps(shapes), part)
+    return rest, [rest.moved(one, scale) for one, scale in zip(near, scales, strict=True)]
+
+
+def amplitudes(linear: Equations, shapes: Array, part: float) -> Array:
+    """(k,) what real shapes (n, k) are to be multiplied with for that; 0 where no point moves."""
+    steps = _steps(shapes)
+    return steps * np.array(_near(linear, shapes, steps, part)[2])
+
+
+def _steps(shapes: Array) -> Array:
+    return _STEP / np.maximum(np.abs(shapes).max(axis=0, initial=0), 1e-300)
+
+
+def _near(
+    linear: Equations, shapes: Array, steps: Array, part: float
+) -> tuple[Outline, list[Outline], list[float]]:
+    """At rest, moved a little by each shape, and how many times as far it is to be."""
     states = [linear.state.q, *(linear.displaced(x) for x in (shapes * steps).T)]
     rest, *near = outlines(linear, np.array(states))
     size = float(np.linalg.norm(np.ptp(rest.points, axis=0)))
     largest = [float(np.linalg.norm(one.points - rest.points, axis=1).max()) for one in near]
     scales = [part * (size or 1.0) / far if far > _SEEN * _STEP * size else 0.0 for far in largest]
-    return rest, [rest.moved(one, scale) for one, scale in zip(near, scales, strict=True)]
+    return rest, near, scales
 
 
 #: Displacements below this, beside what a turn of the whole scene makes, are none.

@@ -49,14 +49,14 @@ def shapes(
     rest, moved = shown(linear, np.real(shapes[:, list(which)]), _PART)
     for panel, k, one in zip(panels, which, moved, strict=False):
         _panel(panel, rest, one)
-        panel.set_title(f"{k + 1}: {_described(complex(eigenvalues[k]))}", fontsize=9)
+        panel.set_title(f"{k + 1}: {described(complex(eigenvalues[k]))}", fontsize=9)
     for panel in panels[len(which) :]:
         panel.set_visible(False)
     write(made, path)
     return made
 
 
-def _described(value: complex) -> str:
+def described(value: complex) -> str:
     """Frequency and damping, or growth."""
     if value == 0:
         return "0 Hz, moves freely"

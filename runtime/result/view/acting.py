@@ -53,8 +53,8 @@ class Acting:
         self.seen = [self._one(one, k, values) for k, one in enumerate(run.model.scene.load)]
 
     def _one(self, load: Load, number: int, values: Values) -> _Seen:
-        places = values.system.loads[number]
-        both = np.hstack([turned(values, number, x) for x in (places.force, places.moment)])
+        numbers = values.system.loads[number]
+        both = np.hstack([turned(values, number, x) for x in (numbers.force, numbers.moment)])
         both = self.when.straight(both[self.when.kept])
         beams = {beam.name for beam in self.run.model.scene.beam}
         at_root = load.on in beams and load.force_per_length is None
@@ -97,7 +97,7 @@ class Acting:
             numbers += [(f"moment {x}", "N m", v) for x, v in zip("xyz", one.moment.T, strict=True)]
             there = [number for number in numbers if number[2].any()]
             labels = tuple((label, unit) for label, unit, _ in there)
-            values = np.array([v for *_, v in there]).reshape(len(there), -1).T
+            values = np.array([v for *_, v in there]).reshape(len(there), len(one.force)).T
             text = (f'load on "{one.load.on}"',)
             yield f"loads/{one.load.name}", Told(one.load.name, text, np.zeros(3), labels, values)
 

@@ -22,18 +22,20 @@ _PAPER, _FAINT = "#ffffff", "#d9dde2"
 
 @dataclass(frozen=True)
 class Flat:
-    """A stage seen by its camera from far away: no perspective, so that lengths can be compared."""
+    """A stage seen by its camera from far away: no perspective, so that lengths can be compared.
+    The camera and the window are those of `whole`, where the stage is a part of that."""
 
     stage: Stage
+    whole: Stage | None = None
 
     @cached_property
     def camera(self) -> Camera:
-        return camera(self.stage)
+        return camera(self.whole or self.stage)
 
     @cached_property
     def window(self) -> tuple[Array, Array]:
         """Least and largest (right, up) in m that the picture shows in every moment."""
-        seen = (self.stage.cloud @ self.camera.axes.T)[:, :2]
+        seen = ((self.whole or self.stage).cloud @ self.camera.axes.T)[:, :2]
         low, high = seen.min(axis=0), seen.max(axis=0)
         room = 0.04 * max(float((high - low).max()), 1e-9)
         return low - room, high + room

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
@@ -12,7 +13,9 @@ import numpy as np
 
 from mstmm.errors import EnvironmentFailure, MstmmError
 from mstmm.extras import missing
+from mstmm.printable import printable
 
+from .choices import Part
 from .drawn import Flat
 from .stage import Stage
 
@@ -25,19 +28,51 @@ _STRIP, _FRAME, _LINE, _DOTS = 7.2, 6.4, 0.28, 100
 _GIF_RATE, _ROW = 15.0, 6
 
 
-def strip(stage: Stage, file: Path | IO[str], kind: str, count: int = 6) -> None:
-    """A picture of `count` moments side by side, for papers; `kind` is png, svg or pdf."""
-    flat = Flat(stage)
-    some = np.unique(np.linspace(0, len(stage.times) - 1, max(1, count)).round().astype(int))
-    columns = _columns(len(some), flat.shape)
-    rows = -(-len(some) // columns)
-    wide = _STRIP / columns
-    figure = _figure(_STRIP, rows * (wide * flat.shape + _LINE))
-    for place, k in enumerate(some):
+@dataclass(frozen=True)
+class Shot:
+    """One picture: a stage at a moment, and what stands above it."""
+
+    flat: Flat
+    moment: int
+    title: str
+
+
+def shots_over(parts: Sequence[Part], whole: Stage) -> list[Shot]:
+    """Every moment of every part, one part after the other, in the window of them all."""
+    flats = [Flat(part, whole) for _, part in parts]
+    several = len(parts) > 1
+    return [
+        Shot(flat, k, _above(f"{whole.title}   {name}" if several else whole.title, flat.stage, k))
+        for flat, (name, _) in zip(flats, parts, strict=True) for k in range(len(whole.times))
+    ]  # fmt: skip
+
+
+def shots_of(parts: Sequence[Part], whole: Stage, count: int) -> list[Shot]:
+    """So many moments; of several parts the first moment of each."""
+    if len(parts) > 1:
+        return [Shot(Flat(part, whole), 0, name) for name, part in parts]
+    some = np.unique(np.linspace(0, len(whole.times) - 1, max(1, count)).round().astype(int))
+    what, unit = whole.clock
+    flat = Flat(whole)
+    return [Shot(flat, int(k), f"{what} = {whole.times[k]:.3g} {unit}") for k in some]
+
+
+def strip(shots: Sequence[Shot], file: Path | IO[str], kind: str, title: str = "") -> None:
+    """Pictures side by side, for papers; `kind` is png, svg or pdf."""
+    shape = shots[0].flat.shape
+    columns = _columns(len(shots), shape)
+    rows = -(-len(shots) // columns)
+    wide, above = _STRIP / columns, _LINE if title else 0.0
+    figure = _figure(_STRIP, rows * (wide * shape + _LINE) + above)
+    for place, shot in enumerate(shots):
         axis = figure.add_subplot(rows, columns, place + 1)
-        flat.draw(axis, int(k))
-        axis.set_title(f"t = {stage.times[k]:.3g} s", fontsize=8.5, pad=2)
-    figure.subplots_adjust(0.01, 0.01, 0.99, 1 - 0.8 * _LINE / figure.get_figheight(), 0.04, 0.14)
+        shot.flat.draw(axis, shot.moment)
+        axis.set_title(printable(shot.title), fontsize=8.5, pad=2, parse_math=False)
+    top = 1 - (0.8 * _LINE + above) / figure.get_figheight()
+    if title:
+        figure.suptitle(printable(title), fontsize=10.5, y=1 - 0.2 * above / figure.get_figheight(),
+                        va="top", parse_math=False)  # fmt: skip
+    figure.subplots_adjust(0.01, 0.01, 0.99, top, 0.04, 0.14)
     figure.savefig(file, dpi=200, format=kind)
 
 
@@ -48,9 +83,10 @@ def _columns(count: int, shape: float) -> int:
     return min(count, max(1, int(np.ceil(np.sqrt(count * shape * 2.2)))))
 
 
-def film(stage: Stage, path: Path) -> None:
+def film(shots: Sequence[Shot], path: Path) -> None:
     """A GIF or an MP4, by the ending.  EnvironmentFailure where an MP4 lacks ffmpeg."""
-    figure, axis, flat = _frame(stage)
+    stage = shots[0].flat.stage
+    figure, axis = _frame(shots[0].flat)
     from matplotlib import animation, rc_context
 
     lasts = _seconds(stage)
@@ -64,8 +100,8 @@ def film(stage: Stage, path: Path) -> None:
             else animation.FFMpegWriter(fps=rate, codec="h264", extra_args=_PLAYABLE)
         )
         with writer.saving(figure, str(path), dpi=_DOTS):
-            for k in range(0, len(stage.times), every):
-                _show(axis, flat, k)
+            for shot in shots[::every]:
+                _show(axis, shot)
                 writer.grab_frame(facecolor="white")
 
 
@@ -73,36 +109,38 @@ def film(stage: Stage, path: Path) -> None:
 _PLAYABLE = ["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]
 
 
-def frames(stage: Stage, folder: Path) -> Sequence[Path]:
-    """Every moment as frame_0001.png and so on; MstmmError where the folder cannot be made."""
+def frames(shots: Sequence[Shot], folder: Path) -> Sequence[Path]:
+    """Every picture as frame_0001.png and so on; MstmmError where the folder cannot be made."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise MstmmError(f'frames: "{folder}" cannot be made ({error.strerror})') from None
-    figure, axis, flat = _frame(stage)
+    figure, axis = _frame(shots[0].flat)
     made = []
-    for k in range(len(stage.times)):
-        _show(axis, flat, k)
-        made.append(folder / f"frame_{k + 1:04d}.png")
+    for k, shot in enumerate(shots, 1):
+        _show(axis, shot)
+        made.append(folder / f"frame_{k:04d}.png")
         figure.savefig(made[-1], dpi=_DOTS)
     return made
 
 
-def _frame(stage: Stage) -> tuple[Any, Any, Flat]:
-    flat = Flat(stage)
+def _frame(flat: Flat) -> tuple[Any, Any]:
     figure = _figure(_FRAME, min(_FRAME * flat.shape, 1.4 * _FRAME) + _LINE)
     tall = 1 - _LINE / figure.get_figheight()
-    return figure, figure.add_axes((0.0, 0.0, 1.0, tall)), flat
+    return figure, figure.add_axes((0.0, 0.0, 1.0, tall))
 
 
-def _show(axis: Any, flat: Flat, k: int) -> None:
+def _show(axis: Any, shot: Shot) -> None:
     axis.clear()
-    flat.draw(axis, k)
-    stage = flat.stage
-    rate = "" if stage.speed == 1 else f"   ({stage.speed:g} s in a second)"
-    axis.set_title(
-        f"{stage.title}   t = {stage.times[k]:.{stage.digits}f} s{rate}", fontsize=9, pad=4
-    )
+    shot.flat.draw(axis, shot.moment)
+    axis.set_title(printable(shot.title), fontsize=9, pad=4, parse_math=False)
+
+
+def _above(title: str, stage: Stage, k: int) -> str:
+    what, unit = stage.clock
+    rate = "" if stage.speed == 1 or unit != "s" else f"   ({stage.speed:g} s in a second)"
+    digits = stage.digits if unit == "s" else 0
+    return f"{title}   {what} = {stage.times[k]:.{digits}f} {unit}{rate}"
 
 
 def _seconds(stage: Stage) -> float:

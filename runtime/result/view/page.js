@@ -28,16 +28,23 @@
     make("b", "", box, told.title);
     const clock = make("div", "font-variant-numeric:tabular-nums", box);
     for (const note of told.notes) make("div", "opacity:.75", box, note);
-    const row = make("label", "display:block", box, "follow ");
-    const pick = make("select", "font:inherit;color:inherit;background:transparent;" +
-      "border:1px solid #8886;border-radius:4px;max-width:14em", row);
-    make("option", `color:${ink};background:${ground}`, pick, "nothing").value = "";
-    for (const [owner, one] of Object.entries(told.owners))
-      if (owner.startsWith("/bodies/"))
-        make("option", `color:${ink};background:${ground}`, pick, one.name).value = owner;
+    const list = (label, entries) => {
+      const row = make("label", "display:block", box, `${label} `);
+      const one = make("select", "font:inherit;color:inherit;background:transparent;" +
+        "border:1px solid #8886;border-radius:4px;max-width:16em", row);
+      for (const [text, value] of entries)
+        make("option", `color:${ink};background:${ground}`, one, text).value = value;
+      return one;
+    };
+    const choice = told.choices.length ?
+      list("show", told.choices.map((name) => [name, `/${name}`])) : null;
+    const bodies = Object.entries(told.owners).filter(([owner]) =>
+      owner.startsWith(`${told.choices.length ? `/${told.choices[0]}` : ""}/bodies/`));
+    const pick = list("follow", [["nothing", ""],
+      ...bodies.map(([owner, one]) => [one.name, owner.slice(owner.indexOf("/bodies/"))])]);
     const tip = make("div", `position:fixed;z-index:6;pointer-events:none;display:none;${look}` +
       "white-space:pre;font-variant-numeric:tabular-nums", document.body);
-    return { clock, pick, tip };
+    return { clock, choice, pick, tip };
   }
 
   function place(view, owner) {
@@ -47,10 +54,22 @@
     return node.localToWorld(new Vector(...told.owners[owner].anchor));
   }
 
-  function under(view, pointer) {
+  // What is not chosen is far away; the recording puts it there, and back, whenever it begins anew.
+  function show(view, chosen) {
+    for (const name of told.choices) {
+      const pose = view.nodePoseData[`/${name}`], x = `/${name}` === chosen ? 0 : told.away;
+      if (!pose || pose.position[0] === x) continue;
+      pose.position = [x, 0, 0];
+      pose.poseUpdateState = "needsUpdate";
+      view.requestRender();
+    }
+  }
+
+  function under(view, pointer, root) {
     const frame = view.canvas.getBoundingClientRect();
     let best = null, least = 22;
     for (const owner of Object.keys(told.owners)) {
+      if (!owner.startsWith(`${root}/`)) continue;
       const at = place(view, owner);
       if (!at) continue;
       at.project(view.camera);
@@ -79,10 +98,11 @@
   }
 
   function start() {
-    const { clock, pick, tip } = panel();
+    const { clock, choice, pick, tip } = panel();
     const pointer = { x: -1e6, y: -1e6 };
     addEventListener("pointermove", (e) => { pointer.x = e.clientX; pointer.y = e.clientY; });
-    const rate = told.speed === 1 ? "" : `, ${number(told.speed, 3)} s in a second`;
+    const [what, unit] = told.clock, digits = unit === "s" ? told.digits : 0;
+    const rate = told.speed === 1 || unit !== "s" ? "" : `, ${number(told.speed, 3)} s in a second`;
     let last = null, ticks = 0;
     const tick = () => {
       requestAnimationFrame(tick);
@@ -91,9 +111,12 @@
       if (view.nodePoseData["/clock"] && ++ticks === SETTLED) fit(view);
       const pose = view.nodePoseData["/clock"];
       const moment = Math.min(times.length - 1, Math.round(pose ? pose.position[0] : 0));
-      clock.textContent = times.length > 1 ? `t = ${times[moment].toFixed(told.digits)} s${rate}` :
-        `t = ${number(times[0], 6)} s`;
-      const at = pick.value ? place(view, pick.value) : null;
+      clock.textContent = times.length > 1 ?
+        `${what} = ${times[moment].toFixed(digits)} ${unit}${rate}` :
+        `${what} = ${number(times[0], 6)} ${unit}`;
+      const root = choice ? choice.value : "";
+      show(view, root);
+      const at = pick.value ? place(view, root + pick.value) : null;
       if (at && last) {
         const aim = view.cameraControl.getTarget(at.clone());
         aim.add(at).sub(last);
@@ -101,7 +124,7 @@
         view.requestRender();
       }
       last = at;
-      const owner = under(view, pointer);
+      const owner = under(view, pointer, root);
       tip.style.display = owner ? "block" : "none";
       if (owner) {
         tip.textContent = words(owner, moment);

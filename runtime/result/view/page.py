@@ -24,6 +24,8 @@ from .stage import Bent, Line, Poses, Solid, Stage
 
 #: Places closer than this by the size of the scene, and quaternions closer than this, are the same.
 _SAME = 1e-5
+#: Where what is not chosen is, m, of what is drawn at 100 m at most.
+_AWAY = 1e6
 #: Sizes (m) between which viser shows all of a scene, and the one that others are drawn at.
 _SMALL, _LARGE, _SHOWN = 0.5, 100.0, 10.0
 #: The grid: its width, and how far it lies below everything, by the size of the scene; its colours.
@@ -89,6 +91,9 @@ class _Moving:
         self.scene, self.stage = scene, stage
         self.same = _SAME * stage.size
         self.clock = scene.add_frame("/clock", show_axes=False)
+        for name in stage.choices:  # out of sight until its turn
+            away = (0.0 if name == stage.choices[0] else _AWAY, 0.0, 0.0)
+            scene.add_frame(f"/{name}", show_axes=False, position=away)
         self.frames = {
             owner: scene.add_frame(f"/{owner}", show_axes=False)
             for owner in {**stage.poses, **stage.told}
@@ -191,7 +196,8 @@ def _told(stage: Stage) -> dict[str, Any]:
     }  # fmt: skip
     return {
         "title": stage.title, "speed": stage.speed, "times": _packed(stage.times),
-        "digits": stage.digits, "notes": stage.notes, "owners": owners,
+        "digits": stage.digits, "notes": stage.notes, "owners": owners, "clock": stage.clock,
+        "choices": stage.choices, "away": _AWAY,
     }  # fmt: skip
 
 

@@ -102,6 +102,8 @@ class Stage:
         poses: owner -> its axes over the moments; "ground" has none.
         told: owner -> what the page says of it.
         notes: what a reader should know of the drawing.
+        clock: what the moments are, and their unit.
+        choices: names in front of owners, of which one is looked at at a time; none: all are.
     """
 
     title: str
@@ -114,6 +116,8 @@ class Stage:
     lines: tuple[Line, ...]
     told: Mapping[str, Told]
     notes: tuple[str, ...] = ()
+    clock: tuple[str, str] = ("t", "s")
+    choices: tuple[str, ...] = ()
 
     def scaled(self, factor: float) -> Stage:
         """The same so many times as large; what is told stays what it is."""

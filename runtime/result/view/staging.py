@@ -44,23 +44,26 @@ def staged(
     trails: Sequence[str] = (),
     speed: float | None = None,
     most: int | None = None,
+    when: Moments | None = None,
 ) -> Stage:
     """The stage of a run.  `trails`: ends whose ways are drawn; `speed`: seconds of the run per
-    second of film; `most`: pictures at most.  SceneError for an end that there is not, and for a
-    run without samples."""
-    return _Staging(run, trails, speed, most).stage(title)
+    second of film; `most`: pictures at most; `when`: moments of one's own in place of these.
+    SceneError for an end that there is not, and for a run without samples."""
+    return _Staging(run, trails, speed, most, when).stage(title)
 
 
 class _Staging:
     def __init__(
-        self, run: Record, trails: Sequence[str], speed: float | None, most: int | None
-    ) -> None:
+        self, run: Record, trails: Sequence[str], speed: float | None, most: int | None,
+        when: Moments | None,
+    ) -> None:  # fmt: skip
         self.run, self.scene = run, run.model.scene
         self.skeleton = self.scene.skeleton
         self.names = [self.skeleton.bodies.name(i) for i in range(len(self.skeleton.bodies))]
         drawn = len(self.scene.hinges) <= _HINGES
         self.hinges: Sequence[Hinge] = self.scene.hinges if drawn else ()
-        self.when = Moments.of(run, len(self.names) + len(self.hinges), speed, most)
+        owners = len(self.names) + len(self.hinges)
+        self.when = when or Moments.of(run, owners, speed, most)
         self.trails = tuple(trails)
         self.elastic = {one.name: one for one in self.scene.elastic if one.name in self.names}
         run._observed.fetch(self.names)

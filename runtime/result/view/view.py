@@ -14,9 +14,9 @@ from mstmm.arrays import whole
 from mstmm.errors import SceneError
 
 from ...host.files import replacing
-from .film import FILMS, STRIPS, film, frames, strip
+from .choices import Part, together
+from .film import FILMS, STRIPS, film, frames, shots_of, shots_over, strip
 from .page import page
-from .stage import Stage
 from .staging import staged
 
 if TYPE_CHECKING:
@@ -33,19 +33,25 @@ class View:
 
     Attributes:
         stage: everything that is seen, as triangles and poses over time.
+        parts: (name, stage) of what can be chosen, or of the one that there is.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        self.stage = stage
+    def __init__(self, title: str, parts: Sequence[Part]) -> None:
+        self.parts = tuple(parts)
+        self.stage = parts[0][1] if len(parts) == 1 else together(title, parts)
 
     @cached_property
     def html(self) -> str:
         """One page that needs no network (extra: view)."""
         return page(self.stage)
 
-    def save(self, path: str | Path, moments: int = 6) -> Path:
-        """Write a page (.html, extra: view), a strip of so many `moments` (.png, .svg, .pdf), a
-        film (.gif, .mp4) or, into a folder, every frame (extra: plot); returns the path.
+    def save(self, path: str | Path, moments: int = 6, title: bool = False) -> Path:
+        """Write a page (.html, extra: view), a strip of so many `moments` (.png, .svg, .pdf), with
+        its title above where that is asked for, a film (.gif, .mp4) or, into a folder, every frame
+        (extra: plot); returns the path.
+
+        Where there is something to choose a strip has the first moment of each, and films show one
+        after the other.
 
         A file appears under its name when it is whole.  SceneError for another ending,
         EnvironmentFailure for what is not installed or cannot be written.
@@ -55,7 +61,7 @@ class View:
         path, moments = Path(path), whole("moments", moments, 1, "a whole number, 1 or more")
         ending = path.suffix.lower()
         if not ending:
-            frames(self.stage, path)
+            frames(shots_over(self.parts, self.stage), path)
             return path
         if ending not in ENDINGS:
             raise SceneError(
@@ -63,23 +69,23 @@ class View:
                 "frames, without an ending"
             )
         with replacing(path) as part:
-            self._write(part, ending, moments)
+            self._write(part, ending, moments, self.stage.title if title else "")
         return path
 
-    def _write(self, part: Path, ending: str, moments: int) -> None:
+    def _write(self, part: Path, ending: str, moments: int, title: str) -> None:
         if ending == ".html":
             part.write_text(self.html, encoding="utf-8")
         elif ending in STRIPS:
-            strip(self.stage, part, ending[1:], moments)
+            strip(shots_of(self.parts, self.stage, moments), part, ending[1:], title)
         else:  # writers of films go by the ending
             with TemporaryDirectory() as folder:
                 made = Path(folder) / f"film{ending}"
-                film(self.stage, made)
+                film(shots_over(self.parts, self.stage), made)
                 shutil.copyfile(made, part)
 
     def draw_strip(self, file: IO[str], moments: int = 6) -> None:
         """The same strip as SVG into an open file."""
-        strip(self.stage, file, "svg", moments)
+        strip(shots_of(self.parts, self.stage, moments), file, "svg")
 
     def _repr_html_(self) -> str:
         return (
@@ -99,4 +105,4 @@ def view(
         trails = (trails,)
     if not isinstance(title, str) or not all(isinstance(one, str) for one in trails):
         raise SceneError("view: title and trails are texts, such as trails=['rod2.tip']")
-    return View(staged(run, title, trails, speed))
+    return View(title, [(title, staged(run, title, trails, speed))])
