@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# What pip cannot bring: Python with venv and headers, a C compiler.  Installs only what is missing.
+# What pip cannot bring: Python with venv and headers, a C compiler, a browser, LaTeX.
+# Installs only what is missing.
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
 missing=()
@@ -8,6 +9,7 @@ command -v gcc >/dev/null || missing+=(gcc)
 command -v clang >/dev/null || missing+=(clang)      # the second opinion on warnings
 command -v git >/dev/null || missing+=(git)
 command -v chromium >/dev/null || missing+=(chromium)  # pages are opened and looked at
+command -v pdflatex >/dev/null || missing+=(texlive-latex-base)  # equations are compiled
 [ -e /usr/include/stdlib.h ] || missing+=(libc6-dev)
 python3 -c 'import ensurepip, venv' 2>/dev/null || missing+=(python3-venv)
 python3 -c 'import os, sysconfig; os.stat(sysconfig.get_paths()["include"] + "/Python.h")' \

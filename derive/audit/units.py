@@ -75,6 +75,9 @@ def dimension_of(expression: sp.Expr, known: Mapping[sp.Basic, Dimension]) -> Di
         return dimension_of(expression.args[0], known)
     if isinstance(expression, sp.Piecewise):
         return _common([value for value, _ in expression.args], known, str(expression))
+    if isinstance(expression, sp.sign):
+        dimension_of(expression.args[0], known)
+        return _NONE
     if isinstance(expression, sp.atan2):
         _common(expression.args, known, str(expression))
         return _NONE

@@ -7,6 +7,8 @@ read off the integrals of `newton_euler`.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import sympy as sp
 
 from ..language.derivation import Derivation, Equation, Quantity, tilde, vector
@@ -77,6 +79,23 @@ def rigid_body(outputs: int = 1, loads: int = 0) -> Derivation:
         premises=_premises(ends, acting),
         sources=(f"{SOURCE}, (5.19) to (5.25)",),
         notes=("Any axes, the same for all arguments.",),
+    )
+
+
+def newton_euler_form() -> Derivation:
+    """The body alone, free at its output ends: what the element `rigid` states in its parameters.
+
+    These are mass = M, the column mc = M r_IC and the tensor J = J_I.
+    """
+    return replace(
+        rigid_body(outputs=0),
+        title="Newton and Euler about the input end I, and the mass matrix that follows",
+        notes=(
+            "rdd_I is the acceleration of I, omegadot the angular acceleration; q_I and m_I are "
+            "the force and the moment that this motion needs there. a_I is [rdd_I; omegadot] and "
+            "f_I is [q_I; m_I], so that f_I = mass_matrix a_I + bias.",
+            "Parameters of the element are mass = M, mc = M r_IC and J = J_I.",
+        ),
     )
 
 

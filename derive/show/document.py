@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
 
 from mstmm.errors import ElementError
 from mstmm.ir import KernelIR, Port
 
 from ..language.derivation import Derivation, Equation, Quantity
+from .entries import Declared, Named, Parts
 from .formulas import stated
 from .ir import listing
 from .layout import Name, Node
-from .names import shown_name
+from .measure import Columns
+from .names import own_name, shown_name
 
 STAGES = ("equations", "matrix", "ir", "c")
 
@@ -33,6 +35,7 @@ class ElementView:
     kernels: Callable[[], Iterable[KernelIR]]
     c_text: Callable[[], str]
     sources: tuple[str, ...] = ()
+    declared: Declared = field(default_factory=Declared)
 
 
 @dataclass(frozen=True)
@@ -53,13 +56,14 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class QuantityRow:
-    """One line of a table of quantities."""
+    """One line of a table of quantities; `inner` ones are entries of the one above."""
 
     symbol: Node
     port: str
     shape: str
     unit: str
     meaning: str
+    inner: bool = False
 
 
 @dataclass(frozen=True)
@@ -89,11 +93,11 @@ class Code:
 Item = Heading | Paragraph | Quantities | Formula | Code
 
 
-def document(view: ElementView, at: str) -> list[Item]:
-    """Items of the page at a stage.  Raises ElementError for an unknown stage."""
+def document(view: ElementView, at: str, measure: Columns) -> list[Item]:
+    """Items of the page at a stage, of formulas that fit.  ElementError for an unknown stage."""
     builders: dict[str, Callable[[ElementView], list[Item]]] = {
-        "equations": lambda v: _derived(v, _equations),
-        "matrix": lambda v: _derived(v, _matrices),
+        "equations": lambda v: _derived(v, _equations, measure),
+        "matrix": lambda v: _derived(v, _matrices, measure),
         "ir": _kernels,
         "c": _c_source,
     }
@@ -111,67 +115,79 @@ def _sources(sources: tuple[str, ...]) -> list[Item]:
     return [Paragraph(source, "sources") for source in sources]
 
 
-def _derived(view: ElementView, part: Callable[[Derivation], list[Item]]) -> list[Item]:
+def _derived(
+    view: ElementView, part: Callable[[Derivation, Written], list[Item]], measure: Columns
+) -> list[Item]:
     items: list[Item] = []
     for derivation in view.derivations:
         if len(view.derivations) > 1:
             items.append(Heading(derivation.title, 2))
-        items += part(derivation)
+        items += part(derivation, Written(derivation, view.declared, measure))
     return items
 
 
-def _equations(derivation: Derivation) -> list[Item]:
-    """Quantities, premises, and the definitions where nothing precedes them."""
-    items: list[Item] = [Heading("Given", 3), _quantities(derivation.inputs)]
-    items += [Heading("Wanted", 3), _quantities(derivation.outputs)]
+def _equations(derivation: Derivation, written: Written) -> list[Item]:
+    """Quantities, premises, and what follows from them."""
+    items: list[Item] = [Heading("Given", 3), _quantities(derivation.inputs, written)]
+    items += [Heading("Wanted", 3), _quantities(derivation.outputs, written)]
     if derivation.premises:
         items.append(Heading("Premises", 3))
-        items += [_formula(e) for e in derivation.premises]
-    else:
-        items.append(Heading("Equations", 3))
-        items += [_formula(e) for e in derivation.definitions]
+        items += [written.formula(e) for e in derivation.premises]
+    items.append(Heading("What follows" if derivation.premises else "Equations", 3))
+    items += [written.formula(e) for e in derivation.definitions]
     return items + [Paragraph(note, "note") for note in derivation.notes]
 
 
-def _matrices(derivation: Derivation) -> list[Item]:
+def _matrices(derivation: Derivation, written: Written) -> list[Item]:
     """The definitions that follow from the premises, large matrices block by block."""
-    items: list[Item] = [Heading("Result", 3), _quantities(derivation.outputs)]
+    items: list[Item] = [Heading("Result", 3), _quantities(derivation.outputs, written)]
     states = {q.name: STATES.get(q.unit.split(",")[0], "") for q in derivation.outputs}
     items += [
-        _formula(e, states.get(str(getattr(e.left, "name", "")), ""))
+        written.formula(e, states.get(str(getattr(e.left, "name", "")), ""))
         for e in derivation.definitions
     ]
     return items + [Paragraph(note, "note") for note in derivation.notes]
 
 
-def _quantities(quantities: Iterable[Quantity]) -> Quantities:
-    return Quantities(
-        tuple(
-            QuantityRow(
-                Name(shown_name(q.name)),
-                q.name,
-                " × ".join(map(str, q.shape if q.shape[1] != 1 else q.shape[:1])),
-                q.unit,
-                q.meaning + (" (symmetric, upper triangle)" if q.symmetric else ""),
-            )
-            for q in quantities
-        )
-    )
+def _quantities(quantities: Iterable[Quantity], written: Written) -> Quantities:
+    rows: list[QuantityRow] = []
+    names = written.names
+    for q in quantities:
+        if 0 in q.shape:
+            continue
+        symmetric = " (symmetric, upper triangle)" if q.symmetric else ""
+        meaning = names.meaning(q.meaning) + symmetric
+        shape = q.shape if q.shape[1] != 1 else q.shape[:1]
+        rows.append(_row(q.name, shape, q.unit, meaning))
+        rows += [] if q.sized else _entries(q.name, written.named.parts(q.name, q.rows))
+    return Quantities(tuple(rows))
 
 
-def _ports(ports: Iterable[Port]) -> Quantities:
-    return Quantities(
-        tuple(
-            QuantityRow(
-                Name(shown_name(p.name)),
-                p.name,
-                " × ".join(map(str, p.shape)) or "1",
-                p.unit,
-                p.meaning + (" (added to)" if p.accumulate else ""),
-            )
-            for p in ports
-        )
-    )
+def _ports(ports: Iterable[Port], names: Declared) -> Quantities:
+    rows: list[QuantityRow] = []
+    for p in ports:
+        if 0 in p.shape:
+            continue
+        meaning = names.meaning(p.meaning) + (" (added to)" if p.accumulate else "")
+        rows.append(_row(p.name, p.shape, p.unit, meaning))
+        rows += _entries(p.name, names.parts(p.name, p.length()))
+    return Quantities(tuple(rows))
+
+
+def _row(name: str, shape: tuple[int | str, ...], unit: str, meaning: str) -> QuantityRow:
+    extents = " × ".join(map(str, shape)) or "1"
+    return QuantityRow(Name(shown_name(name)), name, extents, unit, meaning)
+
+
+def _entries(array: str, parts: Parts) -> Iterator[QuantityRow]:
+    """What stands in an array, by the names of its author."""
+    first = 0
+    for part in parts:
+        symbol = Name(own_name(part.name) if part.length == 1 else shown_name(part.name))
+        place = f"{array}[{first}]" if part.length == 1 else f"{array}[{first}...]"
+        shape = " × ".join(map(str, part.shape if part.shape[1] != 1 else part.shape[:1]))
+        yield QuantityRow(symbol, place, shape, part.unit, part.meaning, True)
+        first += part.length
 
 
 def _kernels(view: ElementView) -> list[Item]:
@@ -185,11 +201,11 @@ def _kernels(view: ElementView) -> list[Item]:
             Paragraph(f"{kernel.flops()} floating-point operations ({counts}){once}", "note"),
             *_sources(tuple(s for s in kernel.sources if s not in _all_sources(view))),
             Heading("reads", 3),
-            _ports(kernel.inputs),
+            _ports(kernel.inputs, view.declared),
             Heading("writes", 3),
-            _ports(kernel.outputs),
+            _ports(kernel.outputs, view.declared),
             Heading("statements", 3),
-            Code("\n".join(listing(kernel))),
+            Code("\n".join(listing(kernel, view.declared))),
         ]
     return items
 
@@ -197,13 +213,32 @@ def _kernels(view: ElementView) -> list[Item]:
 def _c_source(view: ElementView) -> list[Item]:
     items: list[Item] = []
     for kernel in view.kernels():
-        items += [Heading(f"kernel {kernel.name}", 2), _ports((*kernel.inputs, *kernel.outputs))]
+        items += [
+            Heading(f"kernel {kernel.name}", 2),
+            _ports((*kernel.inputs, *kernel.outputs), view.declared),
+        ]
     return [*items, Heading("C", 2), Code(view.c_text().rstrip("\n"))]
 
 
-def _formula(e: Equation, labels: str = "") -> Formula:
-    zeros = ""
-    if e.zeros:
-        zeros = "entries " + ", ".join(f"({i + 1},{j + 1})" for i, j in e.zeros) + " vanish"
-    remark = "; ".join(filter(None, (e.remark, zeros, labels)))
-    return Formula(e.name, tuple(stated(e.left, e.right)), e.source, remark)
+def _all(kernel: KernelIR) -> tuple[Port, ...]:
+    return (*kernel.inputs, *kernel.outputs)
+
+
+class Written:
+    """Equations of a derivation as formulas that fit, in the names of its author."""
+
+    def __init__(self, derivation: Derivation, names: Declared, measure: Columns) -> None:
+        self.names, self.measure = names, measure
+        self.named = Named(derivation, names)
+
+    def formula(self, e: Equation, labels: str = "") -> Formula:
+        """An equation, with what its blocks stand for."""
+        zeros = ""
+        if e.zeros:
+            zeros = "entries " + ", ".join(f"({i + 1},{j + 1})" for i, j in e.zeros) + " vanish"
+        remark = "; ".join(filter(None, (e.remark, zeros, labels)))
+        shape = getattr(e.left, "shape", (1, 1))
+        array = str(getattr(e.left, "name", ""))
+        rows = self.names.labels(array, shape[0]) if shape[1] == 1 else ()
+        right = e.right.xreplace(self.named.entries)
+        return Formula(e.name, tuple(stated(e.left, right, rows, self.measure)), e.source, remark)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import sympy as sp
 
 from .layout import Name, Node, Row, Sign, Table, Word, entry_index, equation, layout
+from .measure import Columns
 from .names import shown_name
 from .recognise import recognise
 from .text import box
@@ -16,94 +19,192 @@ PARTITIONS: dict[int, tuple[int, ...]] = {
     13: (3, 3, 3, 3, 1), 7: (2, 1, 1, 2, 1), 12: (3, 3, 3, 3), 9: (3, 3, 3), 6: (3, 3),
     10: (2, 1, 1, 2, 3, 1), 15: (3, 3, 3, 3, 2, 1),
 }  # fmt: skip
-
-#: A block wider than this in text gets a name and is spelled out below the matrix.
-CELL_WIDTH = 20
-#: A formula wider than this in text is stated entry by entry.
-FORMULA_WIDTH = 96
 #: Matrices with more operations than this are stated with named common sub-expressions.
 SHARED_ABOVE = 150
-#: Explicit matrices wider than this inside a formula that does not fit get a name.
-INNER_WIDTH = 16
 
 
-def stated(left: sp.Basic, right: sp.Basic) -> list[Node]:
-    """Lines of left = right; matrices in blocks where their extents are those of state vectors."""
-    shown = layout(left)
-    if isinstance(right, sp.MatrixBase):
-        return _stated_matrix(shown, right)
-    if not getattr(right, "is_Matrix", False):
-        return _scalar(shown, right)
-    line = equation(shown, layout(right))
-    return [line] if _fits(line) else _hoisted(shown, right) or [line]
+def stated(
+    left: sp.Basic,
+    right: sp.Basic,
+    rows: tuple[str, ...] = (),
+    measure: Columns = Columns(),  # noqa: B008 - it holds nothing
+) -> list[Node]:
+    """Lines of left = right; matrices in blocks where their extents are those of state vectors.
+
+    `rows` are names of the entries of a column, which is stated entry by entry then; `measure`
+    says what fits.
+    """
+    return _Stated(measure).equation(layout(left), right, rows)
 
 
-def _fits(line: Node) -> bool:
-    return box(line).width <= FORMULA_WIDTH
+class _Stated:
+    """Formulas by what fits."""
 
+    def __init__(self, measure: Columns) -> None:
+        self.measure = measure
 
-def _stated_matrix(shown: Node, matrix: sp.MatrixBase) -> list[Node]:
-    small = max(matrix.shape) <= 6 and matrix.rows * matrix.cols <= 12
-    partitioned = any(extent in PARTITIONS for extent in matrix.shape)
-    if partitioned and not small and recognise(matrix) is None:
-        return _blocks(shown, matrix)
-    return _spelled(shown, matrix)
-
-
-def _spelled(shown: Node, matrix: sp.MatrixBase) -> list[Node]:
-    """A matrix in one formula, or entry by entry where that is too wide."""
-    if matrix.shape == (1, 1):
-        return _scalar(shown, matrix[0, 0])
-    if recognise(matrix) is not None or sp.count_ops(matrix) <= SHARED_ABOVE:
-        line = equation(shown, layout(matrix))
-        if _fits(line):
+    def equation(self, shown: Node, right: sp.Basic, rows: tuple[str, ...]) -> list[Node]:
+        if isinstance(right, sp.MatrixBase):
+            roots, right = self.rooted(right)
+            whole = self.of_rows(shown, right, rows) if rows else self.matrix(shown, right)
+            return [*roots, *whole]
+        if not getattr(right, "is_Matrix", False):
+            return self.scalar(shown, right)
+        line = equation(shown, layout(right))
+        if self.measure.line(line):
             return [line]
-    return _entries(shown, matrix)
+        if isinstance(right, sp.BlockMatrix):
+            return self.of_blocks(shown, right)
+        return self.hoisted(shown, right) or [line]
+
+    def rooted(self, matrix: sp.MatrixBase) -> tuple[list[Node], sp.MatrixBase]:
+        """Long roots that stand in many places by a name, each stated once."""
+        counts = Counter(
+            sp.sqrt(node.base)
+            for entry in matrix
+            for node in sp.preorder_traversal(entry)
+            if isinstance(node, sp.Pow) and abs(node.exp) == sp.Rational(1, 2)
+        )
+        lines: list[Node] = []
+        names: dict[sp.Basic, sp.Basic] = {}
+        for root in sorted(counts, key=sp.default_sort_key):
+            if counts[root] > 2 and not self.measure.inner(layout(root)):
+                symbol = sp.Symbol(f"l_{len(names) + 1}" if names else "l", positive=True)
+                names |= {root: symbol, 1 / root: 1 / symbol}
+                lines += self.scalar(layout(symbol), root)
+        return lines, matrix.xreplace(names) if names else matrix
+
+    def of_rows(self, shown: Node, column: sp.MatrixBase, rows: tuple[str, ...]) -> list[Node]:
+        assert isinstance(shown, Name)
+        lines = []
+        for row, entry in zip(rows, column, strict=True):
+            subscript = ",".join(filter(None, (shown.name.subscript, row)))
+            lines += self.scalar(Name(replace(shown.name, subscript=subscript)), entry)
+        return lines
+
+    def matrix(self, shown: Node, matrix: sp.MatrixBase) -> list[Node]:
+        small = max(matrix.shape) <= 6 and matrix.rows * matrix.cols <= 12
+        partitioned = any(extent in PARTITIONS for extent in matrix.shape)
+        if not partitioned or recognise(matrix) is not None:
+            return self.spelled(shown, matrix)
+        if matrix.cols == 1:
+            parts = list(_parts(matrix))
+            if all(len(part) == 1 or recognise(part) is not None for part in parts):
+                line = equation(shown, Table(tuple((layout(part),) for part in parts)))
+                if self.measure.line(line):
+                    return [line]
+        return self.spelled(shown, matrix) if small else self.blocks(shown, matrix)
+
+    def spelled(self, shown: Node, matrix: sp.MatrixBase) -> list[Node]:
+        """A matrix in one formula, or entry by entry where that is too wide."""
+        if matrix.shape == (1, 1):
+            return self.scalar(shown, matrix[0, 0])
+        if recognise(matrix) is not None or sp.count_ops(matrix) <= SHARED_ABOVE:
+            line = equation(shown, layout(matrix))
+            if self.measure.line(line):
+                return [line]
+        return self.entries(shown, matrix)
+
+    def blocks(self, shown: Node, matrix: sp.MatrixBase) -> list[Node]:
+        """The matrix of its blocks, then the blocks that needed a name."""
+        rows = PARTITIONS.get(matrix.rows, (matrix.rows,))
+        columns = PARTITIONS.get(matrix.cols, (matrix.cols,))
+        table: list[tuple[Node, ...]] = []
+        below: list[Node] = []
+        for i, height in enumerate(rows):
+            cells = []
+            for j, width in enumerate(columns):
+                first, start = sum(rows[:i]), sum(columns[:j])
+                block = matrix[first : first + height, start : start + width]
+                cell = layout(block) if sp.count_ops(block) <= SHARED_ABOVE else None
+                if cell is None or not self.measure.cell(cell, len(columns)):
+                    position = f"{i + 1}{j + 1}" if len(columns) > 1 else str(i + 1)
+                    cell = _named(shown, f"⟨{position}⟩")
+                    below += self.spelled(cell, block)
+                cells.append(cell)
+            table.append(tuple(cells))
+        return [equation(shown, Table(tuple(table))), *below]
+
+    def of_blocks(self, shown: Node, matrix: sp.BlockMatrix) -> list[Node]:
+        """A matrix stated by its blocks, those that do not fit by names."""
+        rows, columns = matrix.blocks.shape
+        below: list[Node] = []
+        table = []
+        for i in range(rows):
+            cells = [layout(matrix.blocks[i, j]) for j in range(columns)]
+            for j, cell in enumerate(cells):
+                if not self.measure.line(Row((shown, cell, Word("   ")))) or columns > 1:
+                    if self.measure.cell(cell, columns):
+                        continue
+                    cells[j] = _named(shown, f"⟨{i + 1}{j + 1}⟩" if columns > 1 else f"⟨{i + 1}⟩")
+                    below += self.equation(cells[j], matrix.blocks[i, j], ())
+            table.append(tuple(cells))
+        return [equation(shown, Table(tuple(table))), *below]
+
+    def entries(self, shown: Node, matrix: sp.MatrixBase) -> list[Node]:
+        """One line for every entry that does not vanish."""
+        lines: list[Node] = []
+        reduced = sp.Matrix(matrix)
+        if sp.count_ops(matrix) > SHARED_ABOVE:
+            symbols = sp.numbered_symbols("c_", start=1)
+            shared, (reduced,) = sp.cse([sp.Matrix(matrix)], symbols=symbols)
+            for symbol, value in shared:
+                lines += self.scalar(layout(symbol), value)
+        for i in range(matrix.rows):
+            for j in range(matrix.cols):
+                if reduced[i, j] != 0:
+                    lines += self.scalar(_entry(shown, matrix.shape, i, j), reduced[i, j])
+        if any(entry == 0 for entry in reduced):
+            lines.append(Word("all other entries are 0"))
+        return lines
+
+    def scalar(self, place: Node, value: sp.Basic) -> list[Node]:
+        """place = value; a choice that does not fit becomes one line for each branch."""
+        line = equation(place, layout(value))
+        if self.measure.line(line) or (len(box(line).lines) == 1 and not value.has(sp.Piecewise)):
+            return [line]
+        if isinstance(value, sp.Piecewise):
+            return [_branch(place, *pair) for pair in value.args]
+        pieces = list(_choices(value))
+        names = {piece: _named(place, f"⟨{k}⟩") for k, piece in enumerate(pieces, start=1)}
+        lines: list[Node] = [equation(place, layout(value, names))]
+        for piece, name in names.items():
+            lines += self.scalar(name, piece)
+        return lines
+
+    def hoisted(self, shown: Node, right: sp.Basic) -> list[Node]:
+        """Explicit matrices inside a wide expression get names and are stated below it."""
+        names: dict[sp.Basic, Node] = {}
+        for matrix in _inner_matrices(right):
+            if matrix not in names and recognise(matrix) is None:
+                wide = sp.count_ops(matrix) > SHARED_ABOVE
+                if wide or not self.measure.inner(layout(matrix)):
+                    names[matrix] = _named(shown, f"⟨{len(names) + 1}⟩")
+        if not names:
+            return []
+        lines: list[Node] = [equation(shown, layout(right, names))]
+        return lines + self.stated_all(names)
+
+    def stated_all(self, names: Mapping[sp.Basic, Node]) -> list[Node]:
+        return [line for matrix, name in names.items() for line in self.matrix(name, matrix)]
 
 
-def _blocks(shown: Node, matrix: sp.MatrixBase) -> list[Node]:
-    """The matrix of its blocks, then the blocks that needed a name."""
-    rows = PARTITIONS.get(matrix.rows, (matrix.rows,))
-    columns = PARTITIONS.get(matrix.cols, (matrix.cols,))
-    table: list[tuple[Node, ...]] = []
-    below: list[Node] = []
-    for i, height in enumerate(rows):
-        cells = []
-        for j, width in enumerate(columns):
-            first, start = sum(rows[:i]), sum(columns[:j])
-            block = matrix[first : first + height, start : start + width]
-            cell = layout(block) if sp.count_ops(block) <= SHARED_ABOVE else None
-            if cell is None or len(box(cell).lines) > 1 or box(cell).width > CELL_WIDTH:
-                position = f"{i + 1}{j + 1}" if len(columns) > 1 else str(i + 1)
-                cell = _named(shown, f"⟨{position}⟩")
-                below += _spelled(cell, block)
-            cells.append(cell)
-        table.append(tuple(cells))
-    return [equation(shown, Table(tuple(table))), *below]
+def _parts(column: sp.MatrixBase) -> Iterator[sp.MatrixBase]:
+    """Parts of a column as state vectors have them."""
+    first = 0
+    for height in PARTITIONS[column.rows]:
+        yield column[first : first + height, :]
+        first += height
 
 
 def _named(shown: Node, index: str) -> Name:
     """A name made from the left side's by an index."""
-    if isinstance(shown, Name):
-        return Name(shown.name, shown.accent, shown.index + index)
-    return Name(shown_name("B"), "", index)
-
-
-def _entries(shown: Node, matrix: sp.MatrixBase) -> list[Node]:
-    """One line for every entry that does not vanish."""
-    lines: list[Node] = []
-    reduced = sp.Matrix(matrix)
-    if sp.count_ops(matrix) > SHARED_ABOVE:
-        shared, (reduced,) = sp.cse([sp.Matrix(matrix)], symbols=sp.numbered_symbols("c_", start=1))
-        for symbol, value in shared:
-            lines += _scalar(layout(symbol), value)
-    for i in range(matrix.rows):
-        for j in range(matrix.cols):
-            if reduced[i, j] != 0:
-                lines += _scalar(_entry(shown, matrix.shape, i, j), reduced[i, j])
-    if any(entry == 0 for entry in reduced):
-        lines.append(Word("all other entries are 0"))
-    return lines
+    if not isinstance(shown, Name):
+        return Name(shown_name("B"), "", index)
+    outer = shown.index
+    if outer.endswith("⟩"):
+        outer, index = outer[:-1], f".{index[1:]}"
+    return Name(shown.name, shown.accent, outer + index)
 
 
 def _entry(shown: Node, shape: tuple[int, int], i: int, j: int) -> Node:
@@ -111,21 +212,6 @@ def _entry(shown: Node, shape: tuple[int, int], i: int, j: int) -> Node:
         index = entry_index(shown.name.written(), shape, i, j)
         return Name(shown.name, shown.accent, shown.index + index)
     return Row((shown, Word(f"[{entry_index('', shape, i, j)}]")))
-
-
-def _scalar(place: Node, value: sp.Basic) -> list[Node]:
-    """place = value; a choice that does not fit becomes one line for each branch."""
-    line = equation(place, layout(value))
-    if len(box(line).lines) == 1 or _fits(line):
-        return [line]
-    if isinstance(value, sp.Piecewise):
-        return [_branch(place, *pair) for pair in value.args]
-    pieces = list(_choices(value))
-    names = {piece: _named(place, f"⟨{k}⟩") for k, piece in enumerate(pieces, start=1)}
-    lines: list[Node] = [equation(place, layout(value, names))]
-    for piece, name in names.items():
-        lines += _scalar(name, piece)
-    return lines
 
 
 def _branch(place: Node, value: sp.Basic, condition: sp.Basic) -> Node:
@@ -146,22 +232,6 @@ def _choices(value: sp.Basic) -> Iterator[sp.Piecewise]:
                 yield current
         else:
             stack.extend(sorted(current.args, key=sp.default_sort_key, reverse=True))
-
-
-def _hoisted(shown: Node, right: sp.Basic) -> list[Node]:
-    """Explicit matrices inside a wide expression get names and are stated below it."""
-    names: dict[sp.Basic, Node] = {}
-    for matrix in _inner_matrices(right):
-        if matrix not in names and recognise(matrix) is None:
-            wide = sp.count_ops(matrix) > SHARED_ABOVE or box(layout(matrix)).width > INNER_WIDTH
-            if wide:
-                names[matrix] = _named(shown, f"⟨{len(names) + 1}⟩")
-    return [equation(shown, layout(right, names)), *_stated_all(names)] if names else []
-
-
-def _stated_all(names: Mapping[sp.Basic, Node]) -> Iterator[Node]:
-    for matrix, name in names.items():
-        yield from _stated_matrix(name, matrix)
 
 
 def _inner_matrices(expression: sp.Basic) -> Iterator[sp.MatrixBase]:

@@ -9,8 +9,10 @@ from .layout import Fence, Fraction, Name, Node, Raised, Root, Row, Sign, Table,
 from .names import GREEK, ShownName
 
 STYLE = """
-:root { color-scheme: light; --ink: #1b1f24; --soft: #57606a; --line: #d5dae0; --page: #fdfdfc;
+html { color-scheme: light; --ink: #1b1f24; --soft: #57606a; --line: #d5dae0; --page: #fdfdfc;
   --block: #f4f6f8; --accent: #0a5a8a; }
+@media print { html { color-scheme: light; --ink: #000; --soft: #444; --line: #bbb; --page: #fff;
+  --block: #fff; --accent: #000; } }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--page); color: var(--ink);
   font: 16px/1.55 "Source Serif 4", Charter, Georgia, "Times New Roman", serif; }
@@ -20,19 +22,23 @@ h2 { font-size: 1.25rem; margin: 2.4rem 0 .8rem; padding-top: .8rem;
   border-top: 1px solid var(--line); }
 h3 { font-size: 1rem; margin: 1.6rem 0 .5rem; color: var(--accent); }
 p { margin: .4rem 0; } p.note, p.sources { color: var(--soft); font-size: .92rem; }
+.wide { overflow-x: auto; }
+table.quantities tr.inner td:first-child { padding-left: 1.2rem; }
 table.quantities { border-collapse: collapse; width: 100%; font-size: .93rem; }
 table.quantities th { text-align: left; font-weight: 600; color: var(--soft); }
 table.quantities th, table.quantities td { padding: .28rem .8rem .28rem 0;
   border-bottom: 1px solid var(--line); vertical-align: baseline; }
+table.quantities td:nth-child(3) { white-space: nowrap; }
 table.quantities code { font-size: .88em; color: var(--soft); }
 figure { margin: .7rem 0; padding: .55rem .9rem; background: var(--block); border-radius: 6px; }
 figure .formula { overflow-x: auto; padding: .35rem 0; }
-figcaption { display: flex; gap: 1rem; justify-content: space-between; font-size: .87rem;
+figcaption { display: flex; flex-wrap: wrap; gap: 0 1rem; font-size: .87rem;
+  justify-content: space-between;
   color: var(--soft); }
 figcaption .source { white-space: nowrap; font-style: italic; }
 math { font-size: 1.12rem; font-family: "STIX Two Math", "Latin Modern Math", "Cambria Math",
   "Libertinus Math", "DejaVu Math TeX Gyre", math; }
-figure math { display: block math; text-align: left; margin: 0 0 0 1.2rem; }
+figure .formula math { margin: 0 0 0 1.2rem; }
 mover > mo { padding-bottom: .1em; }
 /* Brackets and braces are drawn, so that they stretch with any font. */
 mtable.matrix, mtable.cases { padding: .1em .25em; margin: 0 .12em; }
@@ -46,13 +52,24 @@ mtable.matrix mtd { padding: .26em .55em; }
 mtable.cases mtd { padding: .26em .7em; text-align: left; }
 pre { background: var(--block); border-radius: 6px; padding: .9rem 1rem; overflow-x: auto;
   font: 13px/1.5 "JetBrains Mono", "DejaVu Sans Mono", Menlo, Consolas, monospace; }
-@media print { main { max-width: none; } figure { break-inside: avoid; } }
+@media (max-width: 40rem) { main { padding: 1rem .8rem 2rem; } figure { padding: .4rem .6rem; }
+  table.quantities { font-size: .85rem; } }
+@media print { body { font-size: 11pt; } main { max-width: none; padding: 0; }
+  figure { padding: 0; break-inside: avoid; } pre { white-space: pre-wrap; font-size: 7pt; }
+  math { font-size: 1rem; } h2, h3 { break-after: avoid; }
+  .wide, figure .formula { overflow: visible; } }
+"""
+
+#: Pages of formulas alone go dark with their reader; pictures of reports are drawn on white.
+DARK = """
+@media (prefers-color-scheme: dark) { :root { color-scheme: dark; --ink: #e3e6ea; --soft: #9aa4af;
+  --line: #363c44; --page: #15181c; --block: #1e2227; --accent: #6fb5e0; } }
 """
 
 
 def mathml(node: Node, display: bool = True) -> str:
-    """A <math> element; displayed formulas on their own line."""
-    kind = ' display="block"' if display else ""
+    """A <math> element; formulas that stand alone in the size of such."""
+    kind = ' displaystyle="true"' if display else ""
     return f'<math xmlns="http://www.w3.org/1998/Math/MathML"{kind}>{_markup(node)}</math>'
 
 
@@ -87,8 +104,8 @@ def _markup(node: Node) -> str:
     if isinstance(node, Name):
         return name_markup(node.name, node.accent, node.index)
     if isinstance(node, Word):
-        number = re.fullmatch(r"[0-9.]+", node.text) is not None
-        tag = "mn" if number or node.text == "−1" else "mi" if len(node.text) == 1 else "mtext"
+        number = re.fullmatch(r"−?[0-9.]+", node.text) is not None
+        tag = "mn" if number else "mi" if len(node.text) == 1 else "mtext"
         return f"<{tag}>{_kept(node.text)}</{tag}>"
     if isinstance(node, Sign):
         return _sign(node)
@@ -135,6 +152,6 @@ def page(title: str, body: str) -> str:
         "<!DOCTYPE html>\n"
         '<html lang="en">\n<head>\n<meta charset="utf-8"/>\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1"/>\n'
-        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n"
+        f"<title>{escape(title)}</title>\n<style>{DARK}{STYLE}</style>\n</head>\n"
         f"<body>\n<main>\n{body}\n</main>\n</body>\n</html>\n"
     )

@@ -10,14 +10,20 @@ from .names import GREEK, ShownName
 _SIGNS = {
     "−": "-", "≤": r"\le ", "≥": r"\ge ", "≠": r"\ne ", " ": r"\,", "·": r"\cdot ",
 }  # fmt: skip
-_WORDS = {"∼": r"\sim", "⊥": r"\perp", "π": r"\pi", "T": r"\mathsf{T}", "−1": "-1", "I": "I"}
+_WORDS = {
+    "∼": r"\sim", "⊥": r"\perp", "π": r"\pi", "T": r"\mathsf{T}", "−1": "-1", "I": "I",
+    "−T": r"-\mathsf{T}", "∫": r"\textstyle\int",
+}  # fmt: skip
 _FUNCTIONS = {"sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "max", "min"}
 _TEXT = {
     "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "_": r"\_", "%": r"\%", "&": r"\&",
     "#": r"\#", "$": r"\$", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}",
     "<": r"\textless{}", ">": r"\textgreater{}", "–": "--", "·": r"$\cdot$", "…": r"\dots{}",
     "≤": r"$\le$", "≥": r"$\ge$", "²": r"$^2$", "³": r"$^3$", "−": r"$-$",
+    "×": r"$\times$", "\u2003": r"\quad{}",
 }  # fmt: skip
+#: Matrices of more columns than this stand closer.
+_NARROW = 5
 
 
 def escaped(text: str) -> str:
@@ -81,8 +87,9 @@ def latex(node: Node) -> str:
     rows = r" \\ ".join(" & ".join(latex(cell) for cell in row) for row in node.rows)
     if node.cases:
         return rf"\begin{{cases}} {rows} \end{{cases}}"
-    layout = "c" * len(node.rows[0])
-    return rf"\left[\begin{{array}}{{{layout}}} {rows} \end{{array}}\right]"
+    columns = len(node.rows[0])
+    narrow = r"\arraycolsep3pt" if columns > _NARROW else ""
+    return rf"\left[{narrow}\begin{{array}}{{{'c' * columns}}} {rows} \end{{array}}\right]"
 
 
 def _word(text: str) -> str:
@@ -90,6 +97,6 @@ def _word(text: str) -> str:
         return _WORDS[text]
     if text in _FUNCTIONS:
         return "\\" + text
-    if re.fullmatch(r"[0-9.]+", text):
-        return text
-    return rf"\text{{{escaped(text)}}}" if text.isascii() else escaped(text)
+    if re.fullmatch(r"−?[0-9.]+", text):
+        return text.replace("−", "-")
+    return rf"\text{{{escaped(text)}}}"

@@ -19,7 +19,8 @@ from sympy.matrices.expressions.slice import MatrixSlice
 
 from ..language.derivation import Factor, Solve, Triangle, Triangular
 from ..language.notation import Perp, Tilde
-from .names import ShownName, shown_name
+from .entries import Own
+from .names import ShownName, own_name, shown_name
 from .recognise import Part, recognise
 
 
@@ -234,7 +235,7 @@ class _Layout:
         return Row(_spaced([inverse, self.fenced(e.right, _POWER)])), _PRODUCT
 
     def factor(self, e: Factor) -> tuple[Node, int]:
-        return Row((Word("LDLᵀ"), Fence("(", self.node(e.matrix), ")"))), _ATOM
+        return Row((Raised(Word("LDL"), Word("T")), Fence("(", self.node(e.matrix), ")"))), _ATOM
 
     def triangular(self, e: Triangular) -> tuple[Node, int]:
         lower = Row((Word("L"), Fence("(", self.node(e.factor), ")")))
@@ -347,6 +348,9 @@ def entry_index(name: str, shape: tuple[int, int], i: int, j: int) -> str:
 
 
 def _number(_: _Layout, e: sp.Number) -> tuple[Node, int]:
+    digits = len(str(e.q)) - 1 if isinstance(e, sp.Rational) and e.p == 1 else 0
+    if digits > 2 and e.q == 10**digits:
+        return Raised(Word("10"), Word(f"−{digits}")), _POWER
     if isinstance(e, sp.Rational) and e.q != 1:
         sign: tuple[Node, ...] = (Sign("−"),) if e.p < 0 else ()
         return Row((*sign, Fraction(Word(str(abs(e.p))), Word(str(e.q))))), _PRODUCT
@@ -356,7 +360,8 @@ def _number(_: _Layout, e: sp.Number) -> tuple[Node, int]:
 
 
 def _symbol(_: _Layout, e: sp.Basic) -> tuple[Node, int]:
-    return Name(shown_name(str(e.name))), _ATOM
+    named = own_name if isinstance(e, Own) else shown_name
+    return Name(named(str(e.name))), _ATOM
 
 
 def _applied(_: _Layout, e: AppliedUndef) -> tuple[Node, int]:

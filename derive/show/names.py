@@ -35,23 +35,33 @@ def shown_name(name: str) -> ShownName:
     """Split a port's or symbol's name into what is shown."""
     head, _, subscript = name.partition("_")
     base, dots = _undotted(head)
-    if _is_letter(base):
+    if is_letter(base):
         return ShownName(base, dots, subscript)
     numbered = re.fullmatch(r"([A-Za-z]+?)(\d+)", head)
-    if numbered and _is_letter(numbered[1]):
+    if numbered and is_letter(numbered[1]):
         return ShownName(numbered[1], 0, ",".join(filter(None, (numbered[2], subscript))))
     short = len(subscript) <= 2
     return ShownName(head if short else name, 0, subscript if short else "", upright=True)
 
 
+def own_name(name: str) -> ShownName:
+    """A name that an author chose: a letter with its subscript, or the word as it is."""
+    head, _, subscript = name.partition("_")
+    numbered = re.fullmatch(r"([A-Za-z]+?)(\d*)", head)
+    if numbered and is_letter(numbered[1]):
+        return ShownName(numbered[1], 0, ",".join(filter(None, (numbered[2], subscript))))
+    return ShownName(name, upright=True)
+
+
 def _undotted(head: str) -> tuple[str, int]:
     for suffix, dots in _DOTS:
-        if head.endswith(suffix) and _is_letter(head.removesuffix(suffix)):
+        if head.endswith(suffix) and is_letter(head.removesuffix(suffix)):
             return head.removesuffix(suffix), dots
     return head, 0
 
 
-def _is_letter(text: str) -> bool:
+def is_letter(text: str) -> bool:
+    """Whether this is one letter, Greek ones by their names."""
     return len(text) == 1 or text in GREEK
 
 

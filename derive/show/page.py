@@ -7,11 +7,14 @@ kernels' statements), c (the generated source).  Every page carries units and so
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Callable
 from html import escape
 
 from mstmm.errors import ElementError
 
+from .breaking import PaperLine, paper_lines
+from .captions import caption
 from .document import (
     STAGES,
     Code,
@@ -26,7 +29,8 @@ from .document import (
 )
 from .html import mathml, page
 from .latex import escaped, latex, latex_unit
-from .layout import Node, Word
+from .layout import Name, Node, Row, Word, equation
+from .measure import Columns, Paper
 from .names import shown_unit
 from .text import WIDTH, box, columns, pad, wrapped
 
@@ -46,7 +50,8 @@ def show_view(view: ElementView, at: str = "equations", format: str = "text") ->
     """The page of a view: complete HTML, a LaTeX fragment (amsmath), or text of 100 columns."""
     if format not in FORMATS:
         raise ElementError(f"no format {format!r}; there are {', '.join(FORMATS)}")
-    return FORMATS[format](view.title, document(view, at))
+    measure = Columns() if format == "text" else Paper()
+    return FORMATS[format](view.title, document(view, at, measure))
 
 
 # --- text -------------------------------------------------------------------------------------
@@ -63,11 +68,13 @@ def _text_item(item: Item) -> list[str]:
     if isinstance(item, Heading):
         if item.level == 3:
             return ["", item.text]
-        return ["", item.text, ("=" if item.level == 1 else "-") * min(columns(item.text), WIDTH)]
+        text = _in_text(item.text)
+        return ["", text, ("=" if item.level == 1 else "-") * min(columns(text), WIDTH)]
     if isinstance(item, Paragraph):
         label = {"sources": "source: ", "note": "note: "}.get(item.kind, "")
         before = [""] if item.kind == "note" else []
-        return [*before, *_folded(label + item.text)]
+        text = item.text if item.kind == "sources" else _in_text(item.text)
+        return [*before, *_folded(label + text)]
     if isinstance(item, Quantities):
         return _text_table(item.rows)
     if isinstance(item, Formula):
@@ -76,12 +83,18 @@ def _text_item(item: Item) -> list[str]:
 
 
 def _text_formula(item: Formula) -> list[str]:
-    head = " · ".join(filter(None, (item.name, item.source, item.remark)))
+    head = " · ".join(filter(None, (_in_text(item.name), item.source, _in_text(item.remark))))
     lines = ["", *_folded("  " + head)]
     tall = any(len(box(line).lines) > 1 for line in item.lines)
     for line in item.lines:
         lines += wrapped(line) + ([""] if tall else [])
     return lines
+
+
+def _in_text(text: str) -> str:
+    """A sentence, its formulas typeset."""
+    parts = (p if isinstance(p, str) else box(p).lines[0] for p in caption(text))
+    return "".join(parts)
 
 
 def _folded(text: str, width: int = WIDTH) -> list[str]:
@@ -96,7 +109,13 @@ def _folded(text: str, width: int = WIDTH) -> list[str]:
 
 
 def _text_table(rows: tuple[QuantityRow, ...]) -> list[str]:
-    cells = [(box(r.symbol).lines[0], r.port, r.shape, shown_unit(r.unit), r.meaning) for r in rows]
+    cells = [
+        (
+            "  " * r.inner + box(r.symbol).lines[0], r.port, r.shape, shown_unit(r.unit),
+            _in_text(r.meaning),
+        )
+        for r in rows
+    ]  # fmt: skip
     if not cells:
         return ["  none"]
     widths = [max(columns(row[k]) for row in cells) for k in range(4)]
@@ -115,46 +134,92 @@ def _text_table(rows: tuple[QuantityRow, ...]) -> list[str]:
 
 def _latex_page(title: str, items: list[Item]) -> str:
     body = "\n".join(_latex_item(item) for item in items)
-    return f"% {title}; needs amsmath\n{body}\n"
+    return f"% {title}; needs amsmath\n{{\\allowdisplaybreaks\n{body}\n}}\n"
 
 
 def _latex_item(item: Item) -> str:
     if isinstance(item, Heading):
-        command = ("section", "subsection", "paragraph")[item.level - 1]
-        return rf"\{command}*{{{escaped(item.text)}}}"
+        command = ("section", "subsection", "subsubsection")[item.level - 1]
+        return rf"\{command}*{{{_in_latex(item.text)}}}"
     if isinstance(item, Paragraph):
-        text = escaped(item.text)
-        return rf"\emph{{{text}}}\par" if item.kind == "sources" else rf"{text}\par"
+        if item.kind == "sources":
+            return rf"{{\raggedright\emph{{{escaped(item.text)}}}\par}}"
+        return rf"{{\raggedright {_in_latex(item.text)}\par}}"
     if isinstance(item, Quantities):
-        rows = "\n".join(_latex_row(row) for row in item.rows)
-        return "\\begin{tabular}{llllp{7cm}}\n" + rows + "\n\\end{tabular}\\par"
+        tables = range(0, len(item.rows), _ROWS)
+        return "\n".join(_latex_table(item.rows[k : k + _ROWS]) for k in tables)
     if isinstance(item, Formula):
         return _latex_formula(item)
-    return "\\begin{verbatim}\n" + item.text + "\n\\end{verbatim}"
+    return _VERBATIM.format("\n".join(map(_code_line, item.text.split("\n"))))
+
+
+def _code_line(line: str) -> str:
+    """A line of code, broken where it is wider than the page."""
+    if len(line) <= WIDTH:
+        return line
+    options = {"subsequent_indent": " " * 8, "drop_whitespace": True, "break_on_hyphens": False}
+    return textwrap.fill(line, WIDTH, **options)  # type: ignore[arg-type]
+
+
+#: Rows of a table that fit on a page with room to spare.
+_ROWS = 24
+#: A line of 100 columns fits the text width.
+_VERBATIM = "{{\\fontsize{{6}}{{7.2}}\\selectfont\n\\begin{{verbatim}}\n{}\n\\end{{verbatim}}}}"
+_COLUMNS = "".join(rf"p{{{w}\textwidth}}" for w in (0.22, 0.19, 0.07, 0.13, 0.31))
+
+
+def _latex_table(rows: tuple[QuantityRow, ...]) -> str:
+    return (
+        "{\\footnotesize\\tabcolsep3pt\\noindent\n"
+        rf"\begin{{tabular}}{{@{{}}{_COLUMNS}@{{}}}}" + "\n"
+        + "\n".join(map(_latex_row, rows))
+        + "\n\\end{tabular}\\par}"
+    )  # fmt: skip
+
+
+def _in_latex(text: str) -> str:
+    parts = (escaped(p) if isinstance(p, str) else f"${{}}{latex(p)}$" for p in caption(text))
+    return "".join(parts)
 
 
 def _latex_row(row: QuantityRow) -> str:
+    indent = r"\quad " if row.inner else ""
     cells = (
-        f"${latex(row.symbol)}$",
-        rf"\texttt{{{escaped(row.port)}}}",
+        indent + _symbol(row.symbol),
+        rf"\texttt{{{_parting(row.port)}}}",
         "$" + row.shape.replace("×", r"\times") + "$",
         latex_unit(row.unit),
-        escaped(row.meaning),
+        _in_latex(row.meaning),
     )
-    return " & ".join(cells) + r" \\"
+    return " & ".join(rf"\raggedright {cell}" for cell in cells) + r"\tabularnewline"
+
+
+def _symbol(symbol: Node) -> str:
+    """A name in a table, where long words may part."""
+    if isinstance(symbol, Name) and symbol.name.upright and not symbol.index:
+        return _parting(symbol.name.written())
+    return f"${latex(symbol)}$"
+
+
+def _parting(word: str) -> str:
+    return escaped(word).replace(r"\_", r"\_\allowbreak{}")
 
 
 def _latex_formula(item: Formula) -> str:
-    head = escaped(item.name) + (f" {escaped(item.source)}" if item.source else "")
-    tail = f" --- {escaped(item.remark)}" if item.remark else ""
-    rows = " \\\\\n".join(_aligned(line) for line in item.lines)
-    return f"\\noindent {head}{tail}\n\\begin{{align*}}\n{rows}\n\\end{{align*}}"
+    head = _in_latex(item.name) + (f" {escaped(item.source)}" if item.source else "")
+    tail = f" --- {_in_latex(item.remark)}" if item.remark else ""
+    rows = " \\\\\n".join(_aligned(part) for line in item.lines for part in paper_lines(line))
+    return (
+        f"{{\\raggedright\\noindent {head}{tail}\\par}}\n\\begin{{align*}}\n{rows}\n\\end{{align*}}"
+    )
 
 
-def _aligned(line: Node) -> str:
-    if isinstance(line, Word):
-        return rf"&\text{{{escaped(line.text)}}}"
-    return latex(line).replace(" = ", " &= ", 1)
+def _aligned(part: PaperLine) -> str:
+    if part.left is not None:
+        return f"{latex(part.left)} &= {latex(part.right)}"
+    if isinstance(part.right, Word):
+        return rf"&\text{{{escaped(part.right.text)}}}"
+    return rf"&\quad{{}} {latex(part.right)}"
 
 
 # --- HTML -------------------------------------------------------------------------------------
@@ -166,32 +231,47 @@ def _html_page(title: str, items: list[Item]) -> str:
 
 def _html_item(item: Item) -> str:
     if isinstance(item, Heading):
-        return f"<h{item.level}>{escape(item.text)}</h{item.level}>"
+        return f"<h{item.level}>{_in_html(item.text)}</h{item.level}>"
     if isinstance(item, Paragraph):
         label = "Source: " if item.kind == "sources" else ""
-        return f'<p class="{item.kind}">{label}{escape(item.text)}</p>'
+        text = escape(item.text) if item.kind == "sources" else _in_html(item.text)
+        return f'<p class="{item.kind}">{label}{text}</p>'
     if isinstance(item, Quantities):
         head = "".join(f"<th>{t}</th>" for t in ("symbol", "name", "size", "unit", "meaning"))
         rows = "\n".join(_html_row(row) for row in item.rows)
-        return f'<table class="quantities">\n<tr>{head}</tr>\n{rows}\n</table>'
+        table = f'<table class="quantities">\n<tr>{head}</tr>\n{rows}\n</table>'
+        return f'<div class="wide">{table}</div>'
     if isinstance(item, Code):
         return f"<pre><code>{escape(item.text)}</code></pre>"
-    lines = "\n".join(f'<div class="formula">{mathml(line)}</div>' for line in item.lines)
-    remark = f" — {escape(item.remark)}" if item.remark else ""
+    parts = (part for line in item.lines for part in paper_lines(line))
+    lines = "\n".join(f'<div class="formula">{mathml(_html_line(part))}</div>' for part in parts)
+    remark = f" — {_in_html(item.remark)}" if item.remark else ""
     source = f'<span class="source">{escape(item.source)}</span>' if item.source else ""
-    caption = f"<figcaption><span>{escape(item.name)}{remark}</span>{source}</figcaption>"
+    caption = f"<figcaption><span>{_in_html(item.name)}{remark}</span>{source}</figcaption>"
     return f"<figure>{caption}\n{lines}</figure>"
 
 
+def _in_html(text: str) -> str:
+    parts = (escape(p) if isinstance(p, str) else mathml(p, display=False) for p in caption(text))
+    return "".join(parts)
+
+
+def _html_line(part: PaperLine) -> Node:
+    if part.left is None:
+        return part.right if isinstance(part.right, Word) else Row((Word("\u2003"), part.right))
+    return equation(part.left, part.right)
+
+
 def _html_row(row: QuantityRow) -> str:
+    kind = ' class="inner"' if row.inner else ""
     cells = (
         mathml(row.symbol, display=False),
         f"<code>{escape(row.port)}</code>",
         escape(row.shape),
         escape(shown_unit(row.unit)),
-        escape(row.meaning),
+        _in_html(row.meaning),
     )
-    return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+    return f"<tr{kind}>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
 
 
 #: Format name -> printer of (title, items).

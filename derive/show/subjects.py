@@ -18,8 +18,14 @@ from ..catalogue.kernels import MAX_SPEEDS, Kernel, built_in, built_in_kernels, 
 from ..catalogue.registry import Element, builtin_elements, kind_of
 from ..catalogue.specs import generic_spec, shared_specs, spec_of
 from ..classical.catalogue import classical_spec
+from ..elements.body_rigid import RigidBody
+from ..equations.hinge import speeds_of
+from ..equations.rigid_body import newton_euler_form
+from ..language.derivation import Derivation
+from ..language.element import Hinge
 from ..print.render import element_source
 from .document import ElementView
+from .entries import Declared, declared
 
 __all__ = ["KINDS", "ElementView", "full_name", "names", "of_element", "view"]
 
@@ -66,8 +72,19 @@ def of_element(element: Element) -> ElementView:
     name = f"{kind_of(element)}_{element.name}"
     return _view(
         name, element.title or element.name, kernels_of(element), element.sources,
-        lambda: element_source(spec_of(element)),
+        lambda: element_source(spec_of(element)), _declared(element),
+        tuple(make() for kind, make in _BEFORE.items() if type(element) is kind),
     )  # fmt: skip
+
+
+#: What the equations of an element come from, where that is a derivation of its own.
+_BEFORE: dict[type, Callable[[], Derivation]] = {RigidBody: newton_euler_form}
+
+
+def _declared(element: Element) -> Declared:
+    if isinstance(element, Hinge):
+        return declared(element.coordinates, speeds_of(element), element.parameters)
+    return declared((), (), element.parameters)
 
 
 def _of_step(kind: str, name: str) -> ElementView:
@@ -100,8 +117,11 @@ def _view(
     kernels: tuple[Kernel, ...],
     sources: tuple[str, ...],
     c_text: Callable[[], str],
+    names: Declared | None = None,
+    before: tuple[Derivation, ...] = (),
 ) -> ElementView:
     def lowered() -> tuple[KernelIR, ...]:
         return tuple(kernel.ir() for kernel in kernels)
 
-    return ElementView(name, title, tuple(k.derivation for k in kernels), lowered, c_text, sources)
+    derivations = (*before, *(k.derivation for k in kernels))
+    return ElementView(name, title, derivations, lowered, c_text, sources, names or Declared())

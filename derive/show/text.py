@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from dataclasses import dataclass
 
@@ -12,7 +13,8 @@ WIDTH = 100
 
 _DOTS = ("", "\u0307", "\u0308")
 _ACCENTS = {"": "", "tilde": "\u0303", "perp": "\u22a5"}
-_RAISED = {"T": "ᵀ", "−1": "⁻¹", "2": "²", "3": "³", "4": "⁴", "∼": "~", "⊥": "⊥"}
+_RAISED = {"T": "ᵀ", "∼": "~", "⊥": "⊥", "+": "⁺", "−T": "⁻ᵀ"}
+_DIGITS = str.maketrans("0123456789−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 @dataclass(frozen=True)
@@ -74,8 +76,11 @@ def box(node: Node) -> Box:
 
 def _index(index: str) -> str:
     """.x, [2,3], or the name of a block as it is."""
-    if not index or index.startswith("⟨"):
-        return index
+    block, closed, own = index.rpartition("⟩")
+    if closed:
+        return block + closed + _index(own)
+    if not index:
+        return ""
     return f".{index}" if index in ("x", "y", "z") else f"[{index}]"
 
 
@@ -95,6 +100,8 @@ def _plain(node: Node) -> bool:
 def _exponent(node: Node) -> str:
     inner = box(node)
     text = inner.lines[inner.baseline]
+    if re.fullmatch(r"−?\d+", text):
+        return text.translate(_DIGITS)
     return _RAISED.get(text, f"^{text}" if len(text) == 1 else f"^({text})")
 
 

@@ -139,6 +139,7 @@ def _kept(kind: str, name: str, at: str) -> ElementView:
 
 def _of_spec(spec: ElementSpec, source: str) -> ElementView:
     from mstmm.derive.show.document import ElementView
+    from mstmm.derive.show.entries import of_spec
 
     return ElementView(
         f"{spec.kind}_{spec.name}",
@@ -147,4 +148,5 @@ def _of_spec(spec: ElementSpec, source: str) -> ElementView:
         lambda: spec.kernels,
         lambda: source,
         spec.sources,
+        of_spec(spec),
     )

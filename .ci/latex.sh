@@ -1,0 +1,5 @@
+#!/usr/bin/env bash
+# The equations of everything that can be shown, compiled by pdflatex: no error, no line too wide.
+source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+
+PYTHONPATH="$ROOT/tests" "$VENV/bin/python" -m pages.latex
