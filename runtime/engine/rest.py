@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
@@ -24,24 +25,27 @@ _SKEW, _ITERATIONS_WITHOUT_POTENTIAL = 1e-4, 20
 _HALVINGS = 40
 #: Steps of the difference quotients, in sizes: where a stiffness is no rounding both agree.
 _COARSE, _FINE = 1e-4, 1e-5
+#: Stiffness in parts of the largest one, all in J, that is rounding of it.
+_NOTHING = 1e-16
 #: First part of the load that is tried where the whole is too much, and the smallest.
 _FIRST_PART, _LEAST_PART = 0.25, 2.0**-10
 
 
 class Unsettled(NumericalFailure):
-    """No rest found; `residual` (n,) is what was left."""
+    """No rest found; `residual` (n,) is what was left along coordinates of `problem`."""
 
-    def __init__(self, message: str, residual: Array) -> None:
+    def __init__(self, message: str, residual: Array, problem: Rest | None = None) -> None:
         super().__init__(message)
-        self.residual = residual
+        self.residual, self.problem = residual, problem
 
 
 class Undetermined(NumericalFailure):
-    """Rest that nothing holds in some directions; `places` are the coordinates they move."""
+    """Rest that nothing holds in some directions; `places` are the coordinates they move among
+    those of `problem`."""
 
-    def __init__(self, places: Sequence[int]) -> None:
+    def __init__(self, places: Sequence[int], problem: Rest) -> None:
         super().__init__("")
-        self.places = tuple(places)
+        self.places, self.problem = tuple(places), problem
 
 
 @dataclass(frozen=True)
@@ -52,11 +56,20 @@ class Rest:
         needed: q -> efforts (n,) that rest needs in the coordinates, N, N*m.
         moved: q and a small motion (n,) -> q after it.
         sizes: (n,) motions of order one: 1 rad, the length of a body; m or rad.
+        places: which speeds of the scene they are, for who asks.
+        there: the same in coordinates that tell motions of another q apart, where those of here
+            need not.
     """
 
     needed: Callable[[Array], Array]
     moved: Callable[[Array, Array], Array]
     sizes: Array
+    places: tuple[int, ...] = ()
+    there: Callable[[Array], Rest] | None = None
+
+    def at(self, q: Array) -> Rest:
+        """In coordinates that serve at q."""
+        return self if self.there is None else self.there(q)
 
     def efforts(self, q: Array) -> Array:
         """Efforts times sizes, J.  NumericalFailure where they are not finite."""
@@ -80,21 +93,25 @@ class Rest:
 
 
 def at_rest(problem: Rest, q: Array, tolerance: float) -> Array:
+    """`approached`, and refused where nothing pushes a motion back: Undetermined."""
+    found = approached(problem, q, tolerance)
+    leaving(problem.at(found), found)
+    return found
+
+
+def approached(problem: Rest, q: Array, tolerance: float) -> Array:
     """q at rest, coordinates within `tolerance` times their sizes, or within rounding.
 
     Newton's method at once, else with the load in parts: what is missing at the start is given as
-    an effort from outside and taken away bit by bit.  Raises Unsettled, and Undetermined where
-    nothing pushes a motion back.
+    an effort from outside and taken away bit by bit.  Raises Unsettled.
     """
     try:
-        found = _newton(problem, q, tolerance, _MAX_ITERATIONS, _downhill)
+        return _newton(problem, q, tolerance, _MAX_ITERATIONS, _downhill)
     except Unsettled as failure:
         try:
-            found = _in_parts(problem, q, tolerance)
+            return _in_parts(problem, q, tolerance)
         except NumericalFailure:
             raise failure from None
-    _refuse_undetermined(problem, found)
-    return found
 
 
 def _in_parts(problem: Rest, q: Array, tolerance: float) -> Array:
@@ -130,10 +147,13 @@ def _newton(
 ) -> Array:
     residual = problem.efforts(q)
     for k in range(iterations):
+        nearby = problem.at(q)
+        if nearby is not problem:
+            problem, residual = nearby, nearby.efforts(q)
         try:
             slope = problem.slope(q)
         except NumericalFailure as failure:
-            raise Unsettled(str(failure), residual / problem.sizes) from None
+            raise Unsettled(str(failure), residual / problem.sizes, problem) from None
         scale = _scale(slope, residual)
         if k >= _ITERATIONS_WITHOUT_POTENTIAL and _is_skew(slope, scale):
             iterations = k
@@ -145,7 +165,7 @@ def _newton(
         q, residual, falls = _followed(problem, q, residual, step, scale)
         if not falls and length < _COARSE and _is_rounding(problem, q, residual):
             return q
-    raise Unsettled(f"no rest after {iterations} steps", residual / problem.sizes)
+    raise Unsettled(f"no rest after {iterations} steps", residual / problem.sizes, problem)
 
 
 def _is_skew(slope: Array, scale: Array) -> bool:
@@ -154,9 +174,10 @@ def _is_skew(slope: Array, scale: Array) -> bool:
     return float(skew.max(initial=0.0)) > _SKEW
 
 
-def _scale(slope: Array, residual: Array) -> Array:
-    """(n,) the stiffness of each coordinate as it shows: K_ii, or K_ij^2 / K_jj, or the effort."""
-    own = np.maximum(np.abs(np.diag(slope)), 1e-300)
+def _scale(slope: Array, residual: Array, noise: Array | float = 0.0) -> Array:
+    """(n,) the stiffness of each coordinate as it shows: K_ii, or K_ij^2 / K_jj, or the effort;
+    `noise` is what of K_jj is rounding."""
+    own = np.maximum(np.maximum(np.abs(np.diag(slope)), noise), 1e-300)
     coupled = np.max(((slope + slope.T) / 2) ** 2 / own, axis=1, initial=0.0)
     return np.maximum.reduce([own, coupled, np.abs(residual)])
 
@@ -211,7 +232,7 @@ def _followed(
             return trial, left, falls
         step, along = step / 2, along / 2
     if reached is None:
-        raise Unsettled("no step leads to another state", residual / problem.sizes)
+        raise Unsettled("no step leads to another state", residual / problem.sizes, problem)
     return *reached, False
 
 
@@ -234,16 +255,26 @@ def _is_rounding(problem: Rest, q: Array, residual: Array) -> bool:
     return bool((np.abs(residual) <= 10 * _FINE * noise.max(axis=1, initial=0.0)).all())
 
 
-def _refuse_undetermined(problem: Rest, q: Array) -> None:
-    """Undetermined for directions whose stiffness is rounding beside that of their coordinates."""
+def leaving(problem: Rest, q: Array) -> tuple[int, ...]:
+    """Coordinates that leave a rest once it is disturbed, as their stiffness is negative; none
+    where efforts have no potential, whose stiffness does not tell.
+
+    Raises Undetermined for directions whose stiffness is rounding beside that of their coordinates.
+    """
     slope, noise = _noise(problem, q)
-    scale = np.maximum(_scale(slope, np.zeros(len(slope))), np.diag(noise))
+    nothing = _NOTHING * float(np.abs(slope).max(initial=0.0))
+    scale = _scale(slope, np.zeros(len(slope)), np.maximum(np.diag(noise), nothing))
     root = np.sqrt(scale)
     both = (slope + slope.T) / 2
     values, directions = np.linalg.eigh(both / np.outer(root, root))
     spread = np.abs(directions) / root[:, None]
-    unsure = np.einsum("ik,ij,jk->k", spread, noise, spread)
-    loose = np.abs(values) <= 4 * unsure + 1e-13
+    unsure = 4 * np.einsum("ik,ij,jk->k", spread, noise, spread) + 1e-13
+
+    def moving(which: NDArray[np.bool_]) -> tuple[int, ...]:
+        share = spread[:, which].max(axis=1, initial=0.0) * root
+        return tuple(np.flatnonzero(share > 0.1).tolist())
+
+    loose = np.abs(values) <= unsure
     if loose.any():
-        share = spread[:, loose].max(axis=1) * root
-        raise Undetermined([int(j) for j in np.nonzero(share > 0.1)[0]])
+        raise Undetermined(moving(loose), problem)
+    return () if _is_skew(slope, scale) else moving(values < 0)

@@ -9,7 +9,7 @@ time squared.  It falls while steps go downhill, so that the way ends in Newton'
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -19,6 +19,15 @@ from mstmm.errors import NumericalFailure
 from .rest import Unsettled
 from .tangent import Tangent
 
+
+class Loose(NumericalFailure):
+    """Rest that nothing holds along some speeds, whose places are `speeds`."""
+
+    def __init__(self, speeds: tuple[int, ...]) -> None:
+        super().__init__("nothing holds this rest")
+        self.speeds = speeds
+
+
 _MOST, _NEWTON = 2000, 40
 #: Steps in sizes of the coordinates: the longest, and that of the first one.
 _LONGEST, _FIRST = 0.5, 0.05
@@ -27,6 +36,8 @@ _LONGEST, _FIRST = 0.5, 0.05
 _EASED, _HELD, _NEAR = 2.0, 4.0, 1e-2
 #: A step that is rounding, in sizes.
 _AT_REST = 1e-12
+#: Efforts that a solution leaves, in parts, where the stiffness it is of is rounding.
+_NOISE = 1e-6
 #: Cycles of rounding: a step that no longer shrinks below this, in sizes, is as near as numbers go.
 _ROUNDING = 1e-7
 
@@ -34,7 +45,8 @@ _ROUNDING = 1e-7
 class RestBySweep:
     """Rest of a packed scene at time t.
 
-    `sizes` (nu,) are motions of order one, `acceleration` gives the accelerations (nu,) at rest,
+    `sizes` (nu,) are motions of order one, `free` the places of speeds that nobody imposes,
+    `acceleration` gives the accelerations (nu,) at rest,
     `settled` puts a state's drives and quaternions in order.
     """
 
@@ -43,16 +55,17 @@ class RestBySweep:
         tangent: Tangent,
         t: float,
         sizes: Array,
+        free: Sequence[int],
         acceleration: Callable[[Array], Array],
         settled: Callable[[Array], Array],
     ) -> None:
-        self.tangent, self.t, self.sizes = tangent, t, sizes
+        self.tangent, self.t, self.sizes, self.free = tangent, t, sizes, free
         self.acceleration, self.settled = acceleration, settled
         self._still = np.zeros(tangent.nu)
 
     def find(self, q: Array, tolerance: float) -> Array:
-        """q (nq,) at rest, coordinates within `tolerance` times their sizes.  Raises Unsettled, and
-        NumericalFailure naming a motion that nothing holds."""
+        """q (nq,) at rest, coordinates within `tolerance` times their sizes.  Raises Unsettled,
+        Loose, and NumericalFailure naming a motion that nothing holds."""
         q, near = self.settled(q), _NEAR
         missing = self._residual(q)
         sigma = self._unrest(q) / _FIRST
@@ -91,11 +104,26 @@ class RestBySweep:
             length = self._length(step)
             q = self._after(q, step)
             if length <= tolerance or (length >= shortest and length < _ROUNDING):
+                self._refuse_loose(q)
                 return q
             if length > 2 * shortest or length >= _LONGEST:
                 break
             shortest = min(shortest, length)
         raise Unsettled(f"no rest after {_NEWTON} steps of Newton's method", self._residual(q))
+
+    def _refuse_loose(self, q: Array) -> None:
+        """What a stiffness of rounding solves, it does not solve."""
+        self._residual(q)
+        self.tangent.factor(0.0, 1.0, 0.0, rate=0.0)
+        pushed, free = self._still.copy(), list(self.free)
+        pushed[free] = np.random.default_rng(0).standard_normal(len(free)) / self.sizes[free]
+        x = self.tangent.solve(pushed)
+        moved = self.tangent.coordinates(x)
+        left = self.tangent.slope(0.0, moved, self._still, self._still) - pushed
+        whole, missing = (float(np.linalg.norm(one * self.sizes)) for one in (pushed, left))
+        if not missing <= _NOISE * whole:
+            far = np.abs(x / self.sizes)
+            raise Loose(tuple(np.flatnonzero(far > 0.1 * far.max()).tolist()))
 
     def _residual(self, q: Array) -> Array:
         return self.tangent.residual(self.t, q, self._still, self._still)

@@ -39,8 +39,10 @@ def kinetic(linear: Equations, shapes: NDArray[Any]) -> dict[str, Array]:
     energies = np.zeros((shapes.shape[1], engine.packed.topology.count))
     for part in parts:
         energies += engine.kinetic_energies(linear.state.q, linear.spread(part).T)
-    names = [engine.body_name(place).partition("/")[0] for place in range(energies.shape[1])]
-    return _parts(names, energies.T)
+    frames = {one.frame for one in engine.packed.system.closures}
+    bodies = [place for place in range(energies.shape[1]) if place not in frames]
+    names = [engine.body_name(place).partition("/")[0] for place in bodies]
+    return _parts(names, energies[:, bodies].T)
 
 
 def strain(linear: Equations, shapes: NDArray[Any]) -> dict[str, Array]:

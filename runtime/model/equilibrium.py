@@ -11,11 +11,12 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.loops.freedom import Freedom
-from ..engine.rest import Rest, Undetermined, Unsettled, at_rest
-from ..engine.rest_by_sweep import RestBySweep
+from ..engine.rest import Rest, Undetermined, Unsettled, approached, leaving
+from ..engine.rest_by_sweep import Loose, RestBySweep
 from ..engine.sizes import speed_sizes
 from ..engine.tangent import Tangent
 from ..run.system import SceneSystem
+from .turns import without_turns
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
 
 #: Coordinates that a message lists.
 _LISTED = 3
-#: More free speeds than this come to rest by the sweep, without a stiffness matrix.
-_DENSE = 600
+#: More free speeds than this come to rest by the sweep; of more than the second number no stiffness
+#: matrix is made.
+_SWEPT, _DENSE = 20, 600
 #: Loops are followed in steps no longer than this, in sizes: longer ones may end where they are
 #: closed another way.
 _PART = 0.1
@@ -36,43 +38,67 @@ class Equilibrium(np.ndarray[Any, np.dtype[np.float64]]):
     """q (nq,) of an equilibrium, an array like any other.
 
     `residuals` are the efforts in N or N*m (of modal coordinates N, or N*m for twist) still missing
-    there, by the names of the free speeds; arrays computed from this one have none.
+    there, by the names of the free speeds, and `unstable` those of these speeds with which it is
+    left once it is disturbed, where efforts have a potential (a saddle, or the top of a hill);
+    arrays computed from this one have neither.
     """
 
     residuals: dict[str, float]
+    unstable: tuple[str, ...]
 
     def __array_finalize__(self, source: object) -> None:
-        self.residuals = {}
+        self.residuals, self.unstable = {}, ()
 
 
 def equilibrium(model: Compiled, q: Array, t: float, tolerance: float) -> Equilibrium:
     """q at which the free coordinates need no effort at rest; see `Model.equilibrium`."""
-    free, trees = list(model.free_speeds), model.freedom is None
+    begun, name = q, model.layout.u_name
     if model.freedom is not None:
-        q, free, problem = _of_mechanism(model, model.freedom, q, t)
+        begun = q = SceneSystem(model.looped).start(t, q, np.zeros(model.nu))[: model.nq]
+        problem = _of_mechanism(model, model.freedom, q, t)
     else:
-        problem = _problem(model, t, free)
+        problem = _problem(model, t, list(model.free_speeds))
     try:
-        if trees and len(free) > _DENSE:
-            found = _by_sweep(model, q, t, tolerance)
-        else:
-            found = at_rest(problem, q, tolerance)
+        found, left = _found(model, problem, q, t, tolerance)
     except Undetermined as failure:
-        names = _some([model.layout.u_name(int(free[k])) for k in failure.places])
+        names = _some([name(failure.problem.places[k]) for k in failure.places])
         raise NumericalFailure(
             f"the equilibrium is undetermined along {names}: nothing pushes these coordinates "
             "back; fix them, drive them or add a stiffness"
         ) from None
     except Unsettled as failure:
-        left = _largest(model, free, failure.residual, problem.sizes)
+        largest = _largest(model, failure.problem or problem, failure.residual)
         raise NumericalFailure(
-            f"no equilibrium found near the start ({failure}); efforts left: {left}; give another "
-            "start, q = ..."
+            f"no equilibrium found near the start ({failure}); efforts left: {largest}; give "
+            "another start, q = ..."
         ) from None
-    result = _with_drives(model, found, t).view(Equilibrium)
-    efforts = dict(zip(free, problem.needed(found).tolist(), strict=True))
-    result.residuals = {model.layout.u_name(j): effort for j, effort in efforts.items()}
+    found = without_turns(model, begun, _with_drives(model, found, t), t)
+    result, problem = found.view(Equilibrium), problem.at(found)
+    efforts = dict(zip(problem.places, problem.needed(found).tolist(), strict=True))
+    result.residuals = {name(j): effort for j, effort in efforts.items()}
+    result.unstable = tuple(map(name, left))
     return result
+
+
+def _found(
+    model: Compiled, problem: Rest, q: Array, t: float, tolerance: float
+) -> tuple[Array, tuple[int, ...]]:
+    """q at rest and the speeds that leave it: of trees with some bodies by their sweep, which goes
+    to rest that lasts, and where it finds none, or that is in doubt, by a stiffness matrix."""
+    count = len(problem.sizes)
+    if model.freedom is None and count > _SWEPT:
+        try:
+            return _by_sweep(model, q, t, tolerance), ()
+        except Loose as failure:
+            if count > _DENSE:
+                places = map(problem.places.index, failure.speeds)
+                raise Undetermined(tuple(places), problem) from None
+        except NumericalFailure:
+            if count > _DENSE:
+                raise
+    found = approached(problem, q, tolerance)
+    problem = problem.at(found)
+    return found, tuple(problem.places[k] for k in leaving(problem, found))
 
 
 def _by_sweep(model: Compiled, q: Array, t: float, tolerance: float) -> Array:
@@ -87,7 +113,7 @@ def _by_sweep(model: Compiled, q: Array, t: float, tolerance: float) -> Array:
     def settled(q: Array) -> Array:
         return scene.start(t, q, still[0])[: model.nq]
 
-    rest = RestBySweep(Tangent(engine), t, speed_sizes(model), acceleration, settled)
+    rest = RestBySweep(Tangent(engine), t, speed_sizes(model), free, acceleration, settled)
     try:
         return rest.find(q, tolerance)
     except Unsettled as failure:
@@ -115,16 +141,14 @@ def _problem(model: Compiled, t: float, free: list[int]) -> Rest:
             result[first : first + 4] = unit / np.linalg.norm(unit)
         return np.asarray(result)
 
-    return Rest(needed, moved, speed_sizes(model)[free])
+    return Rest(needed, moved, speed_sizes(model)[free], tuple(free))
 
 
-def _of_mechanism(
-    model: Compiled, freedom: Freedom, q: Array, t: float
-) -> tuple[Array, list[int], Rest]:
-    """The start with its loops closed, the independent speeds there, and their way to rest: what
-    the tree needs along the motions that the loops leave, which the loads of loops do not see."""
+def _of_mechanism(model: Compiled, freedom: Freedom, q: Array, t: float) -> Rest:
+    """The way of a closed q to rest along the independent speeds there: what the tree needs along
+    the motions that the loops leave, which the loads of loops do not see."""
     engine, still, scene = model.looped, np.zeros(model.nu), SceneSystem(model.looped)
-    memory = engine.start_memory()
+    memory, every = engine.start_memory(), speed_sizes(model)
 
     def closed(q: Array) -> Array:
         try:
@@ -132,24 +156,30 @@ def _of_mechanism(
         except SceneError as error:
             raise NumericalFailure(str(error)) from None
 
-    q = scene.start(t, q, still)[: model.nq]
-    places = list(freedom.chosen(q))
+    def along(places: tuple[int, ...]) -> Rest:
+        sizes = every[list(places)]
 
-    def needed(q: Array) -> Array:
-        efforts = engine.inverse_dynamics(t, q, still, still, memory)
-        found = np.asarray(freedom.following(q, places).T @ efforts)
-        # What nothing pushes must not go by rounding of what cancels.
-        whole = float(np.abs(efforts) @ freedom.sizes)
-        return np.where(np.abs(found) * sizes > _CANCELLED * whole, found, 0.0)
+        def needed(q: Array) -> Array:
+            efforts = engine.inverse_dynamics(t, q, still, still, memory)
+            found = np.asarray(freedom.following(q, places).T @ efforts)
+            # What nothing pushes must not go by rounding of what cancels.
+            whole = float(np.abs(efforts) @ freedom.sizes)
+            return np.where(np.abs(found) * sizes > _CANCELLED * whole, found, 0.0)
 
-    def moved(q: Array, increment: Array) -> Array:
-        parts = max(1, int(np.ceil(float(np.abs(increment / sizes).max(initial=0.0)) / _PART)))
-        for _ in range(parts):
-            q = closed(freedom.moved(q, freedom.following(q, places) @ (increment / parts)))
-        return q
+        def moved(q: Array, increment: Array) -> Array:
+            parts = max(1, int(np.ceil(float(np.abs(increment / sizes).max(initial=0.0)) / _PART)))
+            for _ in range(parts):
+                q = closed(freedom.moved(q, freedom.following(q, places) @ (increment / parts)))
+            return q
 
-    sizes = speed_sizes(model)[places]
-    return q, places, Rest(needed, moved, sizes)
+        problem = Rest(needed, moved, sizes, places, lambda q: there(places, problem, q))
+        return problem
+
+    def there(places: tuple[int, ...], problem: Rest, q: Array) -> Rest:
+        chosen = freedom.chosen(q)
+        return problem if chosen == places else along(chosen)
+
+    return along(freedom.chosen(q))
 
 
 def _straight_places(model: Compiled, free: list[int]) -> NDArray[np.int64] | None:
@@ -175,9 +205,10 @@ def _some(names: list[str]) -> str:
     return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
-def _largest(model: Compiled, free: list[int], residual: Array, sizes: Array) -> str:
+def _largest(model: Compiled, problem: Rest, residual: Array) -> str:
     """The largest efforts by name, counted by their work over a motion of order one."""
-    order = np.argsort(-np.abs(residual * sizes))[:_LISTED]
-    listed = [f"{residual[k]:.3g} along {model.layout.u_name(int(free[k]))}" for k in order]
+    order = np.argsort(-np.abs(residual * problem.sizes))[:_LISTED]
+    names = [model.layout.u_name(problem.places[k]) for k in order]
+    listed = [f"{residual[k]:.3g} along {name}" for k, name in zip(order, names, strict=True)]
     more = len(residual) - len(listed)
     return ", ".join(listed) + " (N or N*m)" + (f" and {more} smaller" if more > 0 else "")

@@ -244,8 +244,10 @@ class Model(Compiled):
         """q (nq,) at which every acceleration vanishes at rest, by Newton from `q` (or the start).
 
         `tolerance` is how far coordinates may be off: rad, or parts of the length of what they
-        move.  The array found has `residuals`, the efforts still missing by the names of speeds.
-        Where Newton's method fails, what is missing at the start is applied in parts.
+        move.  The array found has `residuals`, the efforts still missing by the names of speeds,
+        and `unstable`, those with which it leaves a saddle.  Where Newton's method fails, what is
+        missing at the start is applied in parts.  Hinges that nothing counts turns of end within
+        half a turn of the start.
 
         Raises NumericalFailure naming the coordinates that nothing determines, or, with the efforts
         that are left, if there is no equilibrium near the start.

@@ -28,16 +28,20 @@ class Amplitudes:
         x = np.zeros((len(s), *columns.shape), dtype=np.complex128)
         growth, whole = np.zeros(len(s)), self._whole
         for k, at in enumerate(s):
-            z = at**2 * whole.M + at * whole.C + whole.K + self._lost
-            growth[k] = _condition(z)
+            parts = at**2 * whole.M, at * whole.C, whole.K + self._lost
+            z = np.asarray(sum(parts))
+            growth[k] = _condition(z, np.asarray(sum(map(np.abs, parts))))
             if np.isfinite(growth[k]):
                 x[k][:, self._places] = np.linalg.solve(z, columns[:, self._places].T).T
         return x, growth, np.full(len(s), -1, dtype=np.int32)
 
 
-def _condition(z: Complex) -> float:
-    """Of a symmetric matrix beside its own diagonal, infinite where it is singular."""
-    scale = np.sqrt(np.abs(z).max(axis=1, initial=0.0))
+def _condition(z: Complex, cancelling: Array) -> float:
+    """Of a symmetric matrix beside the sizes of what cancels in it, infinite where it is
+    singular."""
+    scale = np.sqrt(cancelling.max(axis=1, initial=0.0))
     if not len(z) or not scale.all():
         return float(np.inf) if len(z) else 1.0
-    return float(np.linalg.cond(z / np.outer(scale, scale)))
+    size = float(np.linalg.norm(cancelling / np.outer(scale, scale), 2))
+    least = float(np.linalg.svd(z / np.outer(scale, scale), compute_uv=False).min())
+    return size / least if least else float(np.inf)

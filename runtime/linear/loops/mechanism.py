@@ -81,17 +81,31 @@ def mechanism_at(model: Compiled, state: State) -> Mechanism | None:
     """
     if model.freedom is None:
         return None
-    if state.u[list(model.free_speeds)].any():
-        raise SceneError(
-            "a linear model of closed loops is that of a state at rest, and this one moves; leave "
-            "u out"
-        )
+    _refuse_moving(model, state)
     packed, places = model.packed, model.freedom.chosen(state.q)
     ways, free = model.freedom.following(state.q, places), model.free_speeds
     tree = Engine(packed_system(torn(packed.system), packed))
     carried = _along(model.looped, state, free, ways, _with_own_still(model, ways)).K
     alone = _along(tree, state, free, ways, ways).K
     return Mechanism(tree, free, places, ways, carried - alone)
+
+
+def _refuse_moving(model: Compiled, state: State) -> None:
+    free = set(model.free_speeds)
+    moving = [k for k in np.flatnonzero(state.u).tolist() if k in free]
+    if not moving:
+        return
+    driving = [k for k in np.flatnonzero(state.u).tolist() if k not in free]
+    if driving:
+        name = model.layout.u_name(driving[0]).rpartition(".")[0]
+        cause, way = f'the drive of "{name}" moves it', "let the drive stand still there"
+    else:
+        cause = f"{model.layout.u_name(moving[0])} = {state.u[moving[0]]:.4g}"
+        way = "take u = 0, or leave u out"
+    raise SceneError(
+        "a linear model of closed loops is that of a state at rest, and this one moves "
+        f"({cause} at t = {state.t:g} s); {way}"
+    )
 
 
 def _along(
