@@ -1,0 +1,1 @@
+"""What the pages need beyond what Sphinx has: formulas, drawings, moving views."""
