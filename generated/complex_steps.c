@@ -20472,8 +20472,7 @@ static int mstmm_complex_at_tangent_column(mstmm_complex_state *state, int index
     const int nu = body->nu;
     mstmm_complex *d_block = state->slope->workspace + body->block;
     memset(d_block + MSTMM_BLOCK_E, 0, 6 * sizeof(mstmm_complex));
-    for (int j = 0; j < nu; j++)
-        (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] = mstmm_complex_plain(0);
+    mstmm_complex_set_zero(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), nu);
     for (int j = 0; j < nu; j++)
         (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] = mstmm_complex_minus((mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j], (state->column + body->u)[j]);
     if (body->modal) {
@@ -20575,8 +20574,7 @@ static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int ind
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     if (mstmm_aside(state->model, state->observed, index)) return 0;
-    for (int j = 0; j < nu; j++)
-        (state->answer + body->u)[j] = mstmm_complex_plain(0);
+    mstmm_complex_set_zero(state->answer + body->u, nu);
     if (body->placed) {
         double *block = state->workspace + body->block;
         mstmm_complex *place = state->tangents->numbers + body->place;

@@ -32,6 +32,16 @@ int mstmm_hinge_ball_rates_by_coordinates(const real *restrict p, const real *re
     const real *restrict u, real *restrict J);
 int mstmm_hinge_ball_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
+int mstmm_hinge_ball_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion);
+int mstmm_hinge_ball_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
 
 /* relative motion of the ball hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
@@ -1417,6 +1427,966 @@ static const mstmm_port mstmm_hinge_ball_rates_by_speeds_outputs[] = {
     {"J", 12, "", 0, 0},
 };
 
+/* motion across the hinge and of the body behind it
+ * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
+ * in  p[0] parameters
+ * in  q[4] coordinates: w, x, y, z
+ * in  u[3] speeds: wx [rad/s], wy [rad/s], wz [rad/s]
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  s[3]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * out R[3][3] rotation, P axes to Q axes
+ * out d[3] (m) position of P from Q, Q axes
+ * out H[6][3] motion subspace, rows v then w, P axes
+ * out v[3] (m/s) relative velocity of P, P axes
+ * out w[3] (rad/s) relative angular velocity, P axes
+ * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
+ * out qdot[4] coordinate rates
+ * out Rc[3][3] rotation, body axes to parent axes
+ * out r[3] (m) P of the body from P of the parent, parent axes
+ * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ */
+int mstmm_hinge_ball_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion)
+{
+    (void)p;
+    const real t0 = q[2] * q[2];
+    const real t1 = q[3] * q[3];
+    const real t2 = t0 + t1;
+    const real t3 = q[0] * q[0];
+    const real t4 = q[1] * q[1];
+    const real t5 = t3 + t4;
+    const real t6 = t0 + t5;
+    const real t7 = t1 + t6;
+    const real t8 = 1.0 / t7;
+    const real t9 = t8 * 2.0;
+    const real t10 = t2 * t9;
+    const real t11 = 1.0 - t10;
+    R[0] = t11;
+    const real t12 = q[1] * q[2];
+    const real t13 = q[0] * q[3];
+    const real t14 = t12 - t13;
+    const real t15 = t9 * t14;
+    R[1] = t15;
+    const real t16 = q[0] * q[2];
+    const real t17 = q[1] * q[3];
+    const real t18 = t16 + t17;
+    const real t19 = t9 * t18;
+    R[2] = t19;
+    const real t20 = t12 + t13;
+    const real t21 = t9 * t20;
+    R[3] = t21;
+    const real t22 = t1 + t4;
+    const real t23 = t9 * t22;
+    const real t24 = 1.0 - t23;
+    R[4] = t24;
+    const real t25 = q[2] * q[3];
+    const real t26 = q[0] * q[1];
+    const real t27 = t25 - t26;
+    const real t28 = t9 * t27;
+    R[5] = t28;
+    const real t29 = t17 - t16;
+    const real t30 = t9 * t29;
+    R[6] = t30;
+    const real t31 = t25 + t26;
+    const real t32 = t9 * t31;
+    R[7] = t32;
+    const real t33 = t0 + t4;
+    const real t34 = t9 * t33;
+    const real t35 = 1.0 - t34;
+    R[8] = t35;
+    d[0] = 0.0;
+    d[1] = 0.0;
+    d[2] = 0.0;
+    H[0] = 0.0;
+    H[1] = 0.0;
+    H[2] = 0.0;
+    H[3] = 0.0;
+    H[4] = 0.0;
+    H[5] = 0.0;
+    H[6] = 0.0;
+    H[7] = 0.0;
+    H[8] = 0.0;
+    H[9] = 1.0;
+    H[10] = 0.0;
+    H[11] = 0.0;
+    H[12] = 0.0;
+    H[13] = 1.0;
+    H[14] = 0.0;
+    H[15] = 0.0;
+    H[16] = 0.0;
+    H[17] = 1.0;
+    v[0] = 0.0;
+    v[1] = 0.0;
+    v[2] = 0.0;
+    w[0] = u[0];
+    w[1] = u[1];
+    w[2] = u[2];
+    c[0] = 0.0;
+    c[1] = 0.0;
+    c[2] = 0.0;
+    c[3] = 0.0;
+    c[4] = 0.0;
+    c[5] = 0.0;
+    const real t36 = q[3] * u[2];
+    const real t37 = q[1] * u[0];
+    const real t38 = q[2] * u[1];
+    const real t39 = t37 + t38;
+    const real t40 = t36 + t39;
+    const real t41 = t40 * 0.5;
+    const real t42 = -t41;
+    qdot[0] = t42;
+    const real t43 = q[0] * u[0];
+    const real t44 = q[2] * u[2];
+    const real t45 = t43 + t44;
+    const real t46 = q[3] * u[1];
+    const real t47 = t45 - t46;
+    const real t48 = 0.5 * t47;
+    qdot[1] = t48;
+    const real t49 = q[3] * u[0];
+    const real t50 = q[0] * u[1];
+    const real t51 = q[1] * u[2];
+    const real t52 = t50 - t51;
+    const real t53 = t49 + t52;
+    const real t54 = 0.5 * t53;
+    qdot[2] = t54;
+    const real t55 = q[0] * u[2];
+    const real t56 = q[1] * u[1];
+    const real t57 = t55 + t56;
+    const real t58 = q[2] * u[0];
+    const real t59 = t57 - t58;
+    const real t60 = 0.5 * t59;
+    qdot[3] = t60;
+    const real t61 = t11 * Rt[0];
+    const real t62 = t21 * Rt[1];
+    const real t63 = t61 + t62;
+    const real t64 = t30 * Rt[2];
+    const real t65 = t63 + t64;
+    Rc[0] = t65;
+    const real t66 = t15 * Rt[0];
+    const real t67 = t24 * Rt[1];
+    const real t68 = t66 + t67;
+    const real t69 = t32 * Rt[2];
+    const real t70 = t68 + t69;
+    Rc[1] = t70;
+    const real t71 = t19 * Rt[0];
+    const real t72 = t28 * Rt[1];
+    const real t73 = t71 + t72;
+    const real t74 = t35 * Rt[2];
+    const real t75 = t73 + t74;
+    Rc[2] = t75;
+    const real t76 = t11 * Rt[3];
+    const real t77 = t21 * Rt[4];
+    const real t78 = t76 + t77;
+    const real t79 = t30 * Rt[5];
+    const real t80 = t78 + t79;
+    Rc[3] = t80;
+    const real t81 = t15 * Rt[3];
+    const real t82 = t24 * Rt[4];
+    const real t83 = t81 + t82;
+    const real t84 = t32 * Rt[5];
+    const real t85 = t83 + t84;
+    Rc[4] = t85;
+    const real t86 = t19 * Rt[3];
+    const real t87 = t28 * Rt[4];
+    const real t88 = t86 + t87;
+    const real t89 = t35 * Rt[5];
+    const real t90 = t88 + t89;
+    Rc[5] = t90;
+    const real t91 = t11 * Rt[6];
+    const real t92 = t21 * Rt[7];
+    const real t93 = t91 + t92;
+    const real t94 = t30 * Rt[8];
+    const real t95 = t93 + t94;
+    Rc[6] = t95;
+    const real t96 = t15 * Rt[6];
+    const real t97 = t24 * Rt[7];
+    const real t98 = t96 + t97;
+    const real t99 = t32 * Rt[8];
+    const real t100 = t98 + t99;
+    Rc[7] = t100;
+    const real t101 = t19 * Rt[6];
+    const real t102 = t28 * Rt[7];
+    const real t103 = t101 + t102;
+    const real t104 = t35 * Rt[8];
+    const real t105 = t103 + t104;
+    Rc[8] = t105;
+    r[0] = ro[0];
+    r[1] = ro[1];
+    r[2] = ro[2];
+    const real t106 = motion_I[0] * t65;
+    const real t107 = motion_I[1] * t80;
+    const real t108 = t106 + t107;
+    const real t109 = motion_I[2] * t95;
+    const real t110 = t108 + t109;
+    const real t111 = u[0] + t110;
+    motion[0] = t111;
+    const real t112 = motion_I[0] * t70;
+    const real t113 = motion_I[1] * t85;
+    const real t114 = t112 + t113;
+    const real t115 = motion_I[2] * t100;
+    const real t116 = t114 + t115;
+    const real t117 = u[1] + t116;
+    motion[1] = t117;
+    const real t118 = motion_I[0] * t75;
+    const real t119 = motion_I[1] * t90;
+    const real t120 = t118 + t119;
+    const real t121 = motion_I[2] * t105;
+    const real t122 = t120 + t121;
+    const real t123 = u[2] + t122;
+    motion[2] = t123;
+    const real t124 = motion_I[3] * t65;
+    const real t125 = motion_I[4] * t80;
+    const real t126 = t124 + t125;
+    const real t127 = motion_I[5] * t95;
+    const real t128 = t126 + t127;
+    const real t129 = u[2] * t116;
+    const real t130 = u[1] * t122;
+    const real t131 = t129 - t130;
+    const real t132 = s[0] + t131;
+    const real t133 = t128 + t132;
+    motion[3] = t133;
+    const real t134 = motion_I[3] * t70;
+    const real t135 = motion_I[4] * t85;
+    const real t136 = t134 + t135;
+    const real t137 = motion_I[5] * t100;
+    const real t138 = t136 + t137;
+    const real t139 = u[0] * t122;
+    const real t140 = u[2] * t110;
+    const real t141 = t139 - t140;
+    const real t142 = s[1] + t141;
+    const real t143 = t138 + t142;
+    motion[4] = t143;
+    const real t144 = motion_I[3] * t75;
+    const real t145 = motion_I[4] * t90;
+    const real t146 = t144 + t145;
+    const real t147 = motion_I[5] * t105;
+    const real t148 = t146 + t147;
+    const real t149 = u[1] * t110;
+    const real t150 = u[0] * t116;
+    const real t151 = t149 - t150;
+    const real t152 = s[2] + t151;
+    const real t153 = t148 + t152;
+    motion[5] = t153;
+    const real t154 = motion_I[0] * motion_I[1];
+    const real t155 = t154 - motion_I[5];
+    const real t156 = ro[1] * t155;
+    const real t157 = motion_I[1] * motion_I[1];
+    const real t158 = motion_I[2] * motion_I[2];
+    const real t159 = t157 + t158;
+    const real t160 = ro[0] * t159;
+    const real t161 = t156 - t160;
+    const real t162 = motion_I[0] * motion_I[2];
+    const real t163 = motion_I[4] + t162;
+    const real t164 = ro[2] * t163;
+    const real t165 = t161 + t164;
+    const real t166 = motion_I[6] + t165;
+    const real t167 = t65 * t166;
+    const real t168 = motion_I[5] + t154;
+    const real t169 = ro[0] * t168;
+    const real t170 = motion_I[0] * motion_I[0];
+    const real t171 = t158 + t170;
+    const real t172 = ro[1] * t171;
+    const real t173 = t169 - t172;
+    const real t174 = motion_I[1] * motion_I[2];
+    const real t175 = t174 - motion_I[3];
+    const real t176 = ro[2] * t175;
+    const real t177 = t173 + t176;
+    const real t178 = motion_I[7] + t177;
+    const real t179 = t80 * t178;
+    const real t180 = t167 + t179;
+    const real t181 = t162 - motion_I[4];
+    const real t182 = ro[0] * t181;
+    const real t183 = motion_I[3] + t174;
+    const real t184 = ro[1] * t183;
+    const real t185 = t182 + t184;
+    const real t186 = t157 + t170;
+    const real t187 = ro[2] * t186;
+    const real t188 = t185 - t187;
+    const real t189 = motion_I[8] + t188;
+    const real t190 = t95 * t189;
+    const real t191 = t180 + t190;
+    motion[6] = t191;
+    const real t192 = t70 * t166;
+    const real t193 = t85 * t178;
+    const real t194 = t192 + t193;
+    const real t195 = t100 * t189;
+    const real t196 = t194 + t195;
+    motion[7] = t196;
+    const real t197 = t75 * t166;
+    const real t198 = t90 * t178;
+    const real t199 = t197 + t198;
+    const real t200 = t105 * t189;
+    const real t201 = t199 + t200;
+    motion[8] = t201;
+    return 0;
+}
+
+static int mstmm_hinge_ball_forward_kept_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_ball_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+}
+
+static const mstmm_port mstmm_hinge_ball_forward_kept_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 4, "", 0, 0},
+    {"u", 3, "", 0, 0},
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"s", 3, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_ball_forward_kept_outputs[] = {
+    {"R", 9, "", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"c", 6, "m/s2, rad/s2", 0, 0},
+    {"qdot", 4, "", 0, 0},
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+/* directions of the unknowns of the hinge
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  p[0] parameters
+ * in  q[4] coordinates: w, x, y, z
+ * in  u[3] speeds: wx [rad/s], wy [rad/s], wz [rad/s]
+ * in  s[3] accelerations of the speeds
+ * in  motion[9] w, wd, and a of the body, own axes
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[3][3] change of the laws' efforts, a row a direction
+ * in  along[3][4] change of the coordinates, a row a direction
+ * in  rate[1] change of the speed itself
+ * in  scale[1] (1/s) and of its acceleration
+ * in  sq[1] (1/s) inverse time by which coordinates follow speeds
+ * out B[3][9] motion along the unknowns, a row a direction
+ * out G[3][6] change of the load that is carried
+ * out W[3][3] slopes of the rows by load, rotors and laws
+ * out H[6][3] motion subspace, rows v then w, P axes
+ */
+int mstmm_hinge_ball_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+{
+    (void)p;
+    (void)sq;
+    const real t0 = q[3] * q[3];
+    const real t1 = q[2] * q[2];
+    const real t2 = q[0] * q[0];
+    const real t3 = q[1] * q[1];
+    const real t4 = t2 + t3;
+    const real t5 = t1 + t4;
+    const real t6 = t0 + t5;
+    const real t7 = 1.0 / t6;
+    const real t8 = t7 * 2.0;
+    const real t9 = q[2] * q[3];
+    const real t10 = q[0] * q[1];
+    const real t11 = t9 + t10;
+    const real t12 = t8 * t11;
+    const real t13 = q[3] * along[1];
+    const real t14 = q[1] * along[3];
+    const real t15 = t13 + t14;
+    const real t16 = q[2] * along[0];
+    const real t17 = q[0] * along[2];
+    const real t18 = t16 + t17;
+    const real t19 = t15 - t18;
+    const real t20 = t8 * t19;
+    const real t21 = q[1] * q[3];
+    const real t22 = q[0] * q[2];
+    const real t23 = t21 - t22;
+    const real t24 = q[1] * along[1];
+    const real t25 = t24 + t24;
+    const real t26 = q[0] * along[0];
+    const real t27 = t26 + t26;
+    const real t28 = t25 + t27;
+    const real t29 = q[2] * along[2];
+    const real t30 = t29 + t29;
+    const real t31 = t28 + t30;
+    const real t32 = q[3] * along[3];
+    const real t33 = t32 + t32;
+    const real t34 = t31 + t33;
+    const real t35 = t7 * t34;
+    const real t36 = t35 / t6;
+    const real t37 = 2.0 * t36;
+    const real t38 = t23 * t37;
+    const real t39 = t20 - t38;
+    const real t40 = t12 * t39;
+    const real t41 = q[1] * q[2];
+    const real t42 = q[0] * q[3];
+    const real t43 = t41 - t42;
+    const real t44 = t8 * t43;
+    const real t45 = t1 + t0;
+    const real t46 = t45 * t37;
+    const real t47 = t30 + t33;
+    const real t48 = t8 * t47;
+    const real t49 = t46 - t48;
+    const real t50 = t44 * t49;
+    const real t51 = t0 + t3;
+    const real t52 = t8 * t51;
+    const real t53 = 1.0 - t52;
+    const real t54 = q[3] * along[0];
+    const real t55 = q[0] * along[3];
+    const real t56 = t54 + t55;
+    const real t57 = q[2] * along[1];
+    const real t58 = q[1] * along[2];
+    const real t59 = t57 + t58;
+    const real t60 = t56 + t59;
+    const real t61 = t8 * t60;
+    const real t62 = t41 + t42;
+    const real t63 = t62 * t37;
+    const real t64 = t61 - t63;
+    const real t65 = t53 * t64;
+    const real t66 = t50 + t65;
+    const real t67 = t40 + t66;
+    const real t68 = motion[1] - u[1];
+    const real t69 = t67 * t68;
+    const real t70 = t8 * t23;
+    const real t71 = t1 + t3;
+    const real t72 = t71 * t37;
+    const real t73 = t25 + t30;
+    const real t74 = t8 * t73;
+    const real t75 = t72 - t74;
+    const real t76 = t70 * t75;
+    const real t77 = t45 * t8;
+    const real t78 = 1.0 - t77;
+    const real t79 = t15 + t18;
+    const real t80 = t8 * t79;
+    const real t81 = t22 + t21;
+    const real t82 = t81 * t37;
+    const real t83 = t80 - t82;
+    const real t84 = t78 * t83;
+    const real t85 = t8 * t62;
+    const real t86 = q[3] * along[2];
+    const real t87 = q[2] * along[3];
+    const real t88 = t86 + t87;
+    const real t89 = q[1] * along[0];
+    const real t90 = q[0] * along[1];
+    const real t91 = t89 + t90;
+    const real t92 = t88 - t91;
+    const real t93 = t8 * t92;
+    const real t94 = t9 - t10;
+    const real t95 = t94 * t37;
+    const real t96 = t93 - t95;
+    const real t97 = t85 * t96;
+    const real t98 = t84 + t97;
+    const real t99 = t76 + t98;
+    const real t100 = motion[2] - u[2];
+    const real t101 = t99 * t100;
+    const real t102 = t69 - t101;
+    const real t103 = rate[0] + t102;
+    B[0] = t103;
+    const real t104 = t8 * t71;
+    const real t105 = 1.0 - t104;
+    const real t106 = t91 + t88;
+    const real t107 = t8 * t106;
+    const real t108 = t11 * t37;
+    const real t109 = t107 - t108;
+    const real t110 = t105 * t109;
+    const real t111 = t8 * t81;
+    const real t112 = t59 - t56;
+    const real t113 = t8 * t112;
+    const real t114 = t43 * t37;
+    const real t115 = t113 - t114;
+    const real t116 = t111 * t115;
+    const real t117 = t8 * t94;
+    const real t118 = t51 * t37;
+    const real t119 = t25 + t33;
+    const real t120 = t8 * t119;
+    const real t121 = t118 - t120;
+    const real t122 = t117 * t121;
+    const real t123 = t116 + t122;
+    const real t124 = t110 + t123;
+    const real t125 = t124 * t100;
+    const real t126 = motion[0] - u[0];
+    const real t127 = t67 * t126;
+    const real t128 = t125 - t127;
+    B[1] = t128;
+    const real t129 = t99 * t126;
+    const real t130 = t124 * t68;
+    const real t131 = t129 - t130;
+    B[2] = t131;
+    const real t132 = u[2] * t128;
+    const real t133 = u[1] * t131;
+    const real t134 = t132 - t133;
+    const real t135 = u[2] * t126;
+    const real t136 = u[0] * t100;
+    const real t137 = t135 - t136;
+    const real t138 = t137 - s[1];
+    const real t139 = motion[4] + t138;
+    const real t140 = t67 * t139;
+    const real t141 = u[0] * t68;
+    const real t142 = u[1] * t126;
+    const real t143 = t141 - t142;
+    const real t144 = t143 - s[2];
+    const real t145 = motion[5] + t144;
+    const real t146 = t99 * t145;
+    const real t147 = t140 - t146;
+    const real t148 = scale[0] + t147;
+    const real t149 = t134 + t148;
+    B[3] = t149;
+    const real t150 = u[0] * t131;
+    const real t151 = u[2] * t102;
+    const real t152 = t150 - t151;
+    const real t153 = t124 * t145;
+    const real t154 = rate[0] * t100;
+    const real t155 = u[1] * t100;
+    const real t156 = u[2] * t68;
+    const real t157 = t155 - t156;
+    const real t158 = t157 - s[0];
+    const real t159 = motion[3] + t158;
+    const real t160 = t67 * t159;
+    const real t161 = t154 - t160;
+    const real t162 = t153 + t161;
+    const real t163 = t152 + t162;
+    B[4] = t163;
+    const real t164 = u[1] * t102;
+    const real t165 = u[0] * t128;
+    const real t166 = t164 - t165;
+    const real t167 = t99 * t159;
+    const real t168 = rate[0] * t68;
+    const real t169 = t167 - t168;
+    const real t170 = t124 * t139;
+    const real t171 = t169 - t170;
+    const real t172 = t166 + t171;
+    B[5] = t172;
+    const real t173 = motion[7] * t67;
+    const real t174 = motion[8] * t99;
+    const real t175 = t173 - t174;
+    B[6] = t175;
+    const real t176 = motion[8] * t124;
+    const real t177 = motion[6] * t67;
+    const real t178 = t176 - t177;
+    B[7] = t178;
+    const real t179 = motion[6] * t99;
+    const real t180 = motion[7] * t124;
+    const real t181 = t179 - t180;
+    B[8] = t181;
+    const real t182 = q[3] * along[5];
+    const real t183 = q[1] * along[7];
+    const real t184 = t182 + t183;
+    const real t185 = q[2] * along[4];
+    const real t186 = q[0] * along[6];
+    const real t187 = t185 + t186;
+    const real t188 = t184 - t187;
+    const real t189 = t8 * t188;
+    const real t190 = q[1] * along[5];
+    const real t191 = t190 + t190;
+    const real t192 = q[0] * along[4];
+    const real t193 = t192 + t192;
+    const real t194 = t191 + t193;
+    const real t195 = q[2] * along[6];
+    const real t196 = t195 + t195;
+    const real t197 = t194 + t196;
+    const real t198 = q[3] * along[7];
+    const real t199 = t198 + t198;
+    const real t200 = t197 + t199;
+    const real t201 = t7 * t200;
+    const real t202 = t201 / t6;
+    const real t203 = 2.0 * t202;
+    const real t204 = t23 * t203;
+    const real t205 = t189 - t204;
+    const real t206 = t12 * t205;
+    const real t207 = t45 * t203;
+    const real t208 = t196 + t199;
+    const real t209 = t8 * t208;
+    const real t210 = t207 - t209;
+    const real t211 = t44 * t210;
+    const real t212 = q[3] * along[4];
+    const real t213 = q[0] * along[7];
+    const real t214 = t212 + t213;
+    const real t215 = q[2] * along[5];
+    const real t216 = q[1] * along[6];
+    const real t217 = t215 + t216;
+    const real t218 = t214 + t217;
+    const real t219 = t8 * t218;
+    const real t220 = t62 * t203;
+    const real t221 = t219 - t220;
+    const real t222 = t53 * t221;
+    const real t223 = t211 + t222;
+    const real t224 = t206 + t223;
+    const real t225 = t68 * t224;
+    const real t226 = t71 * t203;
+    const real t227 = t191 + t196;
+    const real t228 = t8 * t227;
+    const real t229 = t226 - t228;
+    const real t230 = t70 * t229;
+    const real t231 = t184 + t187;
+    const real t232 = t8 * t231;
+    const real t233 = t81 * t203;
+    const real t234 = t232 - t233;
+    const real t235 = t78 * t234;
+    const real t236 = q[3] * along[6];
+    const real t237 = q[2] * along[7];
+    const real t238 = t236 + t237;
+    const real t239 = q[1] * along[4];
+    const real t240 = q[0] * along[5];
+    const real t241 = t239 + t240;
+    const real t242 = t238 - t241;
+    const real t243 = t8 * t242;
+    const real t244 = t94 * t203;
+    const real t245 = t243 - t244;
+    const real t246 = t85 * t245;
+    const real t247 = t235 + t246;
+    const real t248 = t230 + t247;
+    const real t249 = t100 * t248;
+    const real t250 = t225 - t249;
+    B[9] = t250;
+    const real t251 = t241 + t238;
+    const real t252 = t8 * t251;
+    const real t253 = t11 * t203;
+    const real t254 = t252 - t253;
+    const real t255 = t105 * t254;
+    const real t256 = t217 - t214;
+    const real t257 = t8 * t256;
+    const real t258 = t43 * t203;
+    const real t259 = t257 - t258;
+    const real t260 = t111 * t259;
+    const real t261 = t51 * t203;
+    const real t262 = t191 + t199;
+    const real t263 = t8 * t262;
+    const real t264 = t261 - t263;
+    const real t265 = t117 * t264;
+    const real t266 = t260 + t265;
+    const real t267 = t255 + t266;
+    const real t268 = t100 * t267;
+    const real t269 = t126 * t224;
+    const real t270 = t268 - t269;
+    const real t271 = rate[0] + t270;
+    B[10] = t271;
+    const real t272 = t126 * t248;
+    const real t273 = t68 * t267;
+    const real t274 = t272 - t273;
+    B[11] = t274;
+    const real t275 = u[2] * t270;
+    const real t276 = u[1] * t274;
+    const real t277 = t275 - t276;
+    const real t278 = t139 * t224;
+    const real t279 = t278 - t154;
+    const real t280 = t145 * t248;
+    const real t281 = t279 - t280;
+    const real t282 = t277 + t281;
+    B[12] = t282;
+    const real t283 = u[0] * t274;
+    const real t284 = u[2] * t250;
+    const real t285 = t283 - t284;
+    const real t286 = t145 * t267;
+    const real t287 = t159 * t224;
+    const real t288 = t286 - t287;
+    const real t289 = scale[0] + t288;
+    const real t290 = t285 + t289;
+    B[13] = t290;
+    const real t291 = u[1] * t250;
+    const real t292 = u[0] * t270;
+    const real t293 = t291 - t292;
+    const real t294 = t159 * t248;
+    const real t295 = rate[0] * t126;
+    const real t296 = t294 + t295;
+    const real t297 = t139 * t267;
+    const real t298 = t296 - t297;
+    const real t299 = t293 + t298;
+    B[14] = t299;
+    const real t300 = motion[7] * t224;
+    const real t301 = motion[8] * t248;
+    const real t302 = t300 - t301;
+    B[15] = t302;
+    const real t303 = motion[8] * t267;
+    const real t304 = motion[6] * t224;
+    const real t305 = t303 - t304;
+    B[16] = t305;
+    const real t306 = motion[6] * t248;
+    const real t307 = motion[7] * t267;
+    const real t308 = t306 - t307;
+    B[17] = t308;
+    const real t309 = q[3] * along[9];
+    const real t310 = q[1] * along[11];
+    const real t311 = t309 + t310;
+    const real t312 = q[2] * along[8];
+    const real t313 = q[0] * along[10];
+    const real t314 = t312 + t313;
+    const real t315 = t311 - t314;
+    const real t316 = t8 * t315;
+    const real t317 = q[1] * along[9];
+    const real t318 = t317 + t317;
+    const real t319 = q[0] * along[8];
+    const real t320 = t319 + t319;
+    const real t321 = t318 + t320;
+    const real t322 = q[2] * along[10];
+    const real t323 = t322 + t322;
+    const real t324 = t321 + t323;
+    const real t325 = q[3] * along[11];
+    const real t326 = t325 + t325;
+    const real t327 = t324 + t326;
+    const real t328 = t7 * t327;
+    const real t329 = t328 / t6;
+    const real t330 = 2.0 * t329;
+    const real t331 = t23 * t330;
+    const real t332 = t316 - t331;
+    const real t333 = t12 * t332;
+    const real t334 = t45 * t330;
+    const real t335 = t323 + t326;
+    const real t336 = t8 * t335;
+    const real t337 = t334 - t336;
+    const real t338 = t44 * t337;
+    const real t339 = q[3] * along[8];
+    const real t340 = q[0] * along[11];
+    const real t341 = t339 + t340;
+    const real t342 = q[2] * along[9];
+    const real t343 = q[1] * along[10];
+    const real t344 = t342 + t343;
+    const real t345 = t341 + t344;
+    const real t346 = t8 * t345;
+    const real t347 = t62 * t330;
+    const real t348 = t346 - t347;
+    const real t349 = t53 * t348;
+    const real t350 = t338 + t349;
+    const real t351 = t333 + t350;
+    const real t352 = t68 * t351;
+    const real t353 = t71 * t330;
+    const real t354 = t318 + t323;
+    const real t355 = t8 * t354;
+    const real t356 = t353 - t355;
+    const real t357 = t70 * t356;
+    const real t358 = t311 + t314;
+    const real t359 = t8 * t358;
+    const real t360 = t81 * t330;
+    const real t361 = t359 - t360;
+    const real t362 = t78 * t361;
+    const real t363 = q[3] * along[10];
+    const real t364 = q[2] * along[11];
+    const real t365 = t363 + t364;
+    const real t366 = q[1] * along[8];
+    const real t367 = q[0] * along[9];
+    const real t368 = t366 + t367;
+    const real t369 = t365 - t368;
+    const real t370 = t8 * t369;
+    const real t371 = t94 * t330;
+    const real t372 = t370 - t371;
+    const real t373 = t85 * t372;
+    const real t374 = t362 + t373;
+    const real t375 = t357 + t374;
+    const real t376 = t100 * t375;
+    const real t377 = t352 - t376;
+    B[18] = t377;
+    const real t378 = t368 + t365;
+    const real t379 = t8 * t378;
+    const real t380 = t11 * t330;
+    const real t381 = t379 - t380;
+    const real t382 = t105 * t381;
+    const real t383 = t344 - t341;
+    const real t384 = t8 * t383;
+    const real t385 = t43 * t330;
+    const real t386 = t384 - t385;
+    const real t387 = t111 * t386;
+    const real t388 = t51 * t330;
+    const real t389 = t318 + t326;
+    const real t390 = t8 * t389;
+    const real t391 = t388 - t390;
+    const real t392 = t117 * t391;
+    const real t393 = t387 + t392;
+    const real t394 = t382 + t393;
+    const real t395 = t100 * t394;
+    const real t396 = t126 * t351;
+    const real t397 = t395 - t396;
+    B[19] = t397;
+    const real t398 = t126 * t375;
+    const real t399 = t68 * t394;
+    const real t400 = t398 - t399;
+    const real t401 = rate[0] + t400;
+    B[20] = t401;
+    const real t402 = u[2] * t397;
+    const real t403 = u[1] * t400;
+    const real t404 = t402 - t403;
+    const real t405 = t139 * t351;
+    const real t406 = t168 + t405;
+    const real t407 = t145 * t375;
+    const real t408 = t406 - t407;
+    const real t409 = t404 + t408;
+    B[21] = t409;
+    const real t410 = u[0] * t400;
+    const real t411 = u[2] * t377;
+    const real t412 = t410 - t411;
+    const real t413 = t145 * t394;
+    const real t414 = t159 * t351;
+    const real t415 = t295 + t414;
+    const real t416 = t413 - t415;
+    const real t417 = t412 + t416;
+    B[22] = t417;
+    const real t418 = u[1] * t377;
+    const real t419 = u[0] * t397;
+    const real t420 = t418 - t419;
+    const real t421 = t159 * t375;
+    const real t422 = t139 * t394;
+    const real t423 = t421 - t422;
+    const real t424 = scale[0] + t423;
+    const real t425 = t420 + t424;
+    B[23] = t425;
+    const real t426 = motion[7] * t351;
+    const real t427 = motion[8] * t375;
+    const real t428 = t426 - t427;
+    B[24] = t428;
+    const real t429 = motion[8] * t394;
+    const real t430 = motion[6] * t351;
+    const real t431 = t429 - t430;
+    B[25] = t431;
+    const real t432 = motion[6] * t375;
+    const real t433 = motion[7] * t394;
+    const real t434 = t432 - t433;
+    B[26] = t434;
+    const real t435 = f[2] * t99;
+    const real t436 = f[1] * t67;
+    const real t437 = t435 - t436;
+    G[0] = t437;
+    const real t438 = f[0] * t67;
+    const real t439 = f[2] * t124;
+    const real t440 = t438 - t439;
+    G[1] = t440;
+    const real t441 = f[1] * t124;
+    const real t442 = f[0] * t99;
+    const real t443 = t441 - t442;
+    G[2] = t443;
+    const real t444 = f[5] * t99;
+    const real t445 = f[4] * t67;
+    const real t446 = t444 - t445;
+    G[3] = t446;
+    const real t447 = f[3] * t67;
+    const real t448 = f[5] * t124;
+    const real t449 = t447 - t448;
+    G[4] = t449;
+    const real t450 = f[4] * t124;
+    const real t451 = f[3] * t99;
+    const real t452 = t450 - t451;
+    G[5] = t452;
+    const real t453 = f[2] * t248;
+    const real t454 = f[1] * t224;
+    const real t455 = t453 - t454;
+    G[6] = t455;
+    const real t456 = f[0] * t224;
+    const real t457 = f[2] * t267;
+    const real t458 = t456 - t457;
+    G[7] = t458;
+    const real t459 = f[1] * t267;
+    const real t460 = f[0] * t248;
+    const real t461 = t459 - t460;
+    G[8] = t461;
+    const real t462 = f[5] * t248;
+    const real t463 = f[4] * t224;
+    const real t464 = t462 - t463;
+    G[9] = t464;
+    const real t465 = f[3] * t224;
+    const real t466 = f[5] * t267;
+    const real t467 = t465 - t466;
+    G[10] = t467;
+    const real t468 = f[4] * t267;
+    const real t469 = f[3] * t248;
+    const real t470 = t468 - t469;
+    G[11] = t470;
+    const real t471 = f[2] * t375;
+    const real t472 = f[1] * t351;
+    const real t473 = t471 - t472;
+    G[12] = t473;
+    const real t474 = f[0] * t351;
+    const real t475 = f[2] * t394;
+    const real t476 = t474 - t475;
+    G[13] = t476;
+    const real t477 = f[1] * t394;
+    const real t478 = f[0] * t375;
+    const real t479 = t477 - t478;
+    G[14] = t479;
+    const real t480 = f[5] * t375;
+    const real t481 = f[4] * t351;
+    const real t482 = t480 - t481;
+    G[15] = t482;
+    const real t483 = f[3] * t351;
+    const real t484 = f[5] * t394;
+    const real t485 = t483 - t484;
+    G[16] = t485;
+    const real t486 = f[4] * t394;
+    const real t487 = f[3] * t375;
+    const real t488 = t486 - t487;
+    G[17] = t488;
+    const real t489 = J[0] * scale[0];
+    const real t490 = t489 - laws[0];
+    W[0] = t490;
+    const real t491 = -laws[1];
+    W[1] = t491;
+    const real t492 = -laws[2];
+    W[2] = t492;
+    const real t493 = -laws[3];
+    W[3] = t493;
+    const real t494 = J[1] * scale[0];
+    const real t495 = t494 - laws[4];
+    W[4] = t495;
+    const real t496 = -laws[5];
+    W[5] = t496;
+    const real t497 = -laws[6];
+    W[6] = t497;
+    const real t498 = -laws[7];
+    W[7] = t498;
+    const real t499 = J[2] * scale[0];
+    const real t500 = t499 - laws[8];
+    W[8] = t500;
+    H[0] = 0.0;
+    H[1] = 0.0;
+    H[2] = 0.0;
+    H[3] = 0.0;
+    H[4] = 0.0;
+    H[5] = 0.0;
+    H[6] = 0.0;
+    H[7] = 0.0;
+    H[8] = 0.0;
+    H[9] = 1.0;
+    H[10] = 0.0;
+    H[11] = 0.0;
+    H[12] = 0.0;
+    H[13] = 1.0;
+    H[14] = 0.0;
+    H[15] = 0.0;
+    H[16] = 0.0;
+    H[17] = 1.0;
+    return 0;
+}
+
+static int mstmm_hinge_ball_directions_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_ball_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_hinge_ball_directions_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 4, "", 0, 0},
+    {"u", 3, "", 0, 0},
+    {"s", 3, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"J", 3, "kg*m2 or kg", 0, 0},
+    {"laws", 9, "", 0, 0},
+    {"along", 12, "", 0, 0},
+    {"rate", 1, "", 0, 0},
+    {"scale", 1, "1/s", 0, 0},
+    {"sq", 1, "1/s", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_ball_directions_outputs[] = {
+    {"B", 27, "", 0, 0},
+    {"G", 18, "", 0, 0},
+    {"W", 9, "", 0, 0},
+    {"H", 18, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_ball_q_names[] = {
     "w", "x", "y", "z",
 };
@@ -1518,13 +2488,37 @@ static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_kept",
+        .function = (void (*)(void))mstmm_hinge_ball_forward_kept,
+        .call = mstmm_hinge_ball_forward_kept_call,
+        .n_inputs = 7,
+        .n_outputs = 10,
+        .inputs = mstmm_hinge_ball_forward_kept_inputs,
+        .outputs = mstmm_hinge_ball_forward_kept_outputs,
+        .ir_hash = "f5e6ff10f24a818bf7399181cf84167e2623e853a38cfa0a223aae5d63978017",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "directions",
+        .function = (void (*)(void))mstmm_hinge_ball_directions,
+        .call = mstmm_hinge_ball_directions_call,
+        .n_inputs = 12,
+        .n_outputs = 4,
+        .inputs = mstmm_hinge_ball_directions_inputs,
+        .outputs = mstmm_hinge_ball_directions_outputs,
+        .ir_hash = "8fc42daa3148d9c26307e57b81dee4501fa9a24e0caeb12d2254c7554456757f",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_ball = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "ball",
-    .hash = "bd0ff4cab6106f57db8b7805df269159b886855320025bbf16258e43df1cb88d",
+    .hash = "a6885e58537d3cc184cef9ece0ee5923c99f6dceb5d72a937d19ff4effd84965",
     .nq = 4,
     .nu = 3,
     .np = 0,
@@ -1534,6 +2528,6 @@ const mstmm_element mstmm_hinge_ball = {
     .u_units = mstmm_hinge_ball_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 7,
+    .n_kernels = 9,
     .kernels = mstmm_hinge_ball_kernels,
 };

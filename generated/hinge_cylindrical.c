@@ -31,6 +31,16 @@ int mstmm_hinge_cylindrical_rates_by_coordinates(const real *restrict p, const r
     const real *restrict u, real *restrict J);
 int mstmm_hinge_cylindrical_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
+int mstmm_hinge_cylindrical_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion);
+int mstmm_hinge_cylindrical_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
 
 /* relative motion of the cylindrical hinge
  * in  p[0] parameters
@@ -1079,6 +1089,406 @@ static const mstmm_port mstmm_hinge_cylindrical_rates_by_speeds_outputs[] = {
     {"J", 4, "", 0, 0},
 };
 
+/* motion across the hinge and of the body behind it
+ * in  p[0] parameters
+ * in  q[2] coordinates: displacement [m], angle [rad]
+ * in  u[2] speeds: displacement_rate [m/s], angle_rate [rad/s]
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  s[2]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * out R[3][3] rotation, P axes to Q axes
+ * out d[3] (m) position of P from Q, Q axes
+ * out H[6][2] motion subspace, rows v then w, P axes
+ * out v[3] (m/s) relative velocity of P, P axes
+ * out w[3] (rad/s) relative angular velocity, P axes
+ * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
+ * out qdot[2] coordinate rates
+ * out Rc[3][3] rotation, body axes to parent axes
+ * out r[3] (m) P of the body from P of the parent, parent axes
+ * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ */
+int mstmm_hinge_cylindrical_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion)
+{
+    (void)p;
+    const real t0 = cos(q[1]);
+    R[0] = t0;
+    const real t1 = sin(q[1]);
+    const real t2 = -t1;
+    R[1] = t2;
+    R[2] = 0.0;
+    R[3] = t1;
+    R[4] = t0;
+    R[5] = 0.0;
+    R[6] = 0.0;
+    R[7] = 0.0;
+    R[8] = 1.0;
+    d[0] = 0.0;
+    d[1] = 0.0;
+    d[2] = q[0];
+    H[0] = 0.0;
+    H[1] = 0.0;
+    H[2] = 0.0;
+    H[3] = 0.0;
+    H[4] = 1.0;
+    H[5] = 0.0;
+    H[6] = 0.0;
+    H[7] = 0.0;
+    H[8] = 0.0;
+    H[9] = 0.0;
+    H[10] = 0.0;
+    H[11] = 1.0;
+    v[0] = 0.0;
+    v[1] = 0.0;
+    v[2] = u[0];
+    w[0] = 0.0;
+    w[1] = 0.0;
+    w[2] = u[1];
+    c[0] = 0.0;
+    c[1] = 0.0;
+    c[2] = 0.0;
+    c[3] = 0.0;
+    c[4] = 0.0;
+    c[5] = 0.0;
+    qdot[0] = u[0];
+    qdot[1] = u[1];
+    const real t3 = t0 * Rt[0];
+    const real t4 = t1 * Rt[1];
+    const real t5 = t3 + t4;
+    Rc[0] = t5;
+    const real t6 = t0 * Rt[1];
+    const real t7 = t1 * Rt[0];
+    const real t8 = t6 - t7;
+    Rc[1] = t8;
+    Rc[2] = Rt[2];
+    const real t9 = t0 * Rt[3];
+    const real t10 = t1 * Rt[4];
+    const real t11 = t9 + t10;
+    Rc[3] = t11;
+    const real t12 = t0 * Rt[4];
+    const real t13 = t1 * Rt[3];
+    const real t14 = t12 - t13;
+    Rc[4] = t14;
+    Rc[5] = Rt[5];
+    const real t15 = t0 * Rt[6];
+    const real t16 = t1 * Rt[7];
+    const real t17 = t15 + t16;
+    Rc[6] = t17;
+    const real t18 = t0 * Rt[7];
+    const real t19 = t1 * Rt[6];
+    const real t20 = t18 - t19;
+    Rc[7] = t20;
+    Rc[8] = Rt[8];
+    const real t21 = q[0] * Rt[2];
+    const real t22 = ro[0] + t21;
+    r[0] = t22;
+    const real t23 = q[0] * Rt[5];
+    const real t24 = ro[1] + t23;
+    r[1] = t24;
+    const real t25 = q[0] * Rt[8];
+    const real t26 = ro[2] + t25;
+    r[2] = t26;
+    const real t27 = motion_I[0] * t5;
+    const real t28 = motion_I[1] * t11;
+    const real t29 = t27 + t28;
+    const real t30 = motion_I[2] * t17;
+    const real t31 = t29 + t30;
+    motion[0] = t31;
+    const real t32 = motion_I[0] * t8;
+    const real t33 = motion_I[1] * t14;
+    const real t34 = t32 + t33;
+    const real t35 = motion_I[2] * t20;
+    const real t36 = t34 + t35;
+    motion[1] = t36;
+    const real t37 = Rt[2] * motion_I[0];
+    const real t38 = Rt[5] * motion_I[1];
+    const real t39 = t37 + t38;
+    const real t40 = Rt[8] * motion_I[2];
+    const real t41 = t39 + t40;
+    const real t42 = u[1] + t41;
+    motion[2] = t42;
+    const real t43 = motion_I[3] * t5;
+    const real t44 = motion_I[4] * t11;
+    const real t45 = t43 + t44;
+    const real t46 = motion_I[5] * t17;
+    const real t47 = t45 + t46;
+    const real t48 = u[1] * t36;
+    const real t49 = t47 + t48;
+    motion[3] = t49;
+    const real t50 = motion_I[3] * t8;
+    const real t51 = motion_I[4] * t14;
+    const real t52 = t50 + t51;
+    const real t53 = motion_I[5] * t20;
+    const real t54 = t52 + t53;
+    const real t55 = u[1] * t31;
+    const real t56 = t54 - t55;
+    motion[4] = t56;
+    const real t57 = Rt[2] * motion_I[3];
+    const real t58 = Rt[5] * motion_I[4];
+    const real t59 = t57 + t58;
+    const real t60 = Rt[8] * motion_I[5];
+    const real t61 = t59 + t60;
+    const real t62 = s[1] + t61;
+    motion[5] = t62;
+    const real t63 = motion_I[0] * motion_I[1];
+    const real t64 = t63 - motion_I[5];
+    const real t65 = t24 * t64;
+    const real t66 = motion_I[1] * motion_I[1];
+    const real t67 = motion_I[2] * motion_I[2];
+    const real t68 = t66 + t67;
+    const real t69 = t22 * t68;
+    const real t70 = t65 - t69;
+    const real t71 = motion_I[0] * motion_I[2];
+    const real t72 = motion_I[4] + t71;
+    const real t73 = t26 * t72;
+    const real t74 = t70 + t73;
+    const real t75 = motion_I[6] + t74;
+    const real t76 = t5 * t75;
+    const real t77 = motion_I[5] + t63;
+    const real t78 = t22 * t77;
+    const real t79 = motion_I[0] * motion_I[0];
+    const real t80 = t67 + t79;
+    const real t81 = t24 * t80;
+    const real t82 = t78 - t81;
+    const real t83 = motion_I[1] * motion_I[2];
+    const real t84 = t83 - motion_I[3];
+    const real t85 = t26 * t84;
+    const real t86 = t82 + t85;
+    const real t87 = motion_I[7] + t86;
+    const real t88 = t11 * t87;
+    const real t89 = t76 + t88;
+    const real t90 = t71 - motion_I[4];
+    const real t91 = t22 * t90;
+    const real t92 = motion_I[3] + t83;
+    const real t93 = t24 * t92;
+    const real t94 = t91 + t93;
+    const real t95 = t66 + t79;
+    const real t96 = t26 * t95;
+    const real t97 = t94 - t96;
+    const real t98 = motion_I[8] + t97;
+    const real t99 = t17 * t98;
+    const real t100 = t89 + t99;
+    const real t101 = u[0] * t36;
+    const real t102 = t101 * 2.0;
+    const real t103 = t100 + t102;
+    motion[6] = t103;
+    const real t104 = t8 * t75;
+    const real t105 = t14 * t87;
+    const real t106 = t104 + t105;
+    const real t107 = t20 * t98;
+    const real t108 = t106 + t107;
+    const real t109 = u[0] * t31;
+    const real t110 = 2.0 * t109;
+    const real t111 = t108 - t110;
+    motion[7] = t111;
+    const real t112 = Rt[2] * t75;
+    const real t113 = Rt[5] * t87;
+    const real t114 = t112 + t113;
+    const real t115 = Rt[8] * t98;
+    const real t116 = t114 + t115;
+    const real t117 = s[0] + t116;
+    motion[8] = t117;
+    return 0;
+}
+
+static int mstmm_hinge_cylindrical_forward_kept_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_cylindrical_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+}
+
+static const mstmm_port mstmm_hinge_cylindrical_forward_kept_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 2, "", 0, 0},
+    {"u", 2, "", 0, 0},
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"s", 2, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_cylindrical_forward_kept_outputs[] = {
+    {"R", 9, "", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"H", 12, "", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"c", 6, "m/s2, rad/s2", 0, 0},
+    {"qdot", 2, "", 0, 0},
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+/* directions of the unknowns of the hinge
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  p[0] parameters
+ * in  q[2] coordinates: displacement [m], angle [rad]
+ * in  u[2] speeds: displacement_rate [m/s], angle_rate [rad/s]
+ * in  s[2] accelerations of the speeds
+ * in  motion[9] w, wd, and a of the body, own axes
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[2][2] change of the laws' efforts, a row a direction
+ * in  along[2][2] change of the coordinates, a row a direction
+ * in  rate[1] change of the speed itself
+ * in  scale[1] (1/s) and of its acceleration
+ * in  sq[1] (1/s) inverse time by which coordinates follow speeds
+ * out B[2][9] motion along the unknowns, a row a direction
+ * out G[2][6] change of the load that is carried
+ * out W[2][2] slopes of the rows by load, rotors and laws
+ * out H[6][2] motion subspace, rows v then w, P axes
+ */
+int mstmm_hinge_cylindrical_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+{
+    (void)p;
+    (void)q;
+    (void)s;
+    (void)along;
+    B[0] = 0.0;
+    B[1] = 0.0;
+    B[2] = 0.0;
+    B[3] = 0.0;
+    B[4] = 0.0;
+    B[5] = 0.0;
+    const real t0 = 1.0 / sq[0];
+    const real t1 = u[1] * motion[0];
+    const real t2 = motion[4] + t1;
+    const real t3 = t0 * t2;
+    const real t4 = motion[1] * rate[0];
+    const real t5 = 2.0 * t4;
+    const real t6 = motion[2] - u[1];
+    const real t7 = motion[0] * t0;
+    const real t8 = t6 * t7;
+    const real t9 = t5 + t8;
+    const real t10 = t3 + t9;
+    B[6] = t10;
+    const real t11 = motion[1] * t0;
+    const real t12 = t6 * t11;
+    const real t13 = motion[0] * rate[0];
+    const real t14 = 2.0 * t13;
+    const real t15 = t12 - t14;
+    const real t16 = u[1] * motion[1];
+    const real t17 = motion[3] - t16;
+    const real t18 = t0 * t17;
+    const real t19 = t15 - t18;
+    B[7] = t19;
+    const real t20 = motion[0] * t7;
+    const real t21 = motion[1] * t11;
+    const real t22 = t20 + t21;
+    const real t23 = scale[0] - t22;
+    B[8] = t23;
+    B[9] = t11;
+    const real t24 = -t7;
+    B[10] = t24;
+    B[11] = rate[0];
+    const real t25 = t3 + t4;
+    const real t26 = u[1] * t7;
+    const real t27 = t25 - t26;
+    B[12] = t27;
+    const real t28 = u[1] * t11;
+    const real t29 = t13 + t18;
+    const real t30 = t28 + t29;
+    const real t31 = -t30;
+    B[13] = t31;
+    B[14] = scale[0];
+    const real t32 = u[0] * motion[0];
+    const real t33 = 2.0 * t32;
+    const real t34 = motion[7] + t33;
+    const real t35 = t0 * t34;
+    const real t36 = u[0] * 2.0;
+    const real t37 = t36 * t7;
+    const real t38 = t35 - t37;
+    B[15] = t38;
+    const real t39 = t36 * t11;
+    const real t40 = u[0] * motion[1];
+    const real t41 = 2.0 * t40;
+    const real t42 = motion[6] - t41;
+    const real t43 = t0 * t42;
+    const real t44 = t39 + t43;
+    const real t45 = -t44;
+    B[16] = t45;
+    B[17] = 0.0;
+    G[0] = 0.0;
+    G[1] = 0.0;
+    G[2] = 0.0;
+    const real t46 = f[1] * t0;
+    const real t47 = -t46;
+    G[3] = t47;
+    const real t48 = f[0] * t0;
+    G[4] = t48;
+    G[5] = 0.0;
+    G[6] = t47;
+    G[7] = t48;
+    G[8] = 0.0;
+    const real t49 = f[4] * t0;
+    const real t50 = -t49;
+    G[9] = t50;
+    const real t51 = f[3] * t0;
+    G[10] = t51;
+    G[11] = 0.0;
+    const real t52 = J[0] * scale[0];
+    const real t53 = t52 - laws[0];
+    W[0] = t53;
+    const real t54 = -laws[1];
+    W[1] = t54;
+    const real t55 = -laws[2];
+    W[2] = t55;
+    const real t56 = J[1] * scale[0];
+    const real t57 = t56 - laws[3];
+    W[3] = t57;
+    H[0] = 0.0;
+    H[1] = 0.0;
+    H[2] = 0.0;
+    H[3] = 0.0;
+    H[4] = 1.0;
+    H[5] = 0.0;
+    H[6] = 0.0;
+    H[7] = 0.0;
+    H[8] = 0.0;
+    H[9] = 0.0;
+    H[10] = 0.0;
+    H[11] = 1.0;
+    return 0;
+}
+
+static int mstmm_hinge_cylindrical_directions_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_cylindrical_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_hinge_cylindrical_directions_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 2, "", 0, 0},
+    {"u", 2, "", 0, 0},
+    {"s", 2, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"J", 2, "kg*m2 or kg", 0, 0},
+    {"laws", 4, "", 0, 0},
+    {"along", 4, "", 0, 0},
+    {"rate", 1, "", 0, 0},
+    {"scale", 1, "1/s", 0, 0},
+    {"sq", 1, "1/s", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_cylindrical_directions_outputs[] = {
+    {"B", 18, "", 0, 0},
+    {"G", 12, "", 0, 0},
+    {"W", 4, "", 0, 0},
+    {"H", 12, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_cylindrical_q_names[] = {
     "displacement", "angle",
 };
@@ -1180,13 +1590,37 @@ static const mstmm_kernel mstmm_hinge_cylindrical_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_kept",
+        .function = (void (*)(void))mstmm_hinge_cylindrical_forward_kept,
+        .call = mstmm_hinge_cylindrical_forward_kept_call,
+        .n_inputs = 7,
+        .n_outputs = 10,
+        .inputs = mstmm_hinge_cylindrical_forward_kept_inputs,
+        .outputs = mstmm_hinge_cylindrical_forward_kept_outputs,
+        .ir_hash = "3fa875e01fe8273a1940323c550949156d8e163b5bc018ae5c6f092024feed44",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "directions",
+        .function = (void (*)(void))mstmm_hinge_cylindrical_directions,
+        .call = mstmm_hinge_cylindrical_directions_call,
+        .n_inputs = 12,
+        .n_outputs = 4,
+        .inputs = mstmm_hinge_cylindrical_directions_inputs,
+        .outputs = mstmm_hinge_cylindrical_directions_outputs,
+        .ir_hash = "7f3445add3751e8594236ceb03fa331961b367dbaa1f263e9c5e64ba882c1f86",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_cylindrical = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "cylindrical",
-    .hash = "2f89e8e30cbd27e71172ce4ad225a960af538ebc05e31157118703ebbd9ec412",
+    .hash = "8e6cc39b98ec32b7f7932a4aa07ea95397e556743f2eaba3b1a47ba7cb29c337",
     .nq = 2,
     .nu = 2,
     .np = 0,
@@ -1196,6 +1630,6 @@ const mstmm_element mstmm_hinge_cylindrical = {
     .u_units = mstmm_hinge_cylindrical_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 7,
+    .n_kernels = 9,
     .kernels = mstmm_hinge_cylindrical_kernels,
 };

@@ -26,6 +26,11 @@ int mstmm_hinge_fixed_hinge_slope(const real *restrict p, const real *restrict q
     const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
     real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
     real *restrict d_c, real *restrict d_qdot);
+int mstmm_hinge_fixed_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion);
 
 /* relative motion of the fixed hinge
  * in  p[0] parameters
@@ -895,6 +900,192 @@ static const mstmm_port mstmm_hinge_fixed_hinge_slope_outputs[] = {
     {"d_qdot", 0, "", 0, 0},
 };
 
+/* motion across the hinge and of the body behind it
+ * in  p[0] parameters
+ * in  q[0] coordinates
+ * in  u[0] speeds
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  s[0]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * out R[3][3] rotation, P axes to Q axes
+ * out d[3] (m) position of P from Q, Q axes
+ * out H[6][0] motion subspace, rows v then w, P axes
+ * out v[3] (m/s) relative velocity of P, P axes
+ * out w[3] (rad/s) relative angular velocity, P axes
+ * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
+ * out qdot[0] coordinate rates
+ * out Rc[3][3] rotation, body axes to parent axes
+ * out r[3] (m) P of the body from P of the parent, parent axes
+ * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ */
+int mstmm_hinge_fixed_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    (void)s;
+    (void)H;
+    (void)qdot;
+    R[0] = 1.0;
+    R[1] = 0.0;
+    R[2] = 0.0;
+    R[3] = 0.0;
+    R[4] = 1.0;
+    R[5] = 0.0;
+    R[6] = 0.0;
+    R[7] = 0.0;
+    R[8] = 1.0;
+    d[0] = 0.0;
+    d[1] = 0.0;
+    d[2] = 0.0;
+    v[0] = 0.0;
+    v[1] = 0.0;
+    v[2] = 0.0;
+    w[0] = 0.0;
+    w[1] = 0.0;
+    w[2] = 0.0;
+    c[0] = 0.0;
+    c[1] = 0.0;
+    c[2] = 0.0;
+    c[3] = 0.0;
+    c[4] = 0.0;
+    c[5] = 0.0;
+    Rc[0] = Rt[0];
+    Rc[1] = Rt[1];
+    Rc[2] = Rt[2];
+    Rc[3] = Rt[3];
+    Rc[4] = Rt[4];
+    Rc[5] = Rt[5];
+    Rc[6] = Rt[6];
+    Rc[7] = Rt[7];
+    Rc[8] = Rt[8];
+    r[0] = ro[0];
+    r[1] = ro[1];
+    r[2] = ro[2];
+    const real t0 = Rt[0] * motion_I[0];
+    const real t1 = Rt[3] * motion_I[1];
+    const real t2 = t0 + t1;
+    const real t3 = Rt[6] * motion_I[2];
+    const real t4 = t2 + t3;
+    motion[0] = t4;
+    const real t5 = Rt[1] * motion_I[0];
+    const real t6 = Rt[4] * motion_I[1];
+    const real t7 = t5 + t6;
+    const real t8 = Rt[7] * motion_I[2];
+    const real t9 = t7 + t8;
+    motion[1] = t9;
+    const real t10 = Rt[2] * motion_I[0];
+    const real t11 = Rt[5] * motion_I[1];
+    const real t12 = t10 + t11;
+    const real t13 = Rt[8] * motion_I[2];
+    const real t14 = t12 + t13;
+    motion[2] = t14;
+    const real t15 = Rt[0] * motion_I[3];
+    const real t16 = Rt[3] * motion_I[4];
+    const real t17 = t15 + t16;
+    const real t18 = Rt[6] * motion_I[5];
+    const real t19 = t17 + t18;
+    motion[3] = t19;
+    const real t20 = Rt[1] * motion_I[3];
+    const real t21 = Rt[4] * motion_I[4];
+    const real t22 = t20 + t21;
+    const real t23 = Rt[7] * motion_I[5];
+    const real t24 = t22 + t23;
+    motion[4] = t24;
+    const real t25 = Rt[2] * motion_I[3];
+    const real t26 = Rt[5] * motion_I[4];
+    const real t27 = t25 + t26;
+    const real t28 = Rt[8] * motion_I[5];
+    const real t29 = t27 + t28;
+    motion[5] = t29;
+    const real t30 = motion_I[0] * motion_I[1];
+    const real t31 = t30 - motion_I[5];
+    const real t32 = ro[1] * t31;
+    const real t33 = motion_I[1] * motion_I[1];
+    const real t34 = motion_I[2] * motion_I[2];
+    const real t35 = t33 + t34;
+    const real t36 = ro[0] * t35;
+    const real t37 = t32 - t36;
+    const real t38 = motion_I[0] * motion_I[2];
+    const real t39 = motion_I[4] + t38;
+    const real t40 = ro[2] * t39;
+    const real t41 = t37 + t40;
+    const real t42 = motion_I[6] + t41;
+    const real t43 = Rt[0] * t42;
+    const real t44 = motion_I[5] + t30;
+    const real t45 = ro[0] * t44;
+    const real t46 = motion_I[0] * motion_I[0];
+    const real t47 = t34 + t46;
+    const real t48 = ro[1] * t47;
+    const real t49 = t45 - t48;
+    const real t50 = motion_I[1] * motion_I[2];
+    const real t51 = t50 - motion_I[3];
+    const real t52 = ro[2] * t51;
+    const real t53 = t49 + t52;
+    const real t54 = motion_I[7] + t53;
+    const real t55 = Rt[3] * t54;
+    const real t56 = t43 + t55;
+    const real t57 = t38 - motion_I[4];
+    const real t58 = ro[0] * t57;
+    const real t59 = motion_I[3] + t50;
+    const real t60 = ro[1] * t59;
+    const real t61 = t58 + t60;
+    const real t62 = t33 + t46;
+    const real t63 = ro[2] * t62;
+    const real t64 = t61 - t63;
+    const real t65 = motion_I[8] + t64;
+    const real t66 = Rt[6] * t65;
+    const real t67 = t56 + t66;
+    motion[6] = t67;
+    const real t68 = Rt[1] * t42;
+    const real t69 = Rt[4] * t54;
+    const real t70 = t68 + t69;
+    const real t71 = Rt[7] * t65;
+    const real t72 = t70 + t71;
+    motion[7] = t72;
+    const real t73 = Rt[2] * t42;
+    const real t74 = Rt[5] * t54;
+    const real t75 = t73 + t74;
+    const real t76 = Rt[8] * t65;
+    const real t77 = t75 + t76;
+    motion[8] = t77;
+    return 0;
+}
+
+static int mstmm_hinge_fixed_forward_kept_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_fixed_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+}
+
+static const mstmm_port mstmm_hinge_fixed_forward_kept_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 0, "", 0, 0},
+    {"u", 0, "", 0, 0},
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"s", 0, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_fixed_forward_kept_outputs[] = {
+    {"R", 9, "", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"H", 0, "", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"c", 6, "m/s2, rad/s2", 0, 0},
+    {"qdot", 0, "", 0, 0},
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
 static const mstmm_kernel mstmm_hinge_fixed_kernels[] = {
     {
         .name = "hinge",
@@ -956,13 +1147,25 @@ static const mstmm_kernel mstmm_hinge_fixed_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_kept",
+        .function = (void (*)(void))mstmm_hinge_fixed_forward_kept,
+        .call = mstmm_hinge_fixed_forward_kept_call,
+        .n_inputs = 7,
+        .n_outputs = 10,
+        .inputs = mstmm_hinge_fixed_forward_kept_inputs,
+        .outputs = mstmm_hinge_fixed_forward_kept_outputs,
+        .ir_hash = "b05b9ffb21a5a61586889e96f09739a8224bc1f67e899ba90f94ec2149054219",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_fixed = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "fixed",
-    .hash = "c1f105f6d68a90bb1224c2abccd271601ce6e0ef37fdbcc585a5882abe88652b",
+    .hash = "d785d97ebc4473b2013ff1280062c646fc11fd16d68a59f804c104f202de4adf",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -972,6 +1175,6 @@ const mstmm_element mstmm_hinge_fixed = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 5,
+    .n_kernels = 6,
     .kernels = mstmm_hinge_fixed_kernels,
 };

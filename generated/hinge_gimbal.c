@@ -33,6 +33,16 @@ int mstmm_hinge_gimbal_rates_by_coordinates(const real *restrict p, const real *
     const real *restrict u, real *restrict J);
 int mstmm_hinge_gimbal_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
+int mstmm_hinge_gimbal_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion);
+int mstmm_hinge_gimbal_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
 
 /* relative motion of the gimbal hinge (three angles)
  * in  p[0] parameters
@@ -1688,6 +1698,806 @@ static const mstmm_port mstmm_hinge_gimbal_rates_by_speeds_outputs[] = {
     {"J", 9, "", 0, 0},
 };
 
+/* motion across the hinge and of the body behind it
+ * in  p[0] parameters
+ * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
+ * in  u[3] speeds: angle1_rate [rad/s], angle2_rate [rad/s], angle3_rate [rad/s]
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  s[3]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * out R[3][3] rotation, P axes to Q axes
+ * out d[3] (m) position of P from Q, Q axes
+ * out H[6][3] motion subspace, rows v then w, P axes
+ * out v[3] (m/s) relative velocity of P, P axes
+ * out w[3] (rad/s) relative angular velocity, P axes
+ * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
+ * out qdot[3] coordinate rates
+ * out Rc[3][3] rotation, body axes to parent axes
+ * out r[3] (m) P of the body from P of the parent, parent axes
+ * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ */
+int mstmm_hinge_gimbal_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion)
+{
+    (void)p;
+    const real t0 = cos(q[1]);
+    const real t1 = cos(q[2]);
+    const real t2 = t0 * t1;
+    R[0] = t2;
+    const real t3 = sin(q[0]);
+    const real t4 = sin(q[1]);
+    const real t5 = t3 * t4;
+    const real t6 = t1 * t5;
+    const real t7 = sin(q[2]);
+    const real t8 = cos(q[0]);
+    const real t9 = t7 * t8;
+    const real t10 = t6 - t9;
+    R[1] = t10;
+    const real t11 = t3 * t7;
+    const real t12 = t4 * t8;
+    const real t13 = t1 * t12;
+    const real t14 = t11 + t13;
+    R[2] = t14;
+    const real t15 = t0 * t7;
+    R[3] = t15;
+    const real t16 = t1 * t8;
+    const real t17 = t5 * t7;
+    const real t18 = t16 + t17;
+    R[4] = t18;
+    const real t19 = t4 * t7;
+    const real t20 = t8 * t19;
+    const real t21 = t1 * t3;
+    const real t22 = t20 - t21;
+    R[5] = t22;
+    const real t23 = -t4;
+    R[6] = t23;
+    const real t24 = t0 * t3;
+    R[7] = t24;
+    const real t25 = t0 * t8;
+    R[8] = t25;
+    d[0] = 0.0;
+    d[1] = 0.0;
+    d[2] = 0.0;
+    H[0] = 0.0;
+    H[1] = 0.0;
+    H[2] = 0.0;
+    H[3] = 0.0;
+    H[4] = 0.0;
+    H[5] = 0.0;
+    H[6] = 0.0;
+    H[7] = 0.0;
+    H[8] = 0.0;
+    H[9] = 1.0;
+    H[10] = 0.0;
+    H[11] = t23;
+    H[12] = 0.0;
+    H[13] = t8;
+    H[14] = t24;
+    H[15] = 0.0;
+    const real t26 = -t3;
+    H[16] = t26;
+    H[17] = t25;
+    v[0] = 0.0;
+    v[1] = 0.0;
+    v[2] = 0.0;
+    const real t27 = u[2] * t4;
+    const real t28 = u[0] - t27;
+    w[0] = t28;
+    const real t29 = u[1] * t8;
+    const real t30 = u[2] * t24;
+    const real t31 = t29 + t30;
+    w[1] = t31;
+    const real t32 = u[2] * t25;
+    const real t33 = u[1] * t3;
+    const real t34 = t32 - t33;
+    w[2] = t34;
+    c[0] = 0.0;
+    c[1] = 0.0;
+    c[2] = 0.0;
+    const real t35 = u[1] * t0;
+    const real t36 = u[2] * t35;
+    const real t37 = -t36;
+    c[3] = t37;
+    const real t38 = u[0] * t34;
+    const real t39 = u[1] * t5;
+    const real t40 = u[2] * t39;
+    const real t41 = t38 - t40;
+    c[4] = t41;
+    const real t42 = u[0] * t31;
+    const real t43 = u[1] * t12;
+    const real t44 = u[2] * t43;
+    const real t45 = t42 + t44;
+    const real t46 = -t45;
+    c[5] = t46;
+    qdot[0] = u[0];
+    qdot[1] = u[1];
+    qdot[2] = u[2];
+    const real t47 = t2 * Rt[0];
+    const real t48 = t15 * Rt[1];
+    const real t49 = t47 + t48;
+    const real t50 = t4 * Rt[2];
+    const real t51 = t49 - t50;
+    Rc[0] = t51;
+    const real t52 = t10 * Rt[0];
+    const real t53 = t18 * Rt[1];
+    const real t54 = t52 + t53;
+    const real t55 = t24 * Rt[2];
+    const real t56 = t54 + t55;
+    Rc[1] = t56;
+    const real t57 = t14 * Rt[0];
+    const real t58 = t22 * Rt[1];
+    const real t59 = t57 + t58;
+    const real t60 = t25 * Rt[2];
+    const real t61 = t59 + t60;
+    Rc[2] = t61;
+    const real t62 = t2 * Rt[3];
+    const real t63 = t15 * Rt[4];
+    const real t64 = t62 + t63;
+    const real t65 = t4 * Rt[5];
+    const real t66 = t64 - t65;
+    Rc[3] = t66;
+    const real t67 = t10 * Rt[3];
+    const real t68 = t18 * Rt[4];
+    const real t69 = t67 + t68;
+    const real t70 = t24 * Rt[5];
+    const real t71 = t69 + t70;
+    Rc[4] = t71;
+    const real t72 = t14 * Rt[3];
+    const real t73 = t22 * Rt[4];
+    const real t74 = t72 + t73;
+    const real t75 = t25 * Rt[5];
+    const real t76 = t74 + t75;
+    Rc[5] = t76;
+    const real t77 = t2 * Rt[6];
+    const real t78 = t15 * Rt[7];
+    const real t79 = t77 + t78;
+    const real t80 = t4 * Rt[8];
+    const real t81 = t79 - t80;
+    Rc[6] = t81;
+    const real t82 = t10 * Rt[6];
+    const real t83 = t18 * Rt[7];
+    const real t84 = t82 + t83;
+    const real t85 = t24 * Rt[8];
+    const real t86 = t84 + t85;
+    Rc[7] = t86;
+    const real t87 = t14 * Rt[6];
+    const real t88 = t22 * Rt[7];
+    const real t89 = t87 + t88;
+    const real t90 = t25 * Rt[8];
+    const real t91 = t89 + t90;
+    Rc[8] = t91;
+    r[0] = ro[0];
+    r[1] = ro[1];
+    r[2] = ro[2];
+    const real t92 = motion_I[0] * t51;
+    const real t93 = motion_I[1] * t66;
+    const real t94 = t92 + t93;
+    const real t95 = motion_I[2] * t81;
+    const real t96 = t94 + t95;
+    const real t97 = t28 + t96;
+    motion[0] = t97;
+    const real t98 = motion_I[0] * t56;
+    const real t99 = motion_I[1] * t71;
+    const real t100 = t98 + t99;
+    const real t101 = motion_I[2] * t86;
+    const real t102 = t100 + t101;
+    const real t103 = t31 + t102;
+    motion[1] = t103;
+    const real t104 = motion_I[0] * t61;
+    const real t105 = motion_I[1] * t76;
+    const real t106 = t104 + t105;
+    const real t107 = motion_I[2] * t91;
+    const real t108 = t106 + t107;
+    const real t109 = t34 + t108;
+    motion[2] = t109;
+    const real t110 = motion_I[3] * t51;
+    const real t111 = motion_I[4] * t66;
+    const real t112 = t110 + t111;
+    const real t113 = motion_I[5] * t81;
+    const real t114 = t112 + t113;
+    const real t115 = t4 * s[2];
+    const real t116 = s[0] - t115;
+    const real t117 = t116 - t36;
+    const real t118 = t34 * t102;
+    const real t119 = t31 * t108;
+    const real t120 = t118 - t119;
+    const real t121 = t117 + t120;
+    const real t122 = t114 + t121;
+    motion[3] = t122;
+    const real t123 = motion_I[3] * t56;
+    const real t124 = motion_I[4] * t71;
+    const real t125 = t123 + t124;
+    const real t126 = motion_I[5] * t86;
+    const real t127 = t125 + t126;
+    const real t128 = t8 * s[1];
+    const real t129 = t24 * s[2];
+    const real t130 = t128 + t129;
+    const real t131 = t41 + t130;
+    const real t132 = t28 * t108;
+    const real t133 = t34 * t96;
+    const real t134 = t132 - t133;
+    const real t135 = t131 + t134;
+    const real t136 = t127 + t135;
+    motion[4] = t136;
+    const real t137 = motion_I[3] * t61;
+    const real t138 = motion_I[4] * t76;
+    const real t139 = t137 + t138;
+    const real t140 = motion_I[5] * t91;
+    const real t141 = t139 + t140;
+    const real t142 = t25 * s[2];
+    const real t143 = t3 * s[1];
+    const real t144 = t142 - t143;
+    const real t145 = t144 - t45;
+    const real t146 = t31 * t96;
+    const real t147 = t28 * t102;
+    const real t148 = t146 - t147;
+    const real t149 = t145 + t148;
+    const real t150 = t141 + t149;
+    motion[5] = t150;
+    const real t151 = motion_I[0] * motion_I[1];
+    const real t152 = t151 - motion_I[5];
+    const real t153 = ro[1] * t152;
+    const real t154 = motion_I[1] * motion_I[1];
+    const real t155 = motion_I[2] * motion_I[2];
+    const real t156 = t154 + t155;
+    const real t157 = ro[0] * t156;
+    const real t158 = t153 - t157;
+    const real t159 = motion_I[0] * motion_I[2];
+    const real t160 = motion_I[4] + t159;
+    const real t161 = ro[2] * t160;
+    const real t162 = t158 + t161;
+    const real t163 = motion_I[6] + t162;
+    const real t164 = t51 * t163;
+    const real t165 = motion_I[5] + t151;
+    const real t166 = ro[0] * t165;
+    const real t167 = motion_I[0] * motion_I[0];
+    const real t168 = t155 + t167;
+    const real t169 = ro[1] * t168;
+    const real t170 = t166 - t169;
+    const real t171 = motion_I[1] * motion_I[2];
+    const real t172 = t171 - motion_I[3];
+    const real t173 = ro[2] * t172;
+    const real t174 = t170 + t173;
+    const real t175 = motion_I[7] + t174;
+    const real t176 = t66 * t175;
+    const real t177 = t164 + t176;
+    const real t178 = t159 - motion_I[4];
+    const real t179 = ro[0] * t178;
+    const real t180 = motion_I[3] + t171;
+    const real t181 = ro[1] * t180;
+    const real t182 = t179 + t181;
+    const real t183 = t154 + t167;
+    const real t184 = ro[2] * t183;
+    const real t185 = t182 - t184;
+    const real t186 = motion_I[8] + t185;
+    const real t187 = t81 * t186;
+    const real t188 = t177 + t187;
+    motion[6] = t188;
+    const real t189 = t56 * t163;
+    const real t190 = t71 * t175;
+    const real t191 = t189 + t190;
+    const real t192 = t86 * t186;
+    const real t193 = t191 + t192;
+    motion[7] = t193;
+    const real t194 = t61 * t163;
+    const real t195 = t76 * t175;
+    const real t196 = t194 + t195;
+    const real t197 = t91 * t186;
+    const real t198 = t196 + t197;
+    motion[8] = t198;
+    return 0;
+}
+
+static int mstmm_hinge_gimbal_forward_kept_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_gimbal_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+}
+
+static const mstmm_port mstmm_hinge_gimbal_forward_kept_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 3, "", 0, 0},
+    {"u", 3, "", 0, 0},
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"s", 3, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_gimbal_forward_kept_outputs[] = {
+    {"R", 9, "", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"c", 6, "m/s2, rad/s2", 0, 0},
+    {"qdot", 3, "", 0, 0},
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+/* directions of the unknowns of the hinge
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  p[0] parameters
+ * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
+ * in  u[3] speeds: angle1_rate [rad/s], angle2_rate [rad/s], angle3_rate [rad/s]
+ * in  s[3] accelerations of the speeds
+ * in  motion[9] w, wd, and a of the body, own axes
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[3][3] change of the laws' efforts, a row a direction
+ * in  along[3][3] change of the coordinates, a row a direction
+ * in  rate[1] change of the speed itself
+ * in  scale[1] (1/s) and of its acceleration
+ * in  sq[1] (1/s) inverse time by which coordinates follow speeds
+ * out B[3][9] motion along the unknowns, a row a direction
+ * out G[3][6] change of the load that is carried
+ * out W[3][3] slopes of the rows by load, rotors and laws
+ * out H[6][3] motion subspace, rows v then w, P axes
+ */
+int mstmm_hinge_gimbal_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+{
+    (void)p;
+    (void)along;
+    B[0] = rate[0];
+    const real t0 = cos(q[1]);
+    const real t1 = cos(q[0]);
+    const real t2 = 1.0 / sq[0];
+    const real t3 = t1 * t2;
+    const real t4 = t0 * t3;
+    const real t5 = u[2] * t4;
+    const real t6 = sin(q[0]);
+    const real t7 = t6 * t2;
+    const real t8 = u[1] * t7;
+    const real t9 = t5 - t8;
+    const real t10 = t0 * t1;
+    const real t11 = u[2] * t10;
+    const real t12 = u[1] * t6;
+    const real t13 = t11 - t12;
+    const real t14 = motion[2] - t13;
+    const real t15 = t2 * t14;
+    const real t16 = t9 + t15;
+    B[1] = t16;
+    const real t17 = u[1] * t3;
+    const real t18 = t0 * t7;
+    const real t19 = u[2] * t18;
+    const real t20 = t17 + t19;
+    const real t21 = u[1] * t1;
+    const real t22 = t0 * t6;
+    const real t23 = u[2] * t22;
+    const real t24 = t21 + t23;
+    const real t25 = motion[1] - t24;
+    const real t26 = t2 * t25;
+    const real t27 = t20 + t26;
+    const real t28 = -t27;
+    B[2] = t28;
+    const real t29 = t13 * t15;
+    const real t30 = t24 * t26;
+    const real t31 = t29 + t30;
+    const real t32 = t20 * t25;
+    const real t33 = t9 * t14;
+    const real t34 = t32 + t33;
+    const real t35 = scale[0] - t34;
+    const real t36 = t31 + t35;
+    B[3] = t36;
+    const real t37 = t13 * rate[0];
+    const real t38 = u[0] * t20;
+    const real t39 = t37 - t38;
+    const real t40 = sin(q[1]);
+    const real t41 = t40 * t3;
+    const real t42 = u[1] * t41;
+    const real t43 = u[2] * t42;
+    const real t44 = t39 - t43;
+    const real t45 = s[2] * t4;
+    const real t46 = s[1] * t7;
+    const real t47 = t45 - t46;
+    const real t48 = t44 + t47;
+    const real t49 = u[2] * t40;
+    const real t50 = u[0] - t49;
+    const real t51 = t50 * t25;
+    const real t52 = motion[0] - t50;
+    const real t53 = t24 * t52;
+    const real t54 = t51 - t53;
+    const real t55 = t10 * s[2];
+    const real t56 = t6 * s[1];
+    const real t57 = t55 - t56;
+    const real t58 = u[0] * t24;
+    const real t59 = t40 * t1;
+    const real t60 = u[1] * t59;
+    const real t61 = u[2] * t60;
+    const real t62 = t58 + t61;
+    const real t63 = t57 - t62;
+    const real t64 = t54 - t63;
+    const real t65 = motion[5] + t64;
+    const real t66 = t2 * t65;
+    const real t67 = rate[0] * t14;
+    const real t68 = t20 * t52;
+    const real t69 = t67 + t68;
+    const real t70 = t66 + t69;
+    const real t71 = t48 + t70;
+    const real t72 = t50 * t26;
+    const real t73 = t71 - t72;
+    B[4] = t73;
+    const real t74 = t40 * t7;
+    const real t75 = u[1] * t74;
+    const real t76 = u[2] * t75;
+    const real t77 = t24 * rate[0];
+    const real t78 = u[0] * t9;
+    const real t79 = t77 + t78;
+    const real t80 = t76 - t79;
+    const real t81 = s[1] * t3;
+    const real t82 = s[2] * t18;
+    const real t83 = t81 + t82;
+    const real t84 = t80 - t83;
+    const real t85 = t9 * t52;
+    const real t86 = rate[0] * t25;
+    const real t87 = t85 - t86;
+    const real t88 = t13 * t52;
+    const real t89 = t50 * t14;
+    const real t90 = t88 - t89;
+    const real t91 = u[0] * t13;
+    const real t92 = t6 * t40;
+    const real t93 = u[1] * t92;
+    const real t94 = u[2] * t93;
+    const real t95 = t91 - t94;
+    const real t96 = t1 * s[1];
+    const real t97 = t22 * s[2];
+    const real t98 = t96 + t97;
+    const real t99 = t95 + t98;
+    const real t100 = t90 - t99;
+    const real t101 = motion[4] + t100;
+    const real t102 = t2 * t101;
+    const real t103 = t87 - t102;
+    const real t104 = t84 + t103;
+    const real t105 = t50 * t15;
+    const real t106 = t104 - t105;
+    B[5] = t106;
+    B[6] = 0.0;
+    const real t107 = motion[8] * t2;
+    B[7] = t107;
+    const real t108 = motion[7] * t2;
+    const real t109 = -t108;
+    B[8] = t109;
+    const real t110 = t0 * t2;
+    const real t111 = u[2] * t110;
+    const real t112 = t7 * t25;
+    const real t113 = t3 * t14;
+    const real t114 = t112 + t113;
+    const real t115 = t111 + t114;
+    const real t116 = -t115;
+    B[9] = t116;
+    const real t117 = t1 * rate[0];
+    const real t118 = t40 * t2;
+    const real t119 = t6 * t118;
+    const real t120 = u[2] * t119;
+    const real t121 = t117 - t120;
+    const real t122 = t7 * t52;
+    const real t123 = t121 + t122;
+    B[10] = t123;
+    const real t124 = t3 * t52;
+    const real t125 = t6 * rate[0];
+    const real t126 = t1 * t118;
+    const real t127 = u[2] * t126;
+    const real t128 = t125 + t127;
+    const real t129 = t124 - t128;
+    B[11] = t129;
+    const real t130 = t13 * t122;
+    const real t131 = t24 * t124;
+    const real t132 = t130 - t131;
+    const real t133 = t0 * rate[0];
+    const real t134 = u[1] * t118;
+    const real t135 = t133 - t134;
+    const real t136 = u[2] * t135;
+    const real t137 = s[2] * t110;
+    const real t138 = t136 + t137;
+    const real t139 = t7 * t101;
+    const real t140 = t25 * t128;
+    const real t141 = t14 * t121;
+    const real t142 = t140 + t141;
+    const real t143 = t139 + t142;
+    const real t144 = t3 * t65;
+    const real t145 = t143 + t144;
+    const real t146 = t138 + t145;
+    const real t147 = t132 - t146;
+    B[12] = t147;
+    const real t148 = t50 * t124;
+    const real t149 = t13 * t114;
+    const real t150 = t148 + t149;
+    const real t151 = t1 * scale[0];
+    const real t152 = s[2] * t119;
+    const real t153 = t151 - t152;
+    const real t154 = t92 * rate[0];
+    const real t155 = t6 * t110;
+    const real t156 = u[1] * t155;
+    const real t157 = t154 + t156;
+    const real t158 = u[2] * t157;
+    const real t159 = u[0] * t128;
+    const real t160 = t158 + t159;
+    const real t161 = t153 - t160;
+    const real t162 = t52 * t128;
+    const real t163 = t14 * t111;
+    const real t164 = t162 - t163;
+    const real t165 = t24 * t14;
+    const real t166 = t13 * t25;
+    const real t167 = t165 - t166;
+    const real t168 = t40 * s[2];
+    const real t169 = s[0] - t168;
+    const real t170 = u[1] * t0;
+    const real t171 = u[2] * t170;
+    const real t172 = t169 - t171;
+    const real t173 = t167 - t172;
+    const real t174 = motion[3] + t173;
+    const real t175 = t7 * t174;
+    const real t176 = t164 + t175;
+    const real t177 = t161 + t176;
+    const real t178 = t150 + t177;
+    B[13] = t178;
+    const real t179 = t3 * t174;
+    const real t180 = t52 * t121;
+    const real t181 = t25 * t111;
+    const real t182 = t180 + t181;
+    const real t183 = t179 + t182;
+    const real t184 = t59 * rate[0];
+    const real t185 = t1 * t110;
+    const real t186 = u[1] * t185;
+    const real t187 = t184 + t186;
+    const real t188 = u[2] * t187;
+    const real t189 = u[0] * t121;
+    const real t190 = t188 + t189;
+    const real t191 = t6 * scale[0];
+    const real t192 = s[2] * t126;
+    const real t193 = t191 + t192;
+    const real t194 = t190 + t193;
+    const real t195 = t183 - t194;
+    const real t196 = t24 * t114;
+    const real t197 = t50 * t122;
+    const real t198 = t196 + t197;
+    const real t199 = t195 - t198;
+    B[14] = t199;
+    const real t200 = motion[7] * t7;
+    const real t201 = motion[8] * t3;
+    const real t202 = t200 + t201;
+    const real t203 = -t202;
+    B[15] = t203;
+    const real t204 = motion[6] * t7;
+    B[16] = t204;
+    const real t205 = motion[6] * t3;
+    B[17] = t205;
+    const real t206 = t10 * t2;
+    const real t207 = t25 * t206;
+    const real t208 = t22 * t2;
+    const real t209 = t14 * t208;
+    const real t210 = t207 - t209;
+    const real t211 = t40 * rate[0];
+    const real t212 = t210 - t211;
+    B[18] = t212;
+    const real t213 = t22 * rate[0];
+    const real t214 = t14 * t118;
+    const real t215 = t52 * t206;
+    const real t216 = t214 + t215;
+    const real t217 = t213 - t216;
+    B[19] = t217;
+    const real t218 = t10 * rate[0];
+    const real t219 = t52 * t208;
+    const real t220 = t25 * t118;
+    const real t221 = t219 + t220;
+    const real t222 = t218 + t221;
+    B[20] = t222;
+    const real t223 = t101 * t206;
+    const real t224 = t25 * t218;
+    const real t225 = t14 * t213;
+    const real t226 = t224 - t225;
+    const real t227 = t223 + t226;
+    const real t228 = t65 * t208;
+    const real t229 = t227 - t228;
+    const real t230 = t170 * rate[0];
+    const real t231 = t40 * scale[0];
+    const real t232 = t230 + t231;
+    const real t233 = t229 - t232;
+    const real t234 = t13 * t216;
+    const real t235 = t24 * t221;
+    const real t236 = t234 + t235;
+    const real t237 = t233 - t236;
+    B[21] = t237;
+    const real t238 = t50 * t221;
+    const real t239 = t13 * t210;
+    const real t240 = t238 - t239;
+    const real t241 = u[0] * t218;
+    const real t242 = t93 * rate[0];
+    const real t243 = t241 - t242;
+    const real t244 = t22 * scale[0];
+    const real t245 = t243 + t244;
+    const real t246 = t65 * t118;
+    const real t247 = t14 * t211;
+    const real t248 = t52 * t218;
+    const real t249 = t247 + t248;
+    const real t250 = t174 * t206;
+    const real t251 = t249 + t250;
+    const real t252 = t246 + t251;
+    const real t253 = t245 - t252;
+    const real t254 = t240 + t253;
+    B[22] = t254;
+    const real t255 = t24 * t210;
+    const real t256 = t50 * t216;
+    const real t257 = t255 + t256;
+    const real t258 = t10 * scale[0];
+    const real t259 = t60 * rate[0];
+    const real t260 = u[0] * t213;
+    const real t261 = t259 + t260;
+    const real t262 = t258 - t261;
+    const real t263 = t174 * t208;
+    const real t264 = t52 * t213;
+    const real t265 = t25 * t211;
+    const real t266 = t264 + t265;
+    const real t267 = t263 + t266;
+    const real t268 = t101 * t118;
+    const real t269 = t267 + t268;
+    const real t270 = t262 + t269;
+    const real t271 = t257 + t270;
+    B[23] = t271;
+    const real t272 = motion[7] * t206;
+    const real t273 = motion[8] * t208;
+    const real t274 = t272 - t273;
+    B[24] = t274;
+    const real t275 = motion[8] * t118;
+    const real t276 = motion[6] * t206;
+    const real t277 = t275 + t276;
+    const real t278 = -t277;
+    B[25] = t278;
+    const real t279 = motion[6] * t208;
+    const real t280 = motion[7] * t118;
+    const real t281 = t279 + t280;
+    B[26] = t281;
+    G[0] = 0.0;
+    const real t282 = f[2] * t2;
+    const real t283 = -t282;
+    G[1] = t283;
+    const real t284 = f[1] * t2;
+    G[2] = t284;
+    G[3] = 0.0;
+    const real t285 = f[5] * t2;
+    const real t286 = -t285;
+    G[4] = t286;
+    const real t287 = f[4] * t2;
+    G[5] = t287;
+    const real t288 = f[2] * t3;
+    const real t289 = f[1] * t7;
+    const real t290 = t288 + t289;
+    G[6] = t290;
+    const real t291 = f[0] * t7;
+    const real t292 = -t291;
+    G[7] = t292;
+    const real t293 = f[0] * t3;
+    const real t294 = -t293;
+    G[8] = t294;
+    const real t295 = f[4] * t7;
+    const real t296 = f[5] * t3;
+    const real t297 = t295 + t296;
+    G[9] = t297;
+    const real t298 = f[3] * t7;
+    const real t299 = -t298;
+    G[10] = t299;
+    const real t300 = f[3] * t3;
+    const real t301 = -t300;
+    G[11] = t301;
+    const real t302 = f[2] * t208;
+    const real t303 = f[1] * t206;
+    const real t304 = t302 - t303;
+    G[12] = t304;
+    const real t305 = f[0] * t206;
+    const real t306 = f[2] * t118;
+    const real t307 = t305 + t306;
+    G[13] = t307;
+    const real t308 = f[1] * t118;
+    const real t309 = f[0] * t208;
+    const real t310 = t308 + t309;
+    const real t311 = -t310;
+    G[14] = t311;
+    const real t312 = f[5] * t208;
+    const real t313 = f[4] * t206;
+    const real t314 = t312 - t313;
+    G[15] = t314;
+    const real t315 = f[3] * t206;
+    const real t316 = f[5] * t118;
+    const real t317 = t315 + t316;
+    G[16] = t317;
+    const real t318 = f[4] * t118;
+    const real t319 = f[3] * t208;
+    const real t320 = t318 + t319;
+    const real t321 = -t320;
+    G[17] = t321;
+    const real t322 = J[0] * scale[0];
+    const real t323 = t322 - laws[0];
+    W[0] = t323;
+    const real t324 = laws[1] + t297;
+    const real t325 = -t324;
+    W[1] = t325;
+    const real t326 = f[4] * t4;
+    const real t327 = f[5] * t18;
+    const real t328 = t326 - t327;
+    const real t329 = t328 - laws[2];
+    W[2] = t329;
+    const real t330 = -laws[3];
+    W[3] = t330;
+    const real t331 = J[1] * scale[0];
+    const real t332 = t331 - laws[4];
+    W[4] = t332;
+    const real t333 = f[3] * t110;
+    const real t334 = f[4] * t119;
+    const real t335 = t333 + t334;
+    const real t336 = f[5] * t126;
+    const real t337 = t335 + t336;
+    const real t338 = laws[5] + t337;
+    const real t339 = -t338;
+    W[5] = t339;
+    const real t340 = -laws[6];
+    W[6] = t340;
+    const real t341 = -laws[7];
+    W[7] = t341;
+    const real t342 = J[2] * scale[0];
+    const real t343 = t342 - laws[8];
+    W[8] = t343;
+    H[0] = 0.0;
+    H[1] = 0.0;
+    H[2] = 0.0;
+    H[3] = 0.0;
+    H[4] = 0.0;
+    H[5] = 0.0;
+    H[6] = 0.0;
+    H[7] = 0.0;
+    H[8] = 0.0;
+    H[9] = 1.0;
+    H[10] = 0.0;
+    const real t344 = -t40;
+    H[11] = t344;
+    H[12] = 0.0;
+    H[13] = t1;
+    H[14] = t22;
+    H[15] = 0.0;
+    const real t345 = -t6;
+    H[16] = t345;
+    H[17] = t10;
+    return 0;
+}
+
+static int mstmm_hinge_gimbal_directions_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_gimbal_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_hinge_gimbal_directions_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 3, "", 0, 0},
+    {"u", 3, "", 0, 0},
+    {"s", 3, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"J", 3, "kg*m2 or kg", 0, 0},
+    {"laws", 9, "", 0, 0},
+    {"along", 9, "", 0, 0},
+    {"rate", 1, "", 0, 0},
+    {"scale", 1, "1/s", 0, 0},
+    {"sq", 1, "1/s", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_gimbal_directions_outputs[] = {
+    {"B", 27, "", 0, 0},
+    {"G", 18, "", 0, 0},
+    {"W", 9, "", 0, 0},
+    {"H", 18, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_gimbal_q_names[] = {
     "angle1", "angle2", "angle3",
 };
@@ -1801,13 +2611,37 @@ static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_kept",
+        .function = (void (*)(void))mstmm_hinge_gimbal_forward_kept,
+        .call = mstmm_hinge_gimbal_forward_kept_call,
+        .n_inputs = 7,
+        .n_outputs = 10,
+        .inputs = mstmm_hinge_gimbal_forward_kept_inputs,
+        .outputs = mstmm_hinge_gimbal_forward_kept_outputs,
+        .ir_hash = "3a191a2279896595b2f747d52358a19bb79c16904faae5b5f8f27846337cdbdc",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "directions",
+        .function = (void (*)(void))mstmm_hinge_gimbal_directions,
+        .call = mstmm_hinge_gimbal_directions_call,
+        .n_inputs = 12,
+        .n_outputs = 4,
+        .inputs = mstmm_hinge_gimbal_directions_inputs,
+        .outputs = mstmm_hinge_gimbal_directions_outputs,
+        .ir_hash = "23619e529b74a03c80072c4ce6501fbd2c6afc3575de8d75ae1ec2b6dbc539b1",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_gimbal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "gimbal",
-    .hash = "b87325fbfdd7fed96d6cd75b62874bf42e2a6cd46f130379126ae85912fb127f",
+    .hash = "d750cda9dbf25d65be4d506f3a45a96ccef2d45d5912c4788d9e8038db1d3878",
     .nq = 3,
     .nu = 3,
     .np = 0,
@@ -1817,6 +2651,6 @@ const mstmm_element mstmm_hinge_gimbal = {
     .u_units = mstmm_hinge_gimbal_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 8,
+    .n_kernels = 10,
     .kernels = mstmm_hinge_gimbal_kernels,
 };

@@ -32,6 +32,16 @@ int mstmm_hinge_pin_rates_by_coordinates(const real *restrict p, const real *res
     const real *restrict u, real *restrict J);
 int mstmm_hinge_pin_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
+int mstmm_hinge_pin_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion);
+int mstmm_hinge_pin_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
 
 /* relative motion of the pin hinge
  * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
@@ -1013,6 +1023,335 @@ static const mstmm_port mstmm_hinge_pin_rates_by_speeds_outputs[] = {
     {"J", 1, "", 0, 0},
 };
 
+/* motion across the hinge and of the body behind it
+ * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
+ * in  p[0] parameters
+ * in  q[1] coordinates: angle [rad]
+ * in  u[1] speeds: angle_rate [rad/s]
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  s[1]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * out R[3][3] rotation, P axes to Q axes
+ * out d[3] (m) position of P from Q, Q axes
+ * out H[6] motion subspace, rows v then w, P axes
+ * out v[3] (m/s) relative velocity of P, P axes
+ * out w[3] (rad/s) relative angular velocity, P axes
+ * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
+ * out qdot[1] coordinate rates
+ * out Rc[3][3] rotation, body axes to parent axes
+ * out r[3] (m) P of the body from P of the parent, parent axes
+ * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ */
+int mstmm_hinge_pin_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion)
+{
+    (void)p;
+    const real t0 = cos(q[0]);
+    R[0] = t0;
+    const real t1 = sin(q[0]);
+    const real t2 = -t1;
+    R[1] = t2;
+    R[2] = 0.0;
+    R[3] = t1;
+    R[4] = t0;
+    R[5] = 0.0;
+    R[6] = 0.0;
+    R[7] = 0.0;
+    R[8] = 1.0;
+    d[0] = 0.0;
+    d[1] = 0.0;
+    d[2] = 0.0;
+    H[0] = 0.0;
+    H[1] = 0.0;
+    H[2] = 0.0;
+    H[3] = 0.0;
+    H[4] = 0.0;
+    H[5] = 1.0;
+    v[0] = 0.0;
+    v[1] = 0.0;
+    v[2] = 0.0;
+    w[0] = 0.0;
+    w[1] = 0.0;
+    w[2] = u[0];
+    c[0] = 0.0;
+    c[1] = 0.0;
+    c[2] = 0.0;
+    c[3] = 0.0;
+    c[4] = 0.0;
+    c[5] = 0.0;
+    qdot[0] = u[0];
+    const real t3 = t0 * Rt[0];
+    const real t4 = t1 * Rt[1];
+    const real t5 = t3 + t4;
+    Rc[0] = t5;
+    const real t6 = t0 * Rt[1];
+    const real t7 = t1 * Rt[0];
+    const real t8 = t6 - t7;
+    Rc[1] = t8;
+    Rc[2] = Rt[2];
+    const real t9 = t0 * Rt[3];
+    const real t10 = t1 * Rt[4];
+    const real t11 = t9 + t10;
+    Rc[3] = t11;
+    const real t12 = t0 * Rt[4];
+    const real t13 = t1 * Rt[3];
+    const real t14 = t12 - t13;
+    Rc[4] = t14;
+    Rc[5] = Rt[5];
+    const real t15 = t0 * Rt[6];
+    const real t16 = t1 * Rt[7];
+    const real t17 = t15 + t16;
+    Rc[6] = t17;
+    const real t18 = t0 * Rt[7];
+    const real t19 = t1 * Rt[6];
+    const real t20 = t18 - t19;
+    Rc[7] = t20;
+    Rc[8] = Rt[8];
+    r[0] = ro[0];
+    r[1] = ro[1];
+    r[2] = ro[2];
+    const real t21 = motion_I[0] * t5;
+    const real t22 = motion_I[1] * t11;
+    const real t23 = t21 + t22;
+    const real t24 = motion_I[2] * t17;
+    const real t25 = t23 + t24;
+    motion[0] = t25;
+    const real t26 = motion_I[0] * t8;
+    const real t27 = motion_I[1] * t14;
+    const real t28 = t26 + t27;
+    const real t29 = motion_I[2] * t20;
+    const real t30 = t28 + t29;
+    motion[1] = t30;
+    const real t31 = Rt[2] * motion_I[0];
+    const real t32 = Rt[5] * motion_I[1];
+    const real t33 = t31 + t32;
+    const real t34 = Rt[8] * motion_I[2];
+    const real t35 = t33 + t34;
+    const real t36 = u[0] + t35;
+    motion[2] = t36;
+    const real t37 = motion_I[3] * t5;
+    const real t38 = motion_I[4] * t11;
+    const real t39 = t37 + t38;
+    const real t40 = motion_I[5] * t17;
+    const real t41 = t39 + t40;
+    const real t42 = u[0] * t30;
+    const real t43 = t41 + t42;
+    motion[3] = t43;
+    const real t44 = motion_I[3] * t8;
+    const real t45 = motion_I[4] * t14;
+    const real t46 = t44 + t45;
+    const real t47 = motion_I[5] * t20;
+    const real t48 = t46 + t47;
+    const real t49 = u[0] * t25;
+    const real t50 = t48 - t49;
+    motion[4] = t50;
+    const real t51 = Rt[2] * motion_I[3];
+    const real t52 = Rt[5] * motion_I[4];
+    const real t53 = t51 + t52;
+    const real t54 = Rt[8] * motion_I[5];
+    const real t55 = t53 + t54;
+    const real t56 = s[0] + t55;
+    motion[5] = t56;
+    const real t57 = motion_I[0] * motion_I[1];
+    const real t58 = t57 - motion_I[5];
+    const real t59 = ro[1] * t58;
+    const real t60 = motion_I[1] * motion_I[1];
+    const real t61 = motion_I[2] * motion_I[2];
+    const real t62 = t60 + t61;
+    const real t63 = ro[0] * t62;
+    const real t64 = t59 - t63;
+    const real t65 = motion_I[0] * motion_I[2];
+    const real t66 = motion_I[4] + t65;
+    const real t67 = ro[2] * t66;
+    const real t68 = t64 + t67;
+    const real t69 = motion_I[6] + t68;
+    const real t70 = t5 * t69;
+    const real t71 = motion_I[5] + t57;
+    const real t72 = ro[0] * t71;
+    const real t73 = motion_I[0] * motion_I[0];
+    const real t74 = t61 + t73;
+    const real t75 = ro[1] * t74;
+    const real t76 = t72 - t75;
+    const real t77 = motion_I[1] * motion_I[2];
+    const real t78 = t77 - motion_I[3];
+    const real t79 = ro[2] * t78;
+    const real t80 = t76 + t79;
+    const real t81 = motion_I[7] + t80;
+    const real t82 = t11 * t81;
+    const real t83 = t70 + t82;
+    const real t84 = t65 - motion_I[4];
+    const real t85 = ro[0] * t84;
+    const real t86 = motion_I[3] + t77;
+    const real t87 = ro[1] * t86;
+    const real t88 = t85 + t87;
+    const real t89 = t60 + t73;
+    const real t90 = ro[2] * t89;
+    const real t91 = t88 - t90;
+    const real t92 = motion_I[8] + t91;
+    const real t93 = t17 * t92;
+    const real t94 = t83 + t93;
+    motion[6] = t94;
+    const real t95 = t8 * t69;
+    const real t96 = t14 * t81;
+    const real t97 = t95 + t96;
+    const real t98 = t20 * t92;
+    const real t99 = t97 + t98;
+    motion[7] = t99;
+    const real t100 = Rt[2] * t69;
+    const real t101 = Rt[5] * t81;
+    const real t102 = t100 + t101;
+    const real t103 = Rt[8] * t92;
+    const real t104 = t102 + t103;
+    motion[8] = t104;
+    return 0;
+}
+
+static int mstmm_hinge_pin_forward_kept_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_pin_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+}
+
+static const mstmm_port mstmm_hinge_pin_forward_kept_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"s", 1, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_pin_forward_kept_outputs[] = {
+    {"R", 9, "", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"c", 6, "m/s2, rad/s2", 0, 0},
+    {"qdot", 1, "", 0, 0},
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+/* directions of the unknowns of the hinge
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  p[0] parameters
+ * in  q[1] coordinates: angle [rad]
+ * in  u[1] speeds: angle_rate [rad/s]
+ * in  s[1] accelerations of the speeds
+ * in  motion[9] w, wd, and a of the body, own axes
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[1][1] change of the laws' efforts, a row a direction
+ * in  along[1][1] change of the coordinates, a row a direction
+ * in  rate[1] change of the speed itself
+ * in  scale[1] (1/s) and of its acceleration
+ * in  sq[1] (1/s) inverse time by which coordinates follow speeds
+ * out B[1][9] motion along the unknowns, a row a direction
+ * out G[1][6] change of the load that is carried
+ * out W[1][1] slopes of the rows by load, rotors and laws
+ * out H[6] motion subspace, rows v then w, P axes
+ */
+int mstmm_hinge_pin_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+{
+    (void)p;
+    (void)q;
+    (void)s;
+    (void)along;
+    const real t0 = 1.0 / sq[0];
+    const real t1 = motion[1] * t0;
+    B[0] = t1;
+    const real t2 = motion[0] * t0;
+    const real t3 = -t2;
+    B[1] = t3;
+    B[2] = rate[0];
+    const real t4 = u[0] * motion[0];
+    const real t5 = motion[4] + t4;
+    const real t6 = t0 * t5;
+    const real t7 = motion[1] * rate[0];
+    const real t8 = t6 + t7;
+    const real t9 = u[0] * t2;
+    const real t10 = t8 - t9;
+    B[3] = t10;
+    const real t11 = u[0] * t1;
+    const real t12 = motion[0] * rate[0];
+    const real t13 = u[0] * motion[1];
+    const real t14 = motion[3] - t13;
+    const real t15 = t0 * t14;
+    const real t16 = t12 + t15;
+    const real t17 = t11 + t16;
+    const real t18 = -t17;
+    B[4] = t18;
+    B[5] = scale[0];
+    const real t19 = motion[7] * t0;
+    B[6] = t19;
+    const real t20 = motion[6] * t0;
+    const real t21 = -t20;
+    B[7] = t21;
+    B[8] = 0.0;
+    const real t22 = f[1] * t0;
+    const real t23 = -t22;
+    G[0] = t23;
+    const real t24 = f[0] * t0;
+    G[1] = t24;
+    G[2] = 0.0;
+    const real t25 = f[4] * t0;
+    const real t26 = -t25;
+    G[3] = t26;
+    const real t27 = f[3] * t0;
+    G[4] = t27;
+    G[5] = 0.0;
+    const real t28 = J[0] * scale[0];
+    const real t29 = t28 - laws[0];
+    W[0] = t29;
+    H[0] = 0.0;
+    H[1] = 0.0;
+    H[2] = 0.0;
+    H[3] = 0.0;
+    H[4] = 0.0;
+    H[5] = 1.0;
+    return 0;
+}
+
+static int mstmm_hinge_pin_directions_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_pin_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_hinge_pin_directions_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+    {"s", 1, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"J", 1, "kg*m2 or kg", 0, 0},
+    {"laws", 1, "", 0, 0},
+    {"along", 1, "", 0, 0},
+    {"rate", 1, "", 0, 0},
+    {"scale", 1, "1/s", 0, 0},
+    {"sq", 1, "1/s", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_pin_directions_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"W", 1, "", 0, 0},
+    {"H", 6, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_pin_q_names[] = {
     "angle",
 };
@@ -1114,13 +1453,37 @@ static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_kept",
+        .function = (void (*)(void))mstmm_hinge_pin_forward_kept,
+        .call = mstmm_hinge_pin_forward_kept_call,
+        .n_inputs = 7,
+        .n_outputs = 10,
+        .inputs = mstmm_hinge_pin_forward_kept_inputs,
+        .outputs = mstmm_hinge_pin_forward_kept_outputs,
+        .ir_hash = "3796999246932f04733a6ee8e98b1d53827d905a0a8c3923cf2324e48f21daa2",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "directions",
+        .function = (void (*)(void))mstmm_hinge_pin_directions,
+        .call = mstmm_hinge_pin_directions_call,
+        .n_inputs = 12,
+        .n_outputs = 4,
+        .inputs = mstmm_hinge_pin_directions_inputs,
+        .outputs = mstmm_hinge_pin_directions_outputs,
+        .ir_hash = "c5c3d992a414e2dfa0a88c202864631522e9a46f4358340d4666cacb08cd424a",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_pin = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "pin",
-    .hash = "d7ecfc3129c8e7d5368045142cbf1c238aaa9c2c8985e66c82d9a053b71a2c21",
+    .hash = "6ca18e194840cbf963bcbb33dc23cbe1158dadbe443177a63724091b523f19ef",
     .nq = 1,
     .nu = 1,
     .np = 0,
@@ -1130,6 +1493,6 @@ const mstmm_element mstmm_hinge_pin = {
     .u_units = mstmm_hinge_pin_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 7,
+    .n_kernels = 9,
     .kernels = mstmm_hinge_pin_kernels,
 };

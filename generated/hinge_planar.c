@@ -31,6 +31,16 @@ int mstmm_hinge_planar_rates_by_coordinates(const real *restrict p, const real *
     const real *restrict u, real *restrict J);
 int mstmm_hinge_planar_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
+int mstmm_hinge_planar_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion);
+int mstmm_hinge_planar_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
 
 /* relative motion of the planar hinge
  * in  p[0] parameters
@@ -1422,6 +1432,579 @@ static const mstmm_port mstmm_hinge_planar_rates_by_speeds_outputs[] = {
     {"J", 9, "", 0, 0},
 };
 
+/* motion across the hinge and of the body behind it
+ * in  p[0] parameters
+ * in  q[3] coordinates: x [m], y [m], angle [rad]
+ * in  u[3] speeds: x_rate [m/s], y_rate [m/s], angle_rate [rad/s]
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  s[3]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * out R[3][3] rotation, P axes to Q axes
+ * out d[3] (m) position of P from Q, Q axes
+ * out H[6][3] motion subspace, rows v then w, P axes
+ * out v[3] (m/s) relative velocity of P, P axes
+ * out w[3] (rad/s) relative angular velocity, P axes
+ * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
+ * out qdot[3] coordinate rates
+ * out Rc[3][3] rotation, body axes to parent axes
+ * out r[3] (m) P of the body from P of the parent, parent axes
+ * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ */
+int mstmm_hinge_planar_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion)
+{
+    (void)p;
+    const real t0 = cos(q[2]);
+    R[0] = t0;
+    const real t1 = sin(q[2]);
+    const real t2 = -t1;
+    R[1] = t2;
+    R[2] = 0.0;
+    R[3] = t1;
+    R[4] = t0;
+    R[5] = 0.0;
+    R[6] = 0.0;
+    R[7] = 0.0;
+    R[8] = 1.0;
+    d[0] = q[0];
+    d[1] = q[1];
+    d[2] = 0.0;
+    H[0] = t0;
+    H[1] = t1;
+    H[2] = 0.0;
+    H[3] = t2;
+    H[4] = t0;
+    H[5] = 0.0;
+    H[6] = 0.0;
+    H[7] = 0.0;
+    H[8] = 0.0;
+    H[9] = 0.0;
+    H[10] = 0.0;
+    H[11] = 0.0;
+    H[12] = 0.0;
+    H[13] = 0.0;
+    H[14] = 0.0;
+    H[15] = 0.0;
+    H[16] = 0.0;
+    H[17] = 1.0;
+    const real t3 = u[1] * t1;
+    const real t4 = u[0] * t0;
+    const real t5 = t3 + t4;
+    v[0] = t5;
+    const real t6 = u[1] * t0;
+    const real t7 = u[0] * t1;
+    const real t8 = t6 - t7;
+    v[1] = t8;
+    v[2] = 0.0;
+    w[0] = 0.0;
+    w[1] = 0.0;
+    w[2] = u[2];
+    c[0] = 0.0;
+    c[1] = 0.0;
+    c[2] = 0.0;
+    c[3] = 0.0;
+    c[4] = 0.0;
+    c[5] = 0.0;
+    qdot[0] = u[0];
+    qdot[1] = u[1];
+    qdot[2] = u[2];
+    const real t9 = t0 * Rt[0];
+    const real t10 = t1 * Rt[1];
+    const real t11 = t9 + t10;
+    Rc[0] = t11;
+    const real t12 = t0 * Rt[1];
+    const real t13 = t1 * Rt[0];
+    const real t14 = t12 - t13;
+    Rc[1] = t14;
+    Rc[2] = Rt[2];
+    const real t15 = t0 * Rt[3];
+    const real t16 = t1 * Rt[4];
+    const real t17 = t15 + t16;
+    Rc[3] = t17;
+    const real t18 = t0 * Rt[4];
+    const real t19 = t1 * Rt[3];
+    const real t20 = t18 - t19;
+    Rc[4] = t20;
+    Rc[5] = Rt[5];
+    const real t21 = t0 * Rt[6];
+    const real t22 = t1 * Rt[7];
+    const real t23 = t21 + t22;
+    Rc[6] = t23;
+    const real t24 = t0 * Rt[7];
+    const real t25 = t1 * Rt[6];
+    const real t26 = t24 - t25;
+    Rc[7] = t26;
+    Rc[8] = Rt[8];
+    const real t27 = q[0] * Rt[0];
+    const real t28 = q[1] * Rt[1];
+    const real t29 = t27 + t28;
+    const real t30 = ro[0] + t29;
+    r[0] = t30;
+    const real t31 = q[0] * Rt[3];
+    const real t32 = q[1] * Rt[4];
+    const real t33 = t31 + t32;
+    const real t34 = ro[1] + t33;
+    r[1] = t34;
+    const real t35 = q[0] * Rt[6];
+    const real t36 = q[1] * Rt[7];
+    const real t37 = t35 + t36;
+    const real t38 = ro[2] + t37;
+    r[2] = t38;
+    const real t39 = motion_I[0] * t11;
+    const real t40 = motion_I[1] * t17;
+    const real t41 = t39 + t40;
+    const real t42 = motion_I[2] * t23;
+    const real t43 = t41 + t42;
+    motion[0] = t43;
+    const real t44 = motion_I[0] * t14;
+    const real t45 = motion_I[1] * t20;
+    const real t46 = t44 + t45;
+    const real t47 = motion_I[2] * t26;
+    const real t48 = t46 + t47;
+    motion[1] = t48;
+    const real t49 = Rt[2] * motion_I[0];
+    const real t50 = Rt[5] * motion_I[1];
+    const real t51 = t49 + t50;
+    const real t52 = Rt[8] * motion_I[2];
+    const real t53 = t51 + t52;
+    const real t54 = u[2] + t53;
+    motion[2] = t54;
+    const real t55 = motion_I[3] * t11;
+    const real t56 = motion_I[4] * t17;
+    const real t57 = t55 + t56;
+    const real t58 = motion_I[5] * t23;
+    const real t59 = t57 + t58;
+    const real t60 = u[2] * t48;
+    const real t61 = t59 + t60;
+    motion[3] = t61;
+    const real t62 = motion_I[3] * t14;
+    const real t63 = motion_I[4] * t20;
+    const real t64 = t62 + t63;
+    const real t65 = motion_I[5] * t26;
+    const real t66 = t64 + t65;
+    const real t67 = u[2] * t43;
+    const real t68 = t66 - t67;
+    motion[4] = t68;
+    const real t69 = Rt[2] * motion_I[3];
+    const real t70 = Rt[5] * motion_I[4];
+    const real t71 = t69 + t70;
+    const real t72 = Rt[8] * motion_I[5];
+    const real t73 = t71 + t72;
+    const real t74 = s[2] + t73;
+    motion[5] = t74;
+    const real t75 = motion_I[0] * motion_I[1];
+    const real t76 = t75 - motion_I[5];
+    const real t77 = t34 * t76;
+    const real t78 = motion_I[1] * motion_I[1];
+    const real t79 = motion_I[2] * motion_I[2];
+    const real t80 = t78 + t79;
+    const real t81 = t30 * t80;
+    const real t82 = t77 - t81;
+    const real t83 = motion_I[0] * motion_I[2];
+    const real t84 = motion_I[4] + t83;
+    const real t85 = t38 * t84;
+    const real t86 = t82 + t85;
+    const real t87 = motion_I[6] + t86;
+    const real t88 = t11 * t87;
+    const real t89 = motion_I[5] + t75;
+    const real t90 = t30 * t89;
+    const real t91 = motion_I[0] * motion_I[0];
+    const real t92 = t79 + t91;
+    const real t93 = t34 * t92;
+    const real t94 = t90 - t93;
+    const real t95 = motion_I[1] * motion_I[2];
+    const real t96 = t95 - motion_I[3];
+    const real t97 = t38 * t96;
+    const real t98 = t94 + t97;
+    const real t99 = motion_I[7] + t98;
+    const real t100 = t17 * t99;
+    const real t101 = t88 + t100;
+    const real t102 = t83 - motion_I[4];
+    const real t103 = t30 * t102;
+    const real t104 = motion_I[3] + t95;
+    const real t105 = t34 * t104;
+    const real t106 = t103 + t105;
+    const real t107 = t78 + t91;
+    const real t108 = t38 * t107;
+    const real t109 = t106 - t108;
+    const real t110 = motion_I[8] + t109;
+    const real t111 = t23 * t110;
+    const real t112 = t101 + t111;
+    const real t113 = t0 * s[0];
+    const real t114 = t1 * s[1];
+    const real t115 = t113 + t114;
+    const real t116 = t8 * t53;
+    const real t117 = 2.0 * t116;
+    const real t118 = t115 - t117;
+    const real t119 = t112 + t118;
+    motion[6] = t119;
+    const real t120 = t14 * t87;
+    const real t121 = t20 * t99;
+    const real t122 = t120 + t121;
+    const real t123 = t26 * t110;
+    const real t124 = t122 + t123;
+    const real t125 = t0 * s[1];
+    const real t126 = t1 * s[0];
+    const real t127 = t125 - t126;
+    const real t128 = t5 * t53;
+    const real t129 = 2.0 * t128;
+    const real t130 = t127 + t129;
+    const real t131 = t124 + t130;
+    motion[7] = t131;
+    const real t132 = Rt[2] * t87;
+    const real t133 = Rt[5] * t99;
+    const real t134 = t132 + t133;
+    const real t135 = Rt[8] * t110;
+    const real t136 = t134 + t135;
+    const real t137 = t8 * t43;
+    const real t138 = 2.0 * t137;
+    const real t139 = t5 * t48;
+    const real t140 = 2.0 * t139;
+    const real t141 = t138 - t140;
+    const real t142 = t136 + t141;
+    motion[8] = t142;
+    return 0;
+}
+
+static int mstmm_hinge_planar_forward_kept_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_planar_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+}
+
+static const mstmm_port mstmm_hinge_planar_forward_kept_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 3, "", 0, 0},
+    {"u", 3, "", 0, 0},
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"s", 3, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_planar_forward_kept_outputs[] = {
+    {"R", 9, "", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"c", 6, "m/s2, rad/s2", 0, 0},
+    {"qdot", 3, "", 0, 0},
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+/* directions of the unknowns of the hinge
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  p[0] parameters
+ * in  q[3] coordinates: x [m], y [m], angle [rad]
+ * in  u[3] speeds: x_rate [m/s], y_rate [m/s], angle_rate [rad/s]
+ * in  s[3] accelerations of the speeds
+ * in  motion[9] w, wd, and a of the body, own axes
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  J[3] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[3][3] change of the laws' efforts, a row a direction
+ * in  along[3][3] change of the coordinates, a row a direction
+ * in  rate[1] change of the speed itself
+ * in  scale[1] (1/s) and of its acceleration
+ * in  sq[1] (1/s) inverse time by which coordinates follow speeds
+ * out B[3][9] motion along the unknowns, a row a direction
+ * out G[3][6] change of the load that is carried
+ * out W[3][3] slopes of the rows by load, rotors and laws
+ * out H[6][3] motion subspace, rows v then w, P axes
+ */
+int mstmm_hinge_planar_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+{
+    (void)p;
+    (void)along;
+    B[0] = 0.0;
+    B[1] = 0.0;
+    B[2] = 0.0;
+    B[3] = 0.0;
+    B[4] = 0.0;
+    B[5] = 0.0;
+    const real t0 = cos(q[2]);
+    const real t1 = t0 * scale[0];
+    const real t2 = sin(q[2]);
+    const real t3 = t2 * rate[0];
+    const real t4 = motion[2] - u[2];
+    const real t5 = t3 * t4;
+    const real t6 = 2.0 * t5;
+    const real t7 = 1.0 / sq[0];
+    const real t8 = t2 * t7;
+    const real t9 = motion[0] * t8;
+    const real t10 = t0 * t7;
+    const real t11 = motion[1] * t10;
+    const real t12 = t9 + t11;
+    const real t13 = motion[1] * t12;
+    const real t14 = t10 * t4;
+    const real t15 = t4 * t14;
+    const real t16 = t13 + t15;
+    const real t17 = t6 - t16;
+    const real t18 = motion[5] - s[2];
+    const real t19 = t8 * t18;
+    const real t20 = t17 + t19;
+    const real t21 = t1 + t20;
+    B[6] = t21;
+    const real t22 = t10 * t18;
+    const real t23 = t0 * rate[0];
+    const real t24 = t23 * t4;
+    const real t25 = 2.0 * t24;
+    const real t26 = t8 * t4;
+    const real t27 = t4 * t26;
+    const real t28 = motion[0] * t12;
+    const real t29 = t27 + t28;
+    const real t30 = t25 + t29;
+    const real t31 = t22 + t30;
+    const real t32 = t2 * scale[0];
+    const real t33 = t31 - t32;
+    B[7] = t33;
+    const real t34 = motion[0] * t14;
+    const real t35 = motion[1] * t26;
+    const real t36 = t34 - t35;
+    const real t37 = motion[0] * t3;
+    const real t38 = 2.0 * t37;
+    const real t39 = t36 - t38;
+    const real t40 = motion[1] * t23;
+    const real t41 = 2.0 * t40;
+    const real t42 = t39 - t41;
+    const real t43 = u[2] * motion[1];
+    const real t44 = motion[3] - t43;
+    const real t45 = t8 * t44;
+    const real t46 = t42 - t45;
+    const real t47 = u[2] * motion[0];
+    const real t48 = motion[4] + t47;
+    const real t49 = t10 * t48;
+    const real t50 = t46 - t49;
+    B[8] = t50;
+    B[9] = 0.0;
+    B[10] = 0.0;
+    B[11] = 0.0;
+    B[12] = 0.0;
+    B[13] = 0.0;
+    B[14] = 0.0;
+    const real t51 = motion[0] * t10;
+    const real t52 = motion[1] * t8;
+    const real t53 = t51 - t52;
+    const real t54 = motion[1] * t53;
+    const real t55 = t54 - t27;
+    const real t56 = t55 - t25;
+    const real t57 = t56 - t22;
+    const real t58 = t32 + t57;
+    B[15] = t58;
+    const real t59 = motion[0] * t53;
+    const real t60 = t15 + t59;
+    const real t61 = t6 - t60;
+    const real t62 = t19 + t61;
+    const real t63 = t1 + t62;
+    B[16] = t63;
+    const real t64 = t10 * t44;
+    const real t65 = motion[0] * t23;
+    const real t66 = 2.0 * t65;
+    const real t67 = motion[0] * t26;
+    const real t68 = motion[1] * t14;
+    const real t69 = t67 + t68;
+    const real t70 = t66 + t69;
+    const real t71 = motion[1] * t3;
+    const real t72 = 2.0 * t71;
+    const real t73 = t70 - t72;
+    const real t74 = t64 + t73;
+    const real t75 = t8 * t48;
+    const real t76 = t74 - t75;
+    B[17] = t76;
+    const real t77 = motion[1] * t7;
+    B[18] = t77;
+    const real t78 = motion[0] * t7;
+    const real t79 = -t78;
+    B[19] = t79;
+    B[20] = rate[0];
+    const real t80 = t7 * t48;
+    const real t81 = motion[1] * rate[0];
+    const real t82 = t80 + t81;
+    const real t83 = u[2] * t78;
+    const real t84 = t82 - t83;
+    B[21] = t84;
+    const real t85 = u[2] * t77;
+    const real t86 = motion[0] * rate[0];
+    const real t87 = t7 * t44;
+    const real t88 = t86 + t87;
+    const real t89 = t85 + t88;
+    const real t90 = -t89;
+    B[22] = t90;
+    B[23] = scale[0];
+    const real t91 = s[1] * t10;
+    const real t92 = s[0] * t8;
+    const real t93 = t91 - t92;
+    const real t94 = u[1] * t2;
+    const real t95 = u[0] * t0;
+    const real t96 = t94 + t95;
+    const real t97 = t96 * t4;
+    const real t98 = 2.0 * t97;
+    const real t99 = t0 * s[1];
+    const real t100 = t2 * s[0];
+    const real t101 = t99 - t100;
+    const real t102 = t98 + t101;
+    const real t103 = motion[7] - t102;
+    const real t104 = t7 * t103;
+    const real t105 = u[0] * t10;
+    const real t106 = u[1] * t8;
+    const real t107 = t105 + t106;
+    const real t108 = t4 * t107;
+    const real t109 = 2.0 * t108;
+    const real t110 = t104 + t109;
+    const real t111 = t93 + t110;
+    B[24] = t111;
+    const real t112 = u[1] * t10;
+    const real t113 = u[0] * t8;
+    const real t114 = t112 - t113;
+    const real t115 = t4 * t114;
+    const real t116 = 2.0 * t115;
+    const real t117 = u[1] * t0;
+    const real t118 = u[0] * t2;
+    const real t119 = t117 - t118;
+    const real t120 = t119 * t4;
+    const real t121 = t120 * 2.0;
+    const real t122 = t0 * s[0];
+    const real t123 = t2 * s[1];
+    const real t124 = t122 + t123;
+    const real t125 = t121 - t124;
+    const real t126 = motion[6] + t125;
+    const real t127 = t7 * t126;
+    const real t128 = t116 - t127;
+    const real t129 = s[0] * t10;
+    const real t130 = s[1] * t8;
+    const real t131 = t129 + t130;
+    const real t132 = t128 - t131;
+    B[25] = t132;
+    const real t133 = t119 * 2.0;
+    const real t134 = t133 * t77;
+    const real t135 = t96 * 2.0;
+    const real t136 = t135 * t78;
+    const real t137 = t134 + t136;
+    const real t138 = motion[0] * t107;
+    const real t139 = 2.0 * t138;
+    const real t140 = motion[1] * t114;
+    const real t141 = 2.0 * t140;
+    const real t142 = t139 + t141;
+    const real t143 = t137 - t142;
+    B[26] = t143;
+    G[0] = 0.0;
+    G[1] = 0.0;
+    G[2] = 0.0;
+    const real t144 = f[2] * t8;
+    const real t145 = -t144;
+    G[3] = t145;
+    const real t146 = f[2] * t10;
+    const real t147 = -t146;
+    G[4] = t147;
+    const real t148 = f[1] * t10;
+    const real t149 = f[0] * t8;
+    const real t150 = t148 + t149;
+    G[5] = t150;
+    G[6] = 0.0;
+    G[7] = 0.0;
+    G[8] = 0.0;
+    G[9] = t146;
+    G[10] = t145;
+    const real t151 = f[1] * t8;
+    const real t152 = f[0] * t10;
+    const real t153 = t151 - t152;
+    G[11] = t153;
+    const real t154 = f[1] * t7;
+    const real t155 = -t154;
+    G[12] = t155;
+    const real t156 = f[0] * t7;
+    G[13] = t156;
+    G[14] = 0.0;
+    const real t157 = f[4] * t7;
+    const real t158 = -t157;
+    G[15] = t158;
+    const real t159 = f[3] * t7;
+    G[16] = t159;
+    G[17] = 0.0;
+    const real t160 = J[0] * scale[0];
+    const real t161 = t160 - laws[0];
+    W[0] = t161;
+    const real t162 = -laws[1];
+    W[1] = t162;
+    const real t163 = -laws[2];
+    W[2] = t163;
+    const real t164 = -laws[3];
+    W[3] = t164;
+    const real t165 = J[1] * scale[0];
+    const real t166 = t165 - laws[4];
+    W[4] = t166;
+    const real t167 = -laws[5];
+    W[5] = t167;
+    const real t168 = laws[6] + t150;
+    const real t169 = -t168;
+    W[6] = t169;
+    const real t170 = laws[7] + t153;
+    const real t171 = -t170;
+    W[7] = t171;
+    const real t172 = J[2] * scale[0];
+    const real t173 = t172 - laws[8];
+    W[8] = t173;
+    H[0] = t0;
+    H[1] = t2;
+    H[2] = 0.0;
+    const real t174 = -t2;
+    H[3] = t174;
+    H[4] = t0;
+    H[5] = 0.0;
+    H[6] = 0.0;
+    H[7] = 0.0;
+    H[8] = 0.0;
+    H[9] = 0.0;
+    H[10] = 0.0;
+    H[11] = 0.0;
+    H[12] = 0.0;
+    H[13] = 0.0;
+    H[14] = 0.0;
+    H[15] = 0.0;
+    H[16] = 0.0;
+    H[17] = 1.0;
+    return 0;
+}
+
+static int mstmm_hinge_planar_directions_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_planar_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_hinge_planar_directions_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 3, "", 0, 0},
+    {"u", 3, "", 0, 0},
+    {"s", 3, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"J", 3, "kg*m2 or kg", 0, 0},
+    {"laws", 9, "", 0, 0},
+    {"along", 9, "", 0, 0},
+    {"rate", 1, "", 0, 0},
+    {"scale", 1, "1/s", 0, 0},
+    {"sq", 1, "1/s", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_planar_directions_outputs[] = {
+    {"B", 27, "", 0, 0},
+    {"G", 18, "", 0, 0},
+    {"W", 9, "", 0, 0},
+    {"H", 18, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_planar_q_names[] = {
     "x", "y", "angle",
 };
@@ -1523,13 +2106,37 @@ static const mstmm_kernel mstmm_hinge_planar_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_kept",
+        .function = (void (*)(void))mstmm_hinge_planar_forward_kept,
+        .call = mstmm_hinge_planar_forward_kept_call,
+        .n_inputs = 7,
+        .n_outputs = 10,
+        .inputs = mstmm_hinge_planar_forward_kept_inputs,
+        .outputs = mstmm_hinge_planar_forward_kept_outputs,
+        .ir_hash = "44876a871c7c0b84082330e3a002b5d2a64d1dd1d737a0fb749ca6522e8d766e",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "directions",
+        .function = (void (*)(void))mstmm_hinge_planar_directions,
+        .call = mstmm_hinge_planar_directions_call,
+        .n_inputs = 12,
+        .n_outputs = 4,
+        .inputs = mstmm_hinge_planar_directions_inputs,
+        .outputs = mstmm_hinge_planar_directions_outputs,
+        .ir_hash = "c03aa6db32a2f329f62fbce732de169953c85e53a01f3b2a263cd2fb562ce39b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_planar = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "planar",
-    .hash = "b4d434a2d6ed591d617f312780364bf6dac5b00b150a9b7eabc26e9d9507bfb5",
+    .hash = "8b0fc168410893be3c4efd3f79a21023ccf450d18a4b682fbacc4b2933232c6e",
     .nq = 3,
     .nu = 3,
     .np = 0,
@@ -1539,6 +2146,6 @@ const mstmm_element mstmm_hinge_planar = {
     .u_units = mstmm_hinge_planar_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 7,
+    .n_kernels = 9,
     .kernels = mstmm_hinge_planar_kernels,
 };

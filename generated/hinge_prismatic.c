@@ -31,6 +31,16 @@ int mstmm_hinge_prismatic_rates_by_coordinates(const real *restrict p, const rea
     const real *restrict u, real *restrict J);
 int mstmm_hinge_prismatic_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
+int mstmm_hinge_prismatic_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion);
+int mstmm_hinge_prismatic_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
 
 /* relative motion of the prismatic hinge
  * in  p[0] parameters
@@ -1002,6 +1012,315 @@ static const mstmm_port mstmm_hinge_prismatic_rates_by_speeds_outputs[] = {
     {"J", 1, "", 0, 0},
 };
 
+/* motion across the hinge and of the body behind it
+ * in  p[0] parameters
+ * in  q[1] coordinates: displacement [m]
+ * in  u[1] speeds: displacement_rate [m/s]
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  s[1]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * out R[3][3] rotation, P axes to Q axes
+ * out d[3] (m) position of P from Q, Q axes
+ * out H[6] motion subspace, rows v then w, P axes
+ * out v[3] (m/s) relative velocity of P, P axes
+ * out w[3] (rad/s) relative angular velocity, P axes
+ * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
+ * out qdot[1] coordinate rates
+ * out Rc[3][3] rotation, body axes to parent axes
+ * out r[3] (m) P of the body from P of the parent, parent axes
+ * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ */
+int mstmm_hinge_prismatic_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion)
+{
+    (void)p;
+    R[0] = 1.0;
+    R[1] = 0.0;
+    R[2] = 0.0;
+    R[3] = 0.0;
+    R[4] = 1.0;
+    R[5] = 0.0;
+    R[6] = 0.0;
+    R[7] = 0.0;
+    R[8] = 1.0;
+    d[0] = 0.0;
+    d[1] = 0.0;
+    d[2] = q[0];
+    H[0] = 0.0;
+    H[1] = 0.0;
+    H[2] = 1.0;
+    H[3] = 0.0;
+    H[4] = 0.0;
+    H[5] = 0.0;
+    v[0] = 0.0;
+    v[1] = 0.0;
+    v[2] = u[0];
+    w[0] = 0.0;
+    w[1] = 0.0;
+    w[2] = 0.0;
+    c[0] = 0.0;
+    c[1] = 0.0;
+    c[2] = 0.0;
+    c[3] = 0.0;
+    c[4] = 0.0;
+    c[5] = 0.0;
+    qdot[0] = u[0];
+    Rc[0] = Rt[0];
+    Rc[1] = Rt[1];
+    Rc[2] = Rt[2];
+    Rc[3] = Rt[3];
+    Rc[4] = Rt[4];
+    Rc[5] = Rt[5];
+    Rc[6] = Rt[6];
+    Rc[7] = Rt[7];
+    Rc[8] = Rt[8];
+    const real t0 = q[0] * Rt[2];
+    const real t1 = ro[0] + t0;
+    r[0] = t1;
+    const real t2 = q[0] * Rt[5];
+    const real t3 = ro[1] + t2;
+    r[1] = t3;
+    const real t4 = q[0] * Rt[8];
+    const real t5 = ro[2] + t4;
+    r[2] = t5;
+    const real t6 = Rt[0] * motion_I[0];
+    const real t7 = Rt[3] * motion_I[1];
+    const real t8 = t6 + t7;
+    const real t9 = Rt[6] * motion_I[2];
+    const real t10 = t8 + t9;
+    motion[0] = t10;
+    const real t11 = Rt[1] * motion_I[0];
+    const real t12 = Rt[4] * motion_I[1];
+    const real t13 = t11 + t12;
+    const real t14 = Rt[7] * motion_I[2];
+    const real t15 = t13 + t14;
+    motion[1] = t15;
+    const real t16 = Rt[2] * motion_I[0];
+    const real t17 = Rt[5] * motion_I[1];
+    const real t18 = t16 + t17;
+    const real t19 = Rt[8] * motion_I[2];
+    const real t20 = t18 + t19;
+    motion[2] = t20;
+    const real t21 = Rt[0] * motion_I[3];
+    const real t22 = Rt[3] * motion_I[4];
+    const real t23 = t21 + t22;
+    const real t24 = Rt[6] * motion_I[5];
+    const real t25 = t23 + t24;
+    motion[3] = t25;
+    const real t26 = Rt[1] * motion_I[3];
+    const real t27 = Rt[4] * motion_I[4];
+    const real t28 = t26 + t27;
+    const real t29 = Rt[7] * motion_I[5];
+    const real t30 = t28 + t29;
+    motion[4] = t30;
+    const real t31 = Rt[2] * motion_I[3];
+    const real t32 = Rt[5] * motion_I[4];
+    const real t33 = t31 + t32;
+    const real t34 = Rt[8] * motion_I[5];
+    const real t35 = t33 + t34;
+    motion[5] = t35;
+    const real t36 = motion_I[0] * motion_I[1];
+    const real t37 = t36 - motion_I[5];
+    const real t38 = t3 * t37;
+    const real t39 = motion_I[1] * motion_I[1];
+    const real t40 = motion_I[2] * motion_I[2];
+    const real t41 = t39 + t40;
+    const real t42 = t1 * t41;
+    const real t43 = t38 - t42;
+    const real t44 = motion_I[0] * motion_I[2];
+    const real t45 = motion_I[4] + t44;
+    const real t46 = t5 * t45;
+    const real t47 = t43 + t46;
+    const real t48 = motion_I[6] + t47;
+    const real t49 = Rt[0] * t48;
+    const real t50 = motion_I[5] + t36;
+    const real t51 = t1 * t50;
+    const real t52 = motion_I[0] * motion_I[0];
+    const real t53 = t40 + t52;
+    const real t54 = t3 * t53;
+    const real t55 = t51 - t54;
+    const real t56 = motion_I[1] * motion_I[2];
+    const real t57 = t56 - motion_I[3];
+    const real t58 = t5 * t57;
+    const real t59 = t55 + t58;
+    const real t60 = motion_I[7] + t59;
+    const real t61 = Rt[3] * t60;
+    const real t62 = t49 + t61;
+    const real t63 = t44 - motion_I[4];
+    const real t64 = t1 * t63;
+    const real t65 = motion_I[3] + t56;
+    const real t66 = t3 * t65;
+    const real t67 = t64 + t66;
+    const real t68 = t39 + t52;
+    const real t69 = t5 * t68;
+    const real t70 = t67 - t69;
+    const real t71 = motion_I[8] + t70;
+    const real t72 = Rt[6] * t71;
+    const real t73 = t62 + t72;
+    const real t74 = u[0] * t15;
+    const real t75 = t74 * 2.0;
+    const real t76 = t73 + t75;
+    motion[6] = t76;
+    const real t77 = Rt[1] * t48;
+    const real t78 = Rt[4] * t60;
+    const real t79 = t77 + t78;
+    const real t80 = Rt[7] * t71;
+    const real t81 = t79 + t80;
+    const real t82 = u[0] * t10;
+    const real t83 = 2.0 * t82;
+    const real t84 = t81 - t83;
+    motion[7] = t84;
+    const real t85 = Rt[2] * t48;
+    const real t86 = Rt[5] * t60;
+    const real t87 = t85 + t86;
+    const real t88 = Rt[8] * t71;
+    const real t89 = t87 + t88;
+    const real t90 = s[0] + t89;
+    motion[8] = t90;
+    return 0;
+}
+
+static int mstmm_hinge_prismatic_forward_kept_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_prismatic_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+}
+
+static const mstmm_port mstmm_hinge_prismatic_forward_kept_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"s", 1, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_prismatic_forward_kept_outputs[] = {
+    {"R", 9, "", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"c", 6, "m/s2, rad/s2", 0, 0},
+    {"qdot", 1, "", 0, 0},
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+/* directions of the unknowns of the hinge
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  p[0] parameters
+ * in  q[1] coordinates: displacement [m]
+ * in  u[1] speeds: displacement_rate [m/s]
+ * in  s[1] accelerations of the speeds
+ * in  motion[9] w, wd, and a of the body, own axes
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[1][1] change of the laws' efforts, a row a direction
+ * in  along[1][1] change of the coordinates, a row a direction
+ * in  rate[1] change of the speed itself
+ * in  scale[1] (1/s) and of its acceleration
+ * in  sq[1] (1/s) inverse time by which coordinates follow speeds
+ * out B[1][9] motion along the unknowns, a row a direction
+ * out G[1][6] change of the load that is carried
+ * out W[1][1] slopes of the rows by load, rotors and laws
+ * out H[6] motion subspace, rows v then w, P axes
+ */
+int mstmm_hinge_prismatic_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+{
+    (void)p;
+    (void)q;
+    (void)u;
+    (void)s;
+    (void)along;
+    B[0] = 0.0;
+    B[1] = 0.0;
+    B[2] = 0.0;
+    B[3] = 0.0;
+    B[4] = 0.0;
+    B[5] = 0.0;
+    const real t0 = 1.0 / sq[0];
+    const real t1 = motion[4] * t0;
+    const real t2 = motion[1] * rate[0];
+    const real t3 = 2.0 * t2;
+    const real t4 = motion[0] * t0;
+    const real t5 = motion[2] * t4;
+    const real t6 = t3 + t5;
+    const real t7 = t1 + t6;
+    B[6] = t7;
+    const real t8 = motion[1] * t0;
+    const real t9 = motion[2] * t8;
+    const real t10 = motion[0] * rate[0];
+    const real t11 = 2.0 * t10;
+    const real t12 = t9 - t11;
+    const real t13 = motion[3] * t0;
+    const real t14 = t12 - t13;
+    B[7] = t14;
+    const real t15 = motion[0] * t4;
+    const real t16 = motion[1] * t8;
+    const real t17 = t15 + t16;
+    const real t18 = scale[0] - t17;
+    B[8] = t18;
+    G[0] = 0.0;
+    G[1] = 0.0;
+    G[2] = 0.0;
+    const real t19 = f[1] * t0;
+    const real t20 = -t19;
+    G[3] = t20;
+    const real t21 = f[0] * t0;
+    G[4] = t21;
+    G[5] = 0.0;
+    const real t22 = J[0] * scale[0];
+    const real t23 = t22 - laws[0];
+    W[0] = t23;
+    H[0] = 0.0;
+    H[1] = 0.0;
+    H[2] = 1.0;
+    H[3] = 0.0;
+    H[4] = 0.0;
+    H[5] = 0.0;
+    return 0;
+}
+
+static int mstmm_hinge_prismatic_directions_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_prismatic_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_hinge_prismatic_directions_inputs[] = {
+    {"p", 0, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+    {"s", 1, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"J", 1, "kg*m2 or kg", 0, 0},
+    {"laws", 1, "", 0, 0},
+    {"along", 1, "", 0, 0},
+    {"rate", 1, "", 0, 0},
+    {"scale", 1, "1/s", 0, 0},
+    {"sq", 1, "1/s", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_prismatic_directions_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"W", 1, "", 0, 0},
+    {"H", 6, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_prismatic_q_names[] = {
     "displacement",
 };
@@ -1103,13 +1422,37 @@ static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_kept",
+        .function = (void (*)(void))mstmm_hinge_prismatic_forward_kept,
+        .call = mstmm_hinge_prismatic_forward_kept_call,
+        .n_inputs = 7,
+        .n_outputs = 10,
+        .inputs = mstmm_hinge_prismatic_forward_kept_inputs,
+        .outputs = mstmm_hinge_prismatic_forward_kept_outputs,
+        .ir_hash = "ba1b9fe3072148c8dd61ab1d3effc797f39f3d5788c253217931b0d290ee376b",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "directions",
+        .function = (void (*)(void))mstmm_hinge_prismatic_directions,
+        .call = mstmm_hinge_prismatic_directions_call,
+        .n_inputs = 12,
+        .n_outputs = 4,
+        .inputs = mstmm_hinge_prismatic_directions_inputs,
+        .outputs = mstmm_hinge_prismatic_directions_outputs,
+        .ir_hash = "46ae8717dc851c9662a2ae98ba25cb436c8c215ef276f80b418ea1c691f1575c",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_prismatic = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "prismatic",
-    .hash = "561e444afa409f9f9b7dbcdda9458118c0b77cb3c1187a7105ded0798461f20b",
+    .hash = "8f66b54e377f3e28af4405a26bb57d5eed20cfcd19a93741a65927c03b98b84b",
     .nq = 1,
     .nu = 1,
     .np = 0,
@@ -1119,6 +1462,6 @@ const mstmm_element mstmm_hinge_prismatic = {
     .u_units = mstmm_hinge_prismatic_u_units,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 7,
+    .n_kernels = 9,
     .kernels = mstmm_hinge_prismatic_kernels,
 };

@@ -31,6 +31,16 @@ int mstmm_hinge_screw_rates_by_coordinates(const real *restrict p, const real *r
     const real *restrict u, real *restrict J);
 int mstmm_hinge_screw_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
+int mstmm_hinge_screw_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion);
+int mstmm_hinge_screw_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
 
 /* relative motion of the screw hinge
  * in  p[1] parameters: lead [m]
@@ -1159,6 +1169,397 @@ static const mstmm_port mstmm_hinge_screw_rates_by_speeds_outputs[] = {
     {"J", 1, "", 0, 0},
 };
 
+/* motion across the hinge and of the body behind it
+ * in  p[1] parameters: lead [m]
+ * in  q[1] coordinates: angle [rad]
+ * in  u[1] speeds: angle_rate [rad/s]
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  s[1]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * out R[3][3] rotation, P axes to Q axes
+ * out d[3] (m) position of P from Q, Q axes
+ * out H[6] motion subspace, rows v then w, P axes
+ * out v[3] (m/s) relative velocity of P, P axes
+ * out w[3] (rad/s) relative angular velocity, P axes
+ * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
+ * out qdot[1] coordinate rates
+ * out Rc[3][3] rotation, body axes to parent axes
+ * out r[3] (m) P of the body from P of the parent, parent axes
+ * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ */
+int mstmm_hinge_screw_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion)
+{
+    const real t0 = cos(q[0]);
+    R[0] = t0;
+    const real t1 = sin(q[0]);
+    const real t2 = -t1;
+    R[1] = t2;
+    R[2] = 0.0;
+    R[3] = t1;
+    R[4] = t0;
+    R[5] = 0.0;
+    R[6] = 0.0;
+    R[7] = 0.0;
+    R[8] = 1.0;
+    d[0] = 0.0;
+    d[1] = 0.0;
+    const real t3 = p[0] * q[0];
+    const real t4 = MSTMM_PI * 2.0;
+    const real t5 = 1.0 / t4;
+    const real t6 = t3 * t5;
+    d[2] = t6;
+    H[0] = 0.0;
+    H[1] = 0.0;
+    const real t7 = p[0] * t5;
+    H[2] = t7;
+    H[3] = 0.0;
+    H[4] = 0.0;
+    H[5] = 1.0;
+    v[0] = 0.0;
+    v[1] = 0.0;
+    const real t8 = p[0] * u[0];
+    const real t9 = t5 * t8;
+    v[2] = t9;
+    w[0] = 0.0;
+    w[1] = 0.0;
+    w[2] = u[0];
+    c[0] = 0.0;
+    c[1] = 0.0;
+    c[2] = 0.0;
+    c[3] = 0.0;
+    c[4] = 0.0;
+    c[5] = 0.0;
+    qdot[0] = u[0];
+    const real t10 = t0 * Rt[0];
+    const real t11 = t1 * Rt[1];
+    const real t12 = t10 + t11;
+    Rc[0] = t12;
+    const real t13 = t0 * Rt[1];
+    const real t14 = t1 * Rt[0];
+    const real t15 = t13 - t14;
+    Rc[1] = t15;
+    Rc[2] = Rt[2];
+    const real t16 = t0 * Rt[3];
+    const real t17 = t1 * Rt[4];
+    const real t18 = t16 + t17;
+    Rc[3] = t18;
+    const real t19 = t0 * Rt[4];
+    const real t20 = t1 * Rt[3];
+    const real t21 = t19 - t20;
+    Rc[4] = t21;
+    Rc[5] = Rt[5];
+    const real t22 = t0 * Rt[6];
+    const real t23 = t1 * Rt[7];
+    const real t24 = t22 + t23;
+    Rc[6] = t24;
+    const real t25 = t0 * Rt[7];
+    const real t26 = t1 * Rt[6];
+    const real t27 = t25 - t26;
+    Rc[7] = t27;
+    Rc[8] = Rt[8];
+    const real t28 = t6 * Rt[2];
+    const real t29 = ro[0] + t28;
+    r[0] = t29;
+    const real t30 = t6 * Rt[5];
+    const real t31 = ro[1] + t30;
+    r[1] = t31;
+    const real t32 = t6 * Rt[8];
+    const real t33 = ro[2] + t32;
+    r[2] = t33;
+    const real t34 = motion_I[0] * t12;
+    const real t35 = motion_I[1] * t18;
+    const real t36 = t34 + t35;
+    const real t37 = motion_I[2] * t24;
+    const real t38 = t36 + t37;
+    motion[0] = t38;
+    const real t39 = motion_I[0] * t15;
+    const real t40 = motion_I[1] * t21;
+    const real t41 = t39 + t40;
+    const real t42 = motion_I[2] * t27;
+    const real t43 = t41 + t42;
+    motion[1] = t43;
+    const real t44 = Rt[2] * motion_I[0];
+    const real t45 = Rt[5] * motion_I[1];
+    const real t46 = t44 + t45;
+    const real t47 = Rt[8] * motion_I[2];
+    const real t48 = t46 + t47;
+    const real t49 = u[0] + t48;
+    motion[2] = t49;
+    const real t50 = motion_I[3] * t12;
+    const real t51 = motion_I[4] * t18;
+    const real t52 = t50 + t51;
+    const real t53 = motion_I[5] * t24;
+    const real t54 = t52 + t53;
+    const real t55 = u[0] * t43;
+    const real t56 = t54 + t55;
+    motion[3] = t56;
+    const real t57 = motion_I[3] * t15;
+    const real t58 = motion_I[4] * t21;
+    const real t59 = t57 + t58;
+    const real t60 = motion_I[5] * t27;
+    const real t61 = t59 + t60;
+    const real t62 = u[0] * t38;
+    const real t63 = t61 - t62;
+    motion[4] = t63;
+    const real t64 = Rt[2] * motion_I[3];
+    const real t65 = Rt[5] * motion_I[4];
+    const real t66 = t64 + t65;
+    const real t67 = Rt[8] * motion_I[5];
+    const real t68 = t66 + t67;
+    const real t69 = s[0] + t68;
+    motion[5] = t69;
+    const real t70 = motion_I[0] * motion_I[1];
+    const real t71 = t70 - motion_I[5];
+    const real t72 = t31 * t71;
+    const real t73 = motion_I[1] * motion_I[1];
+    const real t74 = motion_I[2] * motion_I[2];
+    const real t75 = t73 + t74;
+    const real t76 = t29 * t75;
+    const real t77 = t72 - t76;
+    const real t78 = motion_I[0] * motion_I[2];
+    const real t79 = motion_I[4] + t78;
+    const real t80 = t33 * t79;
+    const real t81 = t77 + t80;
+    const real t82 = motion_I[6] + t81;
+    const real t83 = t12 * t82;
+    const real t84 = motion_I[5] + t70;
+    const real t85 = t29 * t84;
+    const real t86 = motion_I[0] * motion_I[0];
+    const real t87 = t74 + t86;
+    const real t88 = t31 * t87;
+    const real t89 = t85 - t88;
+    const real t90 = motion_I[1] * motion_I[2];
+    const real t91 = t90 - motion_I[3];
+    const real t92 = t33 * t91;
+    const real t93 = t89 + t92;
+    const real t94 = motion_I[7] + t93;
+    const real t95 = t18 * t94;
+    const real t96 = t83 + t95;
+    const real t97 = t78 - motion_I[4];
+    const real t98 = t29 * t97;
+    const real t99 = motion_I[3] + t90;
+    const real t100 = t31 * t99;
+    const real t101 = t98 + t100;
+    const real t102 = t73 + t86;
+    const real t103 = t33 * t102;
+    const real t104 = t101 - t103;
+    const real t105 = motion_I[8] + t104;
+    const real t106 = t24 * t105;
+    const real t107 = t96 + t106;
+    const real t108 = t9 * t43;
+    const real t109 = 2.0 * t108;
+    const real t110 = t107 + t109;
+    motion[6] = t110;
+    const real t111 = t15 * t82;
+    const real t112 = t21 * t94;
+    const real t113 = t111 + t112;
+    const real t114 = t27 * t105;
+    const real t115 = t113 + t114;
+    const real t116 = t9 * t38;
+    const real t117 = 2.0 * t116;
+    const real t118 = t115 - t117;
+    motion[7] = t118;
+    const real t119 = Rt[2] * t82;
+    const real t120 = Rt[5] * t94;
+    const real t121 = t119 + t120;
+    const real t122 = Rt[8] * t105;
+    const real t123 = t121 + t122;
+    const real t124 = t7 * s[0];
+    const real t125 = t123 + t124;
+    motion[8] = t125;
+    return 0;
+}
+
+static int mstmm_hinge_screw_forward_kept_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_screw_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+}
+
+static const mstmm_port mstmm_hinge_screw_forward_kept_inputs[] = {
+    {"p", 1, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"s", 1, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_screw_forward_kept_outputs[] = {
+    {"R", 9, "", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"c", 6, "m/s2, rad/s2", 0, 0},
+    {"qdot", 1, "", 0, 0},
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+/* directions of the unknowns of the hinge
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  p[1] parameters: lead [m]
+ * in  q[1] coordinates: angle [rad]
+ * in  u[1] speeds: angle_rate [rad/s]
+ * in  s[1] accelerations of the speeds
+ * in  motion[9] w, wd, and a of the body, own axes
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[1][1] change of the laws' efforts, a row a direction
+ * in  along[1][1] change of the coordinates, a row a direction
+ * in  rate[1] change of the speed itself
+ * in  scale[1] (1/s) and of its acceleration
+ * in  sq[1] (1/s) inverse time by which coordinates follow speeds
+ * out B[1][9] motion along the unknowns, a row a direction
+ * out G[1][6] change of the load that is carried
+ * out W[1][1] slopes of the rows by load, rotors and laws
+ * out H[6] motion subspace, rows v then w, P axes
+ */
+int mstmm_hinge_screw_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+{
+    (void)q;
+    (void)s;
+    (void)along;
+    const real t0 = 1.0 / sq[0];
+    const real t1 = motion[1] * t0;
+    B[0] = t1;
+    const real t2 = motion[0] * t0;
+    const real t3 = -t2;
+    B[1] = t3;
+    B[2] = rate[0];
+    const real t4 = u[0] * motion[0];
+    const real t5 = motion[4] + t4;
+    const real t6 = t0 * t5;
+    const real t7 = motion[1] * rate[0];
+    const real t8 = t6 + t7;
+    const real t9 = u[0] * t2;
+    const real t10 = t8 - t9;
+    B[3] = t10;
+    const real t11 = u[0] * t1;
+    const real t12 = motion[0] * rate[0];
+    const real t13 = u[0] * motion[1];
+    const real t14 = motion[3] - t13;
+    const real t15 = t0 * t14;
+    const real t16 = t12 + t15;
+    const real t17 = t11 + t16;
+    const real t18 = -t17;
+    B[4] = t18;
+    B[5] = scale[0];
+    const real t19 = MSTMM_PI * 2.0;
+    const real t20 = 1.0 / t19;
+    const real t21 = p[0] * u[0];
+    const real t22 = t20 * t21;
+    const real t23 = t22 * motion[0];
+    const real t24 = 2.0 * t23;
+    const real t25 = motion[7] + t24;
+    const real t26 = t0 * t25;
+    const real t27 = p[0] * t20;
+    const real t28 = t27 * t0;
+    const real t29 = t28 * t5;
+    const real t30 = p[0] * rate[0];
+    const real t31 = t20 * t30;
+    const real t32 = motion[1] * t31;
+    const real t33 = 2.0 * t32;
+    const real t34 = motion[2] - u[0];
+    const real t35 = motion[0] * t28;
+    const real t36 = t34 * t35;
+    const real t37 = t33 + t36;
+    const real t38 = t29 + t37;
+    const real t39 = t26 + t38;
+    const real t40 = 2.0 * t22;
+    const real t41 = t2 * t40;
+    const real t42 = t39 - t41;
+    B[6] = t42;
+    const real t43 = motion[1] * t28;
+    const real t44 = t34 * t43;
+    const real t45 = motion[0] * t31;
+    const real t46 = 2.0 * t45;
+    const real t47 = t44 - t46;
+    const real t48 = t28 * t14;
+    const real t49 = t47 - t48;
+    const real t50 = t22 * motion[1];
+    const real t51 = 2.0 * t50;
+    const real t52 = motion[6] - t51;
+    const real t53 = t0 * t52;
+    const real t54 = t49 - t53;
+    const real t55 = t1 * t40;
+    const real t56 = t54 - t55;
+    B[7] = t56;
+    const real t57 = t27 * scale[0];
+    const real t58 = motion[0] * t35;
+    const real t59 = motion[1] * t43;
+    const real t60 = t58 + t59;
+    const real t61 = t57 - t60;
+    B[8] = t61;
+    const real t62 = f[1] * t0;
+    const real t63 = -t62;
+    G[0] = t63;
+    const real t64 = f[0] * t0;
+    G[1] = t64;
+    G[2] = 0.0;
+    const real t65 = f[1] * t28;
+    const real t66 = f[4] * t0;
+    const real t67 = t65 + t66;
+    const real t68 = -t67;
+    G[3] = t68;
+    const real t69 = f[3] * t0;
+    const real t70 = f[0] * t28;
+    const real t71 = t69 + t70;
+    G[4] = t71;
+    G[5] = 0.0;
+    const real t72 = J[0] * scale[0];
+    const real t73 = t72 - laws[0];
+    W[0] = t73;
+    H[0] = 0.0;
+    H[1] = 0.0;
+    H[2] = t27;
+    H[3] = 0.0;
+    H[4] = 0.0;
+    H[5] = 1.0;
+    return 0;
+}
+
+static int mstmm_hinge_screw_directions_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_screw_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_hinge_screw_directions_inputs[] = {
+    {"p", 1, "", 0, 0},
+    {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0},
+    {"s", 1, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"J", 1, "kg*m2 or kg", 0, 0},
+    {"laws", 1, "", 0, 0},
+    {"along", 1, "", 0, 0},
+    {"rate", 1, "", 0, 0},
+    {"scale", 1, "1/s", 0, 0},
+    {"sq", 1, "1/s", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_screw_directions_outputs[] = {
+    {"B", 9, "", 0, 0},
+    {"G", 6, "", 0, 0},
+    {"W", 1, "", 0, 0},
+    {"H", 6, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_screw_q_names[] = {
     "angle",
 };
@@ -1268,13 +1669,37 @@ static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_kept",
+        .function = (void (*)(void))mstmm_hinge_screw_forward_kept,
+        .call = mstmm_hinge_screw_forward_kept_call,
+        .n_inputs = 7,
+        .n_outputs = 10,
+        .inputs = mstmm_hinge_screw_forward_kept_inputs,
+        .outputs = mstmm_hinge_screw_forward_kept_outputs,
+        .ir_hash = "b70e1c0383e49a5a385f3dc6a79388745811d4ee7f042fcd17e9fe8046709ac3",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "directions",
+        .function = (void (*)(void))mstmm_hinge_screw_directions,
+        .call = mstmm_hinge_screw_directions_call,
+        .n_inputs = 12,
+        .n_outputs = 4,
+        .inputs = mstmm_hinge_screw_directions_inputs,
+        .outputs = mstmm_hinge_screw_directions_outputs,
+        .ir_hash = "cfbe14c4cfe5c8aea552768f9a8d81896a6a414876766dc1b818d574fbf86680",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_screw = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "screw",
-    .hash = "2345c01c6f5c0f81027bd51ae2f03a01b545d91a5cad8aa6f3790e0976550f4b",
+    .hash = "633348380add35c0faa2959623b9f9ddfbb6face89d1dd4af15ec0e662c3883c",
     .nq = 1,
     .nu = 1,
     .np = 1,
@@ -1284,6 +1709,6 @@ const mstmm_element mstmm_hinge_screw = {
     .u_units = mstmm_hinge_screw_u_units,
     .p_names = mstmm_hinge_screw_p_names,
     .p_units = mstmm_hinge_screw_p_units,
-    .n_kernels = 7,
+    .n_kernels = 9,
     .kernels = mstmm_hinge_screw_kernels,
 };

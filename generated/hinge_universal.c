@@ -31,6 +31,16 @@ int mstmm_hinge_universal_rates_by_coordinates(const real *restrict p, const rea
     const real *restrict u, real *restrict J);
 int mstmm_hinge_universal_rates_by_speeds(const real *restrict p, const real *restrict q,
     const real *restrict u, real *restrict J);
+int mstmm_hinge_universal_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion);
+int mstmm_hinge_universal_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
 
 /* relative motion of the universal hinge
  * in  p[1] parameters: alpha [rad]
@@ -1362,6 +1372,595 @@ static const mstmm_port mstmm_hinge_universal_rates_by_speeds_outputs[] = {
     {"J", 4, "", 0, 0},
 };
 
+/* motion across the hinge and of the body behind it
+ * in  p[1] parameters: alpha [rad]
+ * in  q[2] coordinates: angle1 [rad], angle2 [rad]
+ * in  u[2] speeds: angle1_rate [rad/s], angle2_rate [rad/s]
+ * in  Rt[3][3] rotation, inboard hinge axes to parent axes
+ * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  s[2]
+ * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * out R[3][3] rotation, P axes to Q axes
+ * out d[3] (m) position of P from Q, Q axes
+ * out H[6][2] motion subspace, rows v then w, P axes
+ * out v[3] (m/s) relative velocity of P, P axes
+ * out w[3] (rad/s) relative angular velocity, P axes
+ * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
+ * out qdot[2] coordinate rates
+ * out Rc[3][3] rotation, body axes to parent axes
+ * out r[3] (m) P of the body from P of the parent, parent axes
+ * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ */
+int mstmm_hinge_universal_forward_kept(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict Rt, const real *restrict ro,
+    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
+    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
+    real *restrict Rc, real *restrict r, real *restrict motion)
+{
+    const real t0 = cos(q[0]);
+    const real t1 = cos(q[1]);
+    const real t2 = t0 * t1;
+    const real t3 = sin(q[0]);
+    const real t4 = sin(q[1]);
+    const real t5 = t3 * t4;
+    const real t6 = cos(p[0]);
+    const real t7 = t5 * t6;
+    const real t8 = t2 - t7;
+    R[0] = t8;
+    const real t9 = t0 * t4;
+    const real t10 = t3 * t6;
+    const real t11 = t1 * t10;
+    const real t12 = t9 + t11;
+    const real t13 = -t12;
+    R[1] = t13;
+    const real t14 = sin(p[0]);
+    const real t15 = t3 * t14;
+    R[2] = t15;
+    const real t16 = t1 * t3;
+    const real t17 = t4 * t6;
+    const real t18 = t0 * t17;
+    const real t19 = t16 + t18;
+    R[3] = t19;
+    const real t20 = t0 * t6;
+    const real t21 = t1 * t20;
+    const real t22 = t21 - t5;
+    R[4] = t22;
+    const real t23 = t0 * t14;
+    const real t24 = -t23;
+    R[5] = t24;
+    const real t25 = t4 * t14;
+    R[6] = t25;
+    const real t26 = t1 * t14;
+    R[7] = t26;
+    R[8] = t6;
+    d[0] = 0.0;
+    d[1] = 0.0;
+    d[2] = 0.0;
+    H[0] = 0.0;
+    H[1] = 0.0;
+    H[2] = 0.0;
+    H[3] = 0.0;
+    H[4] = 0.0;
+    H[5] = 0.0;
+    H[6] = t25;
+    H[7] = 0.0;
+    H[8] = t26;
+    H[9] = 0.0;
+    H[10] = t6;
+    H[11] = 1.0;
+    v[0] = 0.0;
+    v[1] = 0.0;
+    v[2] = 0.0;
+    const real t27 = u[0] * t25;
+    w[0] = t27;
+    const real t28 = u[0] * t26;
+    w[1] = t28;
+    const real t29 = u[0] * t6;
+    const real t30 = u[1] + t29;
+    w[2] = t30;
+    c[0] = 0.0;
+    c[1] = 0.0;
+    c[2] = 0.0;
+    const real t31 = u[1] * t28;
+    c[3] = t31;
+    const real t32 = u[1] * t27;
+    const real t33 = -t32;
+    c[4] = t33;
+    c[5] = 0.0;
+    qdot[0] = u[0];
+    qdot[1] = u[1];
+    const real t34 = t8 * Rt[0];
+    const real t35 = t19 * Rt[1];
+    const real t36 = t34 + t35;
+    const real t37 = t25 * Rt[2];
+    const real t38 = t36 + t37;
+    Rc[0] = t38;
+    const real t39 = t22 * Rt[1];
+    const real t40 = t12 * Rt[0];
+    const real t41 = t39 - t40;
+    const real t42 = t26 * Rt[2];
+    const real t43 = t41 + t42;
+    Rc[1] = t43;
+    const real t44 = t15 * Rt[0];
+    const real t45 = t23 * Rt[1];
+    const real t46 = t44 - t45;
+    const real t47 = t6 * Rt[2];
+    const real t48 = t46 + t47;
+    Rc[2] = t48;
+    const real t49 = t8 * Rt[3];
+    const real t50 = t19 * Rt[4];
+    const real t51 = t49 + t50;
+    const real t52 = t25 * Rt[5];
+    const real t53 = t51 + t52;
+    Rc[3] = t53;
+    const real t54 = t22 * Rt[4];
+    const real t55 = t12 * Rt[3];
+    const real t56 = t54 - t55;
+    const real t57 = t26 * Rt[5];
+    const real t58 = t56 + t57;
+    Rc[4] = t58;
+    const real t59 = t15 * Rt[3];
+    const real t60 = t23 * Rt[4];
+    const real t61 = t59 - t60;
+    const real t62 = t6 * Rt[5];
+    const real t63 = t61 + t62;
+    Rc[5] = t63;
+    const real t64 = t8 * Rt[6];
+    const real t65 = t19 * Rt[7];
+    const real t66 = t64 + t65;
+    const real t67 = t25 * Rt[8];
+    const real t68 = t66 + t67;
+    Rc[6] = t68;
+    const real t69 = t22 * Rt[7];
+    const real t70 = t12 * Rt[6];
+    const real t71 = t69 - t70;
+    const real t72 = t26 * Rt[8];
+    const real t73 = t71 + t72;
+    Rc[7] = t73;
+    const real t74 = t15 * Rt[6];
+    const real t75 = t23 * Rt[7];
+    const real t76 = t74 - t75;
+    const real t77 = t6 * Rt[8];
+    const real t78 = t76 + t77;
+    Rc[8] = t78;
+    r[0] = ro[0];
+    r[1] = ro[1];
+    r[2] = ro[2];
+    const real t79 = motion_I[0] * t38;
+    const real t80 = motion_I[1] * t53;
+    const real t81 = t79 + t80;
+    const real t82 = motion_I[2] * t68;
+    const real t83 = t81 + t82;
+    const real t84 = t27 + t83;
+    motion[0] = t84;
+    const real t85 = motion_I[0] * t43;
+    const real t86 = motion_I[1] * t58;
+    const real t87 = t85 + t86;
+    const real t88 = motion_I[2] * t73;
+    const real t89 = t87 + t88;
+    const real t90 = t28 + t89;
+    motion[1] = t90;
+    const real t91 = motion_I[0] * t48;
+    const real t92 = motion_I[1] * t63;
+    const real t93 = t91 + t92;
+    const real t94 = motion_I[2] * t78;
+    const real t95 = t93 + t94;
+    const real t96 = t30 + t95;
+    motion[2] = t96;
+    const real t97 = motion_I[3] * t38;
+    const real t98 = motion_I[4] * t53;
+    const real t99 = t97 + t98;
+    const real t100 = motion_I[5] * t68;
+    const real t101 = t99 + t100;
+    const real t102 = t25 * s[0];
+    const real t103 = t31 + t102;
+    const real t104 = t30 * t89;
+    const real t105 = t28 * t95;
+    const real t106 = t104 - t105;
+    const real t107 = t103 + t106;
+    const real t108 = t101 + t107;
+    motion[3] = t108;
+    const real t109 = motion_I[3] * t43;
+    const real t110 = motion_I[4] * t58;
+    const real t111 = t109 + t110;
+    const real t112 = motion_I[5] * t73;
+    const real t113 = t111 + t112;
+    const real t114 = t26 * s[0];
+    const real t115 = t114 - t32;
+    const real t116 = t27 * t95;
+    const real t117 = t30 * t83;
+    const real t118 = t116 - t117;
+    const real t119 = t115 + t118;
+    const real t120 = t113 + t119;
+    motion[4] = t120;
+    const real t121 = motion_I[3] * t48;
+    const real t122 = motion_I[4] * t63;
+    const real t123 = t121 + t122;
+    const real t124 = motion_I[5] * t78;
+    const real t125 = t123 + t124;
+    const real t126 = t6 * s[0];
+    const real t127 = s[1] + t126;
+    const real t128 = t28 * t83;
+    const real t129 = t27 * t89;
+    const real t130 = t128 - t129;
+    const real t131 = t127 + t130;
+    const real t132 = t125 + t131;
+    motion[5] = t132;
+    const real t133 = motion_I[0] * motion_I[1];
+    const real t134 = t133 - motion_I[5];
+    const real t135 = ro[1] * t134;
+    const real t136 = motion_I[1] * motion_I[1];
+    const real t137 = motion_I[2] * motion_I[2];
+    const real t138 = t136 + t137;
+    const real t139 = ro[0] * t138;
+    const real t140 = t135 - t139;
+    const real t141 = motion_I[0] * motion_I[2];
+    const real t142 = motion_I[4] + t141;
+    const real t143 = ro[2] * t142;
+    const real t144 = t140 + t143;
+    const real t145 = motion_I[6] + t144;
+    const real t146 = t38 * t145;
+    const real t147 = motion_I[5] + t133;
+    const real t148 = ro[0] * t147;
+    const real t149 = motion_I[0] * motion_I[0];
+    const real t150 = t137 + t149;
+    const real t151 = ro[1] * t150;
+    const real t152 = t148 - t151;
+    const real t153 = motion_I[1] * motion_I[2];
+    const real t154 = t153 - motion_I[3];
+    const real t155 = ro[2] * t154;
+    const real t156 = t152 + t155;
+    const real t157 = motion_I[7] + t156;
+    const real t158 = t53 * t157;
+    const real t159 = t146 + t158;
+    const real t160 = t141 - motion_I[4];
+    const real t161 = ro[0] * t160;
+    const real t162 = motion_I[3] + t153;
+    const real t163 = ro[1] * t162;
+    const real t164 = t161 + t163;
+    const real t165 = t136 + t149;
+    const real t166 = ro[2] * t165;
+    const real t167 = t164 - t166;
+    const real t168 = motion_I[8] + t167;
+    const real t169 = t68 * t168;
+    const real t170 = t159 + t169;
+    motion[6] = t170;
+    const real t171 = t43 * t145;
+    const real t172 = t58 * t157;
+    const real t173 = t171 + t172;
+    const real t174 = t73 * t168;
+    const real t175 = t173 + t174;
+    motion[7] = t175;
+    const real t176 = t48 * t145;
+    const real t177 = t63 * t157;
+    const real t178 = t176 + t177;
+    const real t179 = t78 * t168;
+    const real t180 = t178 + t179;
+    motion[8] = t180;
+    return 0;
+}
+
+static int mstmm_hinge_universal_forward_kept_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_universal_forward_kept(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
+}
+
+static const mstmm_port mstmm_hinge_universal_forward_kept_inputs[] = {
+    {"p", 1, "", 0, 0},
+    {"q", 2, "", 0, 0},
+    {"u", 2, "", 0, 0},
+    {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0},
+    {"s", 2, "", 0, 0},
+    {"motion_I", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_universal_forward_kept_outputs[] = {
+    {"R", 9, "", 0, 0},
+    {"d", 3, "m", 0, 0},
+    {"H", 12, "", 0, 0},
+    {"v", 3, "m/s", 0, 0},
+    {"w", 3, "rad/s", 0, 0},
+    {"c", 6, "m/s2, rad/s2", 0, 0},
+    {"qdot", 2, "", 0, 0},
+    {"Rc", 9, "", 0, 0},
+    {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0},
+};
+
+/* directions of the unknowns of the hinge
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  p[1] parameters: alpha [rad]
+ * in  q[2] coordinates: angle1 [rad], angle2 [rad]
+ * in  u[2] speeds: angle1_rate [rad/s], angle2_rate [rad/s]
+ * in  s[2] accelerations of the speeds
+ * in  motion[9] w, wd, and a of the body, own axes
+ * in  f[6] (N, N*m) load at P that is carried
+ * in  J[2] (kg*m2 or kg) rotor inertia reflected to the speeds
+ * in  laws[2][2] change of the laws' efforts, a row a direction
+ * in  along[2][2] change of the coordinates, a row a direction
+ * in  rate[1] change of the speed itself
+ * in  scale[1] (1/s) and of its acceleration
+ * in  sq[1] (1/s) inverse time by which coordinates follow speeds
+ * out B[2][9] motion along the unknowns, a row a direction
+ * out G[2][6] change of the load that is carried
+ * out W[2][2] slopes of the rows by load, rotors and laws
+ * out H[6][2] motion subspace, rows v then w, P axes
+ */
+int mstmm_hinge_universal_directions(const real *restrict p, const real *restrict q,
+    const real *restrict u, const real *restrict s, const real *restrict motion,
+    const real *restrict f, const real *restrict J, const real *restrict laws,
+    const real *restrict along, const real *restrict rate, const real *restrict scale,
+    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+{
+    (void)along;
+    const real t0 = sin(q[1]);
+    const real t1 = sin(p[0]);
+    const real t2 = t0 * t1;
+    const real t3 = t2 * rate[0];
+    const real t4 = cos(p[0]);
+    const real t5 = 1.0 / sq[0];
+    const real t6 = t4 * t5;
+    const real t7 = cos(q[1]);
+    const real t8 = t7 * t1;
+    const real t9 = u[0] * t8;
+    const real t10 = motion[1] - t9;
+    const real t11 = t6 * t10;
+    const real t12 = t8 * t5;
+    const real t13 = u[0] * t4;
+    const real t14 = u[1] + t13;
+    const real t15 = motion[2] - t14;
+    const real t16 = t12 * t15;
+    const real t17 = t11 - t16;
+    const real t18 = t3 + t17;
+    B[0] = t18;
+    const real t19 = t8 * rate[0];
+    const real t20 = t2 * t5;
+    const real t21 = t20 * t15;
+    const real t22 = u[0] * t2;
+    const real t23 = motion[0] - t22;
+    const real t24 = t6 * t23;
+    const real t25 = t21 - t24;
+    const real t26 = t19 + t25;
+    B[1] = t26;
+    const real t27 = t4 * rate[0];
+    const real t28 = t12 * t23;
+    const real t29 = t20 * t10;
+    const real t30 = t28 - t29;
+    const real t31 = t27 + t30;
+    B[2] = t31;
+    const real t32 = t14 * t25;
+    const real t33 = t9 * t30;
+    const real t34 = t32 - t33;
+    const real t35 = u[1] * t19;
+    const real t36 = t2 * scale[0];
+    const real t37 = t35 + t36;
+    const real t38 = t14 * t23;
+    const real t39 = t22 * t15;
+    const real t40 = t38 - t39;
+    const real t41 = t8 * s[0];
+    const real t42 = u[1] * t22;
+    const real t43 = t41 - t42;
+    const real t44 = t40 - t43;
+    const real t45 = motion[4] + t44;
+    const real t46 = t6 * t45;
+    const real t47 = t27 * t10;
+    const real t48 = t19 * t15;
+    const real t49 = t47 - t48;
+    const real t50 = t46 + t49;
+    const real t51 = t22 * t10;
+    const real t52 = t9 * t23;
+    const real t53 = t51 - t52;
+    const real t54 = t4 * s[0];
+    const real t55 = s[1] + t54;
+    const real t56 = t53 - t55;
+    const real t57 = motion[5] + t56;
+    const real t58 = t12 * t57;
+    const real t59 = t50 - t58;
+    const real t60 = t37 + t59;
+    const real t61 = t34 + t60;
+    B[3] = t61;
+    const real t62 = t22 * t30;
+    const real t63 = t14 * t17;
+    const real t64 = t62 - t63;
+    const real t65 = t8 * scale[0];
+    const real t66 = u[1] * t3;
+    const real t67 = t65 - t66;
+    const real t68 = t20 * t57;
+    const real t69 = t3 * t15;
+    const real t70 = t27 * t23;
+    const real t71 = t69 - t70;
+    const real t72 = t9 * t15;
+    const real t73 = t14 * t10;
+    const real t74 = t72 - t73;
+    const real t75 = u[1] * t9;
+    const real t76 = t2 * s[0];
+    const real t77 = t75 + t76;
+    const real t78 = t74 - t77;
+    const real t79 = motion[3] + t78;
+    const real t80 = t6 * t79;
+    const real t81 = t71 - t80;
+    const real t82 = t68 + t81;
+    const real t83 = t67 + t82;
+    const real t84 = t64 + t83;
+    B[4] = t84;
+    const real t85 = t9 * t17;
+    const real t86 = t22 * t25;
+    const real t87 = t85 - t86;
+    const real t88 = t4 * scale[0];
+    const real t89 = t12 * t79;
+    const real t90 = t19 * t23;
+    const real t91 = t3 * t10;
+    const real t92 = t90 - t91;
+    const real t93 = t89 + t92;
+    const real t94 = t20 * t45;
+    const real t95 = t93 - t94;
+    const real t96 = t88 + t95;
+    const real t97 = t87 + t96;
+    B[5] = t97;
+    const real t98 = motion[7] * t6;
+    const real t99 = motion[8] * t12;
+    const real t100 = t98 - t99;
+    B[6] = t100;
+    const real t101 = motion[8] * t20;
+    const real t102 = motion[6] * t6;
+    const real t103 = t101 - t102;
+    B[7] = t103;
+    const real t104 = motion[6] * t12;
+    const real t105 = motion[7] * t20;
+    const real t106 = t104 - t105;
+    B[8] = t106;
+    const real t107 = t7 * t5;
+    const real t108 = t1 * t107;
+    const real t109 = u[0] * t108;
+    const real t110 = t5 * t10;
+    const real t111 = t109 + t110;
+    B[9] = t111;
+    const real t112 = t0 * t5;
+    const real t113 = t1 * t112;
+    const real t114 = u[0] * t113;
+    const real t115 = t5 * t23;
+    const real t116 = t114 + t115;
+    const real t117 = -t116;
+    B[10] = t117;
+    B[11] = rate[0];
+    const real t118 = t9 * rate[0];
+    const real t119 = u[1] * t114;
+    const real t120 = t118 - t119;
+    const real t121 = s[0] * t108;
+    const real t122 = t120 + t121;
+    const real t123 = t5 * t45;
+    const real t124 = rate[0] * t10;
+    const real t125 = t15 * t114;
+    const real t126 = t124 + t125;
+    const real t127 = t123 + t126;
+    const real t128 = t122 + t127;
+    const real t129 = t14 * t115;
+    const real t130 = t128 - t129;
+    B[12] = t130;
+    const real t131 = t15 * t109;
+    const real t132 = rate[0] * t23;
+    const real t133 = t131 - t132;
+    const real t134 = t5 * t79;
+    const real t135 = t133 - t134;
+    const real t136 = t22 * rate[0];
+    const real t137 = u[1] * t109;
+    const real t138 = t136 + t137;
+    const real t139 = s[0] * t113;
+    const real t140 = t138 + t139;
+    const real t141 = t135 - t140;
+    const real t142 = t14 * t110;
+    const real t143 = t141 - t142;
+    B[13] = t143;
+    const real t144 = t9 * t110;
+    const real t145 = t22 * t115;
+    const real t146 = t144 + t145;
+    const real t147 = t23 * t114;
+    const real t148 = t10 * t109;
+    const real t149 = t147 + t148;
+    const real t150 = scale[0] - t149;
+    const real t151 = t146 + t150;
+    B[14] = t151;
+    const real t152 = motion[7] * t5;
+    B[15] = t152;
+    const real t153 = motion[6] * t5;
+    const real t154 = -t153;
+    B[16] = t154;
+    B[17] = 0.0;
+    const real t155 = f[2] * t12;
+    const real t156 = f[1] * t6;
+    const real t157 = t155 - t156;
+    G[0] = t157;
+    const real t158 = f[0] * t6;
+    const real t159 = f[2] * t20;
+    const real t160 = t158 - t159;
+    G[1] = t160;
+    const real t161 = f[1] * t20;
+    const real t162 = f[0] * t12;
+    const real t163 = t161 - t162;
+    G[2] = t163;
+    const real t164 = f[5] * t12;
+    const real t165 = f[4] * t6;
+    const real t166 = t164 - t165;
+    G[3] = t166;
+    const real t167 = f[3] * t6;
+    const real t168 = f[5] * t20;
+    const real t169 = t167 - t168;
+    G[4] = t169;
+    const real t170 = f[4] * t20;
+    const real t171 = f[3] * t12;
+    const real t172 = t170 - t171;
+    G[5] = t172;
+    const real t173 = f[1] * t5;
+    const real t174 = -t173;
+    G[6] = t174;
+    const real t175 = f[0] * t5;
+    G[7] = t175;
+    G[8] = 0.0;
+    const real t176 = f[4] * t5;
+    const real t177 = -t176;
+    G[9] = t177;
+    const real t178 = f[3] * t5;
+    G[10] = t178;
+    G[11] = 0.0;
+    const real t179 = J[0] * scale[0];
+    const real t180 = t179 - laws[0];
+    W[0] = t180;
+    const real t181 = -laws[1];
+    W[1] = t181;
+    const real t182 = f[3] * t108;
+    const real t183 = f[4] * t113;
+    const real t184 = t182 - t183;
+    const real t185 = t184 - laws[2];
+    W[2] = t185;
+    const real t186 = J[1] * scale[0];
+    const real t187 = t186 - laws[3];
+    W[3] = t187;
+    H[0] = 0.0;
+    H[1] = 0.0;
+    H[2] = 0.0;
+    H[3] = 0.0;
+    H[4] = 0.0;
+    H[5] = 0.0;
+    H[6] = t2;
+    H[7] = 0.0;
+    H[8] = t8;
+    H[9] = 0.0;
+    H[10] = t4;
+    H[11] = 1.0;
+    return 0;
+}
+
+static int mstmm_hinge_universal_directions_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_hinge_universal_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
+}
+
+static const mstmm_port mstmm_hinge_universal_directions_inputs[] = {
+    {"p", 1, "", 0, 0},
+    {"q", 2, "", 0, 0},
+    {"u", 2, "", 0, 0},
+    {"s", 2, "", 0, 0},
+    {"motion", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0},
+    {"J", 2, "kg*m2 or kg", 0, 0},
+    {"laws", 4, "", 0, 0},
+    {"along", 4, "", 0, 0},
+    {"rate", 1, "", 0, 0},
+    {"scale", 1, "1/s", 0, 0},
+    {"sq", 1, "1/s", 0, 0},
+};
+
+static const mstmm_port mstmm_hinge_universal_directions_outputs[] = {
+    {"B", 18, "", 0, 0},
+    {"G", 12, "", 0, 0},
+    {"W", 4, "", 0, 0},
+    {"H", 12, "", 0, 0},
+};
+
 static const char *const mstmm_hinge_universal_q_names[] = {
     "angle1", "angle2",
 };
@@ -1471,13 +2070,37 @@ static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
         .n_guards = 0,
         .guards = NULL,
     },
+    {
+        .name = "forward_kept",
+        .function = (void (*)(void))mstmm_hinge_universal_forward_kept,
+        .call = mstmm_hinge_universal_forward_kept_call,
+        .n_inputs = 7,
+        .n_outputs = 10,
+        .inputs = mstmm_hinge_universal_forward_kept_inputs,
+        .outputs = mstmm_hinge_universal_forward_kept_outputs,
+        .ir_hash = "6016724b5256b65736f4b5597e4df84fa2ec50b625b140ceb0286d79d6d61278",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "directions",
+        .function = (void (*)(void))mstmm_hinge_universal_directions,
+        .call = mstmm_hinge_universal_directions_call,
+        .n_inputs = 12,
+        .n_outputs = 4,
+        .inputs = mstmm_hinge_universal_directions_inputs,
+        .outputs = mstmm_hinge_universal_directions_outputs,
+        .ir_hash = "11c726eae5b0f6cda2a2195de125231935facdf6ceb837595f2268a6213ef77f",
+        .n_guards = 0,
+        .guards = NULL,
+    },
 };
 
 const mstmm_element mstmm_hinge_universal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "universal",
-    .hash = "631daf0becf58e22ae79ed80e9d6b59c489715c918994d1a37d015d8743fca08",
+    .hash = "554904d6e761a21c85ec8e90969f9e6dd965ba5797a9c66b6676a259baa51c06",
     .nq = 2,
     .nu = 2,
     .np = 1,
@@ -1487,6 +2110,6 @@ const mstmm_element mstmm_hinge_universal = {
     .u_units = mstmm_hinge_universal_u_units,
     .p_names = mstmm_hinge_universal_p_names,
     .p_units = mstmm_hinge_universal_p_units,
-    .n_kernels = 7,
+    .n_kernels = 9,
     .kernels = mstmm_hinge_universal_kernels,
 };

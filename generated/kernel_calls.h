@@ -3982,6 +3982,69 @@ static inline int mstmm_hinge_rates_by_speeds_by(void (*kernel)(void), struct ms
 }
 #define mstmm_hinge_rates_by_speeds(kernel, ...) mstmm_hinge_rates_by_speeds_by(kernel, (struct mstmm_hinge_rates_by_speeds){__VA_ARGS__})
 
+struct mstmm_hinge_forward_kept {
+    const real *p;
+    const real *q;
+    const real *u;
+    const real *Rt;
+    const real *ro;
+    const real *s;
+    const real *motion_I;
+    real *R;
+    real *d;
+    real *H;
+    real *v;
+    real *w;
+    real *c;
+    real *qdot;
+    real *Rc;
+    real *r;
+    real *motion;
+};
+typedef int mstmm_hinge_forward_kept_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, real *restrict,
+    real *restrict, real *restrict, real *restrict, real *restrict, real *restrict,
+    real *restrict, real *restrict, real *restrict, real *restrict);
+static inline int mstmm_hinge_forward_kept_by(void (*kernel)(void), struct mstmm_hinge_forward_kept to)
+{
+    return ((mstmm_hinge_forward_kept_kernel *)kernel)(
+        to.p, to.q, to.u, to.Rt, to.ro, to.s, to.motion_I, to.R, to.d, to.H, to.v, to.w, to.c,
+        to.qdot, to.Rc, to.r, to.motion);
+}
+#define mstmm_hinge_forward_kept(kernel, ...) mstmm_hinge_forward_kept_by(kernel, (struct mstmm_hinge_forward_kept){__VA_ARGS__})
+
+struct mstmm_hinge_directions {
+    const real *p;
+    const real *q;
+    const real *u;
+    const real *s;
+    const real *motion;
+    const real *f;
+    const real *J;
+    const real *laws;
+    const real *along;
+    const real *rate;
+    const real *scale;
+    const real *sq;
+    real *B;
+    real *G;
+    real *W;
+    real *H;
+};
+typedef int mstmm_hinge_directions_kernel(
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
+    real *restrict, real *restrict, real *restrict, real *restrict);
+static inline int mstmm_hinge_directions_by(void (*kernel)(void), struct mstmm_hinge_directions to)
+{
+    return ((mstmm_hinge_directions_kernel *)kernel)(
+        to.p, to.q, to.u, to.s, to.motion, to.f, to.J, to.laws, to.along, to.rate, to.scale,
+        to.sq, to.B, to.G, to.W, to.H);
+}
+#define mstmm_hinge_directions(kernel, ...) mstmm_hinge_directions_by(kernel, (struct mstmm_hinge_directions){__VA_ARGS__})
+
 struct mstmm_body_inertia {
     const real *p;
     real *S;

@@ -331,13 +331,11 @@ static int mstmm_at_prescribed(mstmm_state *state, int index)
     if (state->given) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
-        for (int j = 0; j < nu; j++)
-            (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j] = (state->given + body->u)[j];
+        mstmm_set(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), state->given + body->u, nu);
     } else {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
-        for (int j = 0; j < nu; j++)
-            (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j] = 0;
+        mstmm_set_zero(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), nu);
     }
     return 0;
 }
@@ -470,11 +468,11 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion)
         code = mstmm_at_section_motion(state, index);
         if (code) return code;
     }
-    if (body->generic && !body->section) {
+    if ((body->generic || state->required) && !body->section && !(body->kernels->forward_kept && !body->section && (body->generic || state->required))) {
         code = mstmm_at_hinge_motion(state, index);
         if (code) return code;
     }
-    if (!body->generic) {
+    if (!(body->generic || state->required)) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
         code = mstmm_hinge_forward(body->kernels->forward,
@@ -485,7 +483,21 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion)
             .motion = block + MSTMM_BLOCK_MOTION, .qdot = state->qdot + body->q);
         if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
     }
-    if (body->generic) {
+    if (body->kernels->forward_kept && !body->section && (body->generic || state->required)) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        code = mstmm_hinge_forward_kept(body->kernels->forward_kept,
+            .p = body->hinge_p, .q = state->q + body->q, .u = state->u + body->u,
+            .Rt = body->connection, .ro = body->connection + 9,
+            .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .motion_I = parent_motion,
+            .R = block + MSTMM_BLOCK_HINGE_R, .d = block + MSTMM_BLOCK_HINGE_D,
+            .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C,
+            .qdot = state->qdot + body->q, .Rc = block + MSTMM_BLOCK_R,
+            .r = block + MSTMM_BLOCK_SHIFT, .motion = block + MSTMM_BLOCK_MOTION);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
+    }
+    if ((body->generic || state->required) && !(body->kernels->forward_kept && !body->section && (body->generic || state->required))) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
         code = mstmm_generic_forward(nu,
@@ -555,7 +567,7 @@ static int mstmm_at_qr_own(mstmm_state *state, int index)
     real *block = state->workspace + body->block;
     int code;
     if (mstmm_idle(state->observed, body)) return 0;
-    if (!body->generic) {
+    if (!(body->generic || state->required)) {
         code = mstmm_at_hinge_motion(state, index);
         if (code) return code;
     }
@@ -589,13 +601,11 @@ static int mstmm_at_efforts(mstmm_state *state, int index)
     if (state->efforts) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
-        for (int j = 0; j < nu; j++)
-            (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU))[j] = (state->efforts + body->u)[j];
+        mstmm_set(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), state->efforts + body->u, nu);
     } else {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
-        for (int j = 0; j < nu; j++)
-            (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU))[j] = 0;
+        mstmm_set_zero(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), nu);
     }
     return 0;
 }
@@ -686,7 +696,7 @@ static int mstmm_at_poses(mstmm_state *state, int index)
     real *parent = mstmm_block(state->model, state->workspace, body->parent);
     int code;
     if (mstmm_idle(state->observed, body)) return 0;
-    if (!body->generic && !state->hinges_known) {
+    if (!(body->generic || state->required) && !state->hinges_known) {
         code = mstmm_at_hinge_motion(state, index);
         if (code) return code;
     }
@@ -936,7 +946,7 @@ int mstmm_at_condense(mstmm_state *state, int index)
             .S_rf = modes + MSTMM_MODES_S_RF(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
             .e_f = modes + MSTMM_MODES_E_F(n));
     }
-    if (body->generic) {
+    if ((body->generic || state->required)) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
         int columns[6];
@@ -949,7 +959,7 @@ int mstmm_at_condense(mstmm_state *state, int index)
         for (int k = 0; k < speeds; k++)
             hinge_tau_free[k] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU))[columns[k]];
     }
-    if (!body->generic) {
+    if (!(body->generic || state->required)) {
         real *block = state->workspace + body->block;
         real *parent = mstmm_block(state->model, state->workspace, body->parent);
         const int nu = body->nu;
@@ -963,7 +973,7 @@ int mstmm_at_condense(mstmm_state *state, int index)
             .e_I = parent + MSTMM_BLOCK_E);
         if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
     }
-    if (body->generic) {
+    if ((body->generic || state->required)) {
         real *block = state->workspace + body->block;
         real *parent = mstmm_block(state->model, state->workspace, body->parent);
         const int nu = body->nu;
@@ -1040,7 +1050,7 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
     real delta[6];
     const mstmm_body *body = &state->model->bodies[index];
     if (mstmm_idle(state->observed, body)) return 0;
-    if (!body->generic) {
+    if (!(body->generic || state->required)) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
         mstmm_hinge_recover(body->kernels->recover,
@@ -1049,7 +1059,7 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
             .g = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .delta_I = parent_delta,
             .udot = state->udot + body->u, .delta = block + MSTMM_BLOCK_DELTA);
     }
-    if (body->generic) {
+    if ((body->generic || state->required)) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
         int columns[6];
@@ -1802,8 +1812,7 @@ static int mstmm_at_closures_answered(mstmm_state *state, int index)
     real *loops = state->workspace + state->model->loops;
     real *closed = closure ? loops + closure->numbers : NULL;
     if (!looped->closure) return 0;
-    for (int j = 0; j < nu; j++)
-        (state->udot + body->u)[j] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j];
+    mstmm_set(state->udot + body->u, mstmm_of_speeds(block, nu, MSTMM_SPEED_S), nu);
     for (int k = 0; k < body->nu; k++) {
         mstmm_loops_told(
             .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k, .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k,
@@ -1855,8 +1864,7 @@ static int mstmm_at_closures_answered_in_plane(mstmm_state *state, int index)
     real *loops = state->workspace + state->model->loops;
     real *closed = closure ? loops + closure->numbers : NULL;
     if (!looped->closure) return 0;
-    for (int j = 0; j < nu; j++)
-        (state->udot + body->u)[j] = (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j];
+    mstmm_set(state->udot + body->u, mstmm_of_speeds(block, nu, MSTMM_SPEED_S), nu);
     for (int k = 0; k < body->nu; k++) {
         mstmm_planar_told(
             .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k, .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k,
@@ -2083,7 +2091,7 @@ static int mstmm_at_required(mstmm_state *state, int index)
         for (int j = 0; j < n; j++)
             (state->required + modal->u)[j] = (modes + MSTMM_MODES_E_F(n))[j];
     }
-    if (!body->generic) {
+    if (!(body->generic || state->required)) {
         code = mstmm_at_hinge_motion(state, index);
         if (code) return code;
     }
@@ -2108,8 +2116,7 @@ static int mstmm_at_unloaded(mstmm_state *state, int index)
     real *block = state->workspace + body->block;
     const int nu = body->nu;
     memset(block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
-    for (int j = 0; j < nu; j++)
-        (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU))[j] = 0;
+    mstmm_set_zero(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), nu);
     if (body->modal) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -2132,7 +2139,7 @@ static int mstmm_at_factorise(mstmm_state *state, int index)
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     int code;
     if (mstmm_idle(state->observed, body)) return 0;
-    if (!body->generic) {
+    if (!(body->generic || state->required)) {
         code = mstmm_at_hinge_motion(state, index);
         if (code) return code;
     }
@@ -2175,8 +2182,7 @@ static int mstmm_at_column(mstmm_state *state, int index)
     real *block = state->workspace + body->block;
     const int nu = body->nu;
     memset(block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
-    for (int j = 0; j < nu; j++)
-        (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU))[j] = (state->column + body->u)[j];
+    mstmm_set(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), state->column + body->u, nu);
     if (body->modal) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -2301,13 +2307,11 @@ static int mstmm_at_prescribed_slope(mstmm_state *state, int index)
     if (state->given) {
         const int nu = body->nu;
         real *d_block = state->slope->workspace + body->block;
-        for (int j = 0; j < nu; j++)
-            (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S))[j] = (state->slope->given + body->u)[j];
+        mstmm_set(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S), state->slope->given + body->u, nu);
     } else {
         const int nu = body->nu;
         real *d_block = state->slope->workspace + body->block;
-        for (int j = 0; j < nu; j++)
-            (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S))[j] = 0;
+        mstmm_set_zero(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_S), nu);
     }
     return 0;
 }
@@ -2489,13 +2493,11 @@ static int mstmm_at_efforts_slope(mstmm_state *state, int index)
     if (state->efforts) {
         const int nu = body->nu;
         real *d_block = state->slope->workspace + body->block;
-        for (int j = 0; j < nu; j++)
-            (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] = (state->slope->efforts + body->u)[j];
+        mstmm_set(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), state->slope->efforts + body->u, nu);
     } else {
         const int nu = body->nu;
         real *d_block = state->slope->workspace + body->block;
-        for (int j = 0; j < nu; j++)
-            (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] = 0;
+        mstmm_set_zero(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), nu);
     }
     return 0;
 }
@@ -3242,8 +3244,7 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
     if (model->n_laws) {
         const int nu = body->nu;
         real *tangent = state->tangents->numbers + body->tangent;
-        for (int j = 0; j < nu * nu; j++)
-            (tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq))[j] = 0;
+        mstmm_set_zero(tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq), nu * nu);
     }
     if (!body->straight) {
         code = mstmm_at_lag(state, index);
@@ -3741,7 +3742,22 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
         }
         mstmm_aim_no_mode(state, modal);
     }
-    if (!body->section && speeds) {
+    if (!body->section && speeds && body->kernels->directions && !body->placed && speeds == body->nu) {
+        const int nu = body->nu;
+        real *tangent = state->tangents->numbers + body->tangent;
+        mstmm_hinge_directions(body->kernels->directions,
+            .p = body->hinge_p, .q = state->q + body->q, .u = state->u + body->u,
+            .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .motion = block + MSTMM_BLOCK_MOTION,
+            .f = block + MSTMM_BLOCK_E, .J = body->rotor,
+            .laws = tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq),
+            .along = tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq),
+            .rate = &state->tangents->rate, .scale = &state->tangents->s,
+            .sq = &state->tangents->sq, .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
+            .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq),
+            .W = tangent + MSTMM_TANGENT_W(body->nu, body->nq),
+            .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq));
+    }
+    if (!body->section && speeds && !(body->kernels->directions && !body->placed && speeds == body->nu)) {
         const int nu = body->nu;
         real *tangent = state->tangents->numbers + body->tangent;
         real *place = state->tangents->numbers + body->place;
@@ -4107,7 +4123,23 @@ static int mstmm_at_tangent_brought(mstmm_state *state, int index)
         }
         mstmm_aim_no_mode(state, modal);
     }
-    if (!body->section && speeds) {
+    if (!body->section && speeds && body->kernels->directions && !body->placed && speeds == body->nu) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        real *tangent = state->tangents->numbers + body->tangent;
+        mstmm_hinge_directions(body->kernels->directions,
+            .p = body->hinge_p, .q = state->q + body->q, .u = state->u + body->u,
+            .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .motion = block + MSTMM_BLOCK_MOTION,
+            .f = block + MSTMM_BLOCK_E, .J = body->rotor,
+            .laws = tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq),
+            .along = tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq),
+            .rate = &state->tangents->rate, .scale = &state->tangents->s,
+            .sq = &state->tangents->sq, .B = tangent + MSTMM_TANGENT_B(body->nu, body->nq),
+            .G = tangent + MSTMM_TANGENT_G(body->nu, body->nq),
+            .W = tangent + MSTMM_TANGENT_W(body->nu, body->nq),
+            .H = tangent + MSTMM_TANGENT_H(body->nu, body->nq));
+    }
+    if (!body->section && speeds && !(body->kernels->directions && !body->placed && speeds == body->nu)) {
         real *block = state->workspace + body->block;
         const int nu = body->nu;
         real *tangent = state->tangents->numbers + body->tangent;
@@ -4256,8 +4288,7 @@ static int mstmm_at_tangent_column(mstmm_state *state, int index)
     const int nu = body->nu;
     real *d_block = state->slope->workspace + body->block;
     memset(d_block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
-    for (int j = 0; j < nu; j++)
-        (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] = 0;
+    mstmm_set_zero(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), nu);
     for (int j = 0; j < nu; j++)
         (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] -= (state->column + body->u)[j];
     if (body->modal) {
@@ -4359,8 +4390,7 @@ static int mstmm_at_tangent_answered(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     if (mstmm_aside(state->model, state->observed, index)) return 0;
-    for (int j = 0; j < nu; j++)
-        (state->answer + body->u)[j] = 0;
+    mstmm_set_zero(state->answer + body->u, nu);
     if (body->placed) {
         real *block = state->workspace + body->block;
         real *place = state->tangents->numbers + body->place;
@@ -4478,8 +4508,7 @@ static int mstmm_at_known_column(mstmm_state *state, int index)
     real *d_block = state->slope->workspace + body->block;
     int code;
     memset(d_block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
-    for (int j = 0; j < nu; j++)
-        (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] = (state->column + body->u)[j];
+    mstmm_set(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), state->column + body->u, nu);
     if (body->modal) {
         memset(d_block + MSTMM_BLOCK_MOTION, 0, 9 * sizeof(real));
         memset(d_block + MSTMM_BLOCK_V, 0, 3 * sizeof(real));
@@ -4804,8 +4833,7 @@ static int mstmm_at_known_answered(mstmm_state *state, int index)
     int columns[6];
     const int speeds = mstmm_free_speeds(state->memory, body, columns);
     if (mstmm_aside(state->model, state->observed, index)) return 0;
-    for (int j = 0; j < nu; j++)
-        (state->answer + body->u)[j] = 0;
+    mstmm_set_zero(state->answer + body->u, nu);
     if (body->placed) {
         real *block = state->workspace + body->block;
         real *place = state->tangents->numbers + body->place;
@@ -4947,8 +4975,7 @@ static int mstmm_at_laws_own(mstmm_state *state, int index)
     mstmm_frames_pivot_floor(
         .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
         .floor_ = block + MSTMM_BLOCK_FLOOR);
-    for (int j = 0; j < nu * nu; j++)
-        (tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq))[j] = 0;
+    mstmm_set_zero(tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq), nu * nu);
     if (body->modal) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -5133,8 +5160,7 @@ static int mstmm_at_laws_column(mstmm_state *state, int index)
     const int nu = body->nu;
     real *d_block = state->slope->workspace + body->block;
     memset(d_block + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
-    for (int j = 0; j < nu; j++)
-        (mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU))[j] = (state->column + body->u)[j];
+    mstmm_set(mstmm_of_speeds(d_block, nu, MSTMM_SPEED_TAU), state->column + body->u, nu);
     if (body->modal) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -5357,9 +5383,7 @@ MSTMM_AT_ONCE void mstmm_fetch_forward(const mstmm_state *state, int index, int 
     if (!body) return;
     real *block = state->workspace + body->block;
     const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_S, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_pass_forward(mstmm_state *state)
@@ -6284,10 +6308,12 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_condense(const mstmm_state *state, int in
     real *block = state->workspace + body->block;
     real *tangent = state->tangents->numbers + body->tangent;
     const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_HINGE_C + 6);
-    mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    const int nq = body->nq;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_HINGE_W + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
     mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 54);
     mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq) + nu * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq), tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + nq * nu);
     mstmm_fetch(body->rotor, body->body_p);
 }
 static int mstmm_pass_tangent_condense(mstmm_state *state)
@@ -6308,9 +6334,10 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_brought(const mstmm_state *state, int ind
     real *block = state->workspace + body->block;
     real *tangent = state->tangents->numbers + body->tangent;
     const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_HINGE_V, block + MSTMM_BLOCK_HINGE_C + 6);
-    mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    const int nq = body->nq;
+    mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
     mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_H(body->nu, body->nq) + 6 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq), tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + nq * nu);
     mstmm_fetch(body->rotor, body->body_p);
 }
 static int mstmm_pass_tangent_brought(mstmm_state *state)
@@ -6448,9 +6475,7 @@ MSTMM_AT_ONCE void mstmm_fetch_inverse_dynamics_chain(const mstmm_state *state, 
     if (!body) return;
     real *block = state->workspace + body->block;
     const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_S, mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_chain_inverse_dynamics(mstmm_state *state)
@@ -6556,9 +6581,7 @@ MSTMM_AT_ONCE void mstmm_fetch_factorisation_chain(const mstmm_state *state, int
     if (!body) return;
     real *block = state->workspace + body->block;
     const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_S, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_chain_factorisation(mstmm_state *state)
@@ -6736,10 +6759,12 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_condense_tile(const mstmm_state *state, i
     real *block = state->workspace + body->block;
     real *tangent = state->tangents->numbers + body->tangent;
     const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_HINGE_C + 6);
-    mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    const int nq = body->nq;
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_HINGE_W + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
     mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 54);
     mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_INVERSE(body->nu, body->nq) + nu * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq), tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + nq * nu);
     mstmm_fetch(body->rotor, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_tiles_tangent_condense(mstmm_state *state)
@@ -6777,10 +6802,11 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_brought_chain(const mstmm_state *state, i
     real *block = state->workspace + body->block;
     real *tangent = state->tangents->numbers + body->tangent;
     const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_HINGE_V, block + MSTMM_BLOCK_HINGE_C + 6);
-    mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    const int nq = body->nq;
+    mstmm_fetch(block + MSTMM_BLOCK_E, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
     mstmm_fetch(state->tangents->numbers + mstmm_carried_at(state->tangents, body), state->tangents->numbers + mstmm_carried_at(state->tangents, body) + 54);
     mstmm_fetch(tangent + MSTMM_TANGENT_B(body->nu, body->nq), tangent + MSTMM_TANGENT_H(body->nu, body->nq) + 6 * nu);
+    mstmm_fetch(tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq), tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + nq * nu);
     mstmm_fetch(body->rotor, body->body_p + MSTMM_RIGID_NUMBERS);
 }
 static int mstmm_chain_tangent_brought(mstmm_state *state)

@@ -56,6 +56,12 @@ int mstmm_solve_lu(
     int n, int m, const real *restrict a, const real *restrict b, real *restrict x,
     real *restrict work, real relative_pivot)
 {
+    if (n == 1) { /* no rows to exchange */
+        if (!(fabs(a[0]) > relative_pivot * fabs(a[0]))) return 1;
+        work[0] = 1 / a[0];
+        for (int j = 0; j < m; ++j) x[j] = b[j] * work[0];
+        return a[0] < 0 ? 2 : 0;
+    }
     int negative = 0;
     for (int i = 0; i < n * n; ++i) work[i] = a[i];
     for (int i = 0; i < n * m; ++i) x[i] = b[i];

@@ -14,6 +14,8 @@ from dataclasses import replace
 from mstmm.ir import KernelIR
 from mstmm.ir.tangent import jacobian, tangent
 
+from .across import across_kernels
+
 #: Suffix of the name of a differentiated kernel.
 SLOPE = "_slope"
 #: Kernels that give all derivatives of an output by a port, a row an entry of the port: name ->
@@ -86,7 +88,8 @@ _MOVING: dict[str, dict[str, tuple[str, str]]] = {
 
 
 def with_slopes(group: str, kernels: Iterable[KernelIR]) -> tuple[KernelIR, ...]:
-    """The kernels, and behind them the slopes of those that are differentiated."""
+    """The kernels, and behind them the slopes of those that are differentiated, and of hinges what
+    does several steps in one."""
     kernels = tuple(kernels)
     moving = _MOVING.get(group, {})
     slopes = [slope(k, *moving[k.name]) for k in kernels if k.name in moving]
@@ -94,6 +97,8 @@ def with_slopes(group: str, kernels: Iterable[KernelIR]) -> tuple[KernelIR, ...]
     for name, (kernel, port, output) in _WHOLE.get(group, {}).items():
         if next(p for p in known[kernel].inputs if p.name == port).length():
             slopes.append(replace(jacobian(known[kernel], port, output), name=name))
+    if group == "hinge":
+        slopes += across_kernels(known["hinge"])
     return (*kernels, *slopes)
 
 

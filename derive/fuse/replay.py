@@ -411,6 +411,7 @@ def _axial(replay: Replay, body: BodyStructure) -> bool:
 _TRAITS: dict[str, Callable[[Replay, BodyStructure], bool]] = {
     "own": lambda replay, body: False,
     "parts": lambda replay, body: True,
+    "whole": lambda replay, body: False,
     "staged": lambda replay, body: replay.staged,
     "axial": _axial,
     "special": lambda replay, body: replay.own_elimination(),

@@ -50,7 +50,7 @@ POINTED = {
         {
             k: k
             for k in ("hinge", "forward", "condense", "recover", "hinge_slope",
-                      "rates_by_coordinates", "rates_by_speeds")
+                      "rates_by_coordinates", "rates_by_speeds", "forward_kept", "directions")
         },
     ),
     "body": (

@@ -36,7 +36,7 @@ _HELD = {
 }
 _NAMES = re.compile(
     r"\bmstmm_(?!tangent_at\b|modal_of\b)"
-    r"(?=(?:state|fail|judged|solve_lu|(?:at|sweep|generic|frames|tangent|modal)_\w+)\b)"
+    r"(?=(?:state|fail|judged|solve_lu|set_zero|(?:at|sweep|generic|frames|tangent|modal)_\w+)\b)"
 )
 
 #: Numbers that begin at zero, and what is added to others.

@@ -6,7 +6,11 @@ from .storage import VARIABLES, reads
 
 #: C conditions of the traits.
 _TRAITS = {
-    "own": "!body->generic", "parts": "body->generic", "section": "body->section",
+    "own": "!(body->generic || state->required)",
+    "parts": "(body->generic || state->required)", "section": "body->section",
+    "whole": "body->kernels->forward_kept && !body->section"
+    " && (body->generic || state->required)",
+    "directed": "body->kernels->directions && !body->placed && speeds == body->nu",
     "outward": "body->section && !body->section->inward", "modal": "body->modal",
     "imposed": "mstmm_imposed(body, state->memory)", "idle": "mstmm_idle(state->observed, body)",
     "drag": "body->modal && body->modal->drag", "inverse": "state->given",

@@ -15,7 +15,12 @@ from .storage import BLOCK, PER_SPEED, SHARED, TANGENT, VARIABLES, place, reads,
 _NAMED = ("to", "source", "free", "imposed")
 _VARIABLES = ("block", "d_block", "tangent", "nu", "nq")
 #: Steps that few bodies of a scene take part in.
-_RARE = frozenset({"modal", "section", "outward", "placed", "drag", "imposed", "parts", "curved"})
+_RARE = {
+    **dict.fromkeys(
+        ("modal", "section", "outward", "placed", "drag", "imposed", "parts", "curved"), True
+    ),
+    "directed": False,
+}
 #: Numbers of the scene that passes read of a body, side by side (runtime/pack/records/bodies.py).
 _GIVEN = ("connection.R", "body.rotor", "hinge.p", "body.p")
 _FIRST = ("body->connection", "body->rotor", "body->hinge_p", "body->body_p")
@@ -61,7 +66,7 @@ def _slots(whole: Pass) -> Iterator[str]:
 
 
 def _slots_of(step: Step) -> Iterator[str]:
-    if never(step) or any(trait in _RARE and wanted for trait, wanted in step.traits):
+    if never(step) or any(_RARE.get(trait) == wanted for trait, wanted in step.traits):
         return
     if isinstance(step, Do) and step.whole is not None:
         yield from _slots(step.whole)

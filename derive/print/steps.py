@@ -305,6 +305,9 @@ class StepText:
                 return [f"{indent}memset({to}, 0, {size} * sizeof(real));"]
             source = self._place(step.source).text
             return [f"{indent}memcpy({to}, {source}, {size} * sizeof(real));"]
+        if size.startswith("nu"):
+            source = f", {self._place(step.source).text}" if step.source else ""
+            return [f"{indent}mstmm_set{'' if source else '_zero'}({to}{source}, {size});"]
         value = _entry(self._place(step.source).text) if step.source else "0"
         return [f"{indent}for (int j = 0; j < {size}; j++)",
                 f"{indent}    {_entry(to)} = {value};"]  # fmt: skip

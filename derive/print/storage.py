@@ -133,7 +133,8 @@ _PLACES = {
     "inboard.place": "state->tangents->numbers + mstmm_place_at(state->model, body->parent)",
     "inboard.z": "state->tangents->numbers + mstmm_place_at(state->model, body->parent)"
     " + MSTMM_PLACE_Z(0, 0)",
-    "step.rate": "&state->tangents->rate", "step.closing": "&state->closing",
+    "step.rate": "&state->tangents->rate", "step.s": "&state->tangents->s",
+    "step.closing": "&state->closing",
     "step.q": "&state->tangents->sq", "step.kappa": "&state->tangents->kappa",
     "body.rho": "state->tangents->rho + body->q",
     "body.change": "state->tangents->change + body->q",

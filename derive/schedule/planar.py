@@ -15,7 +15,7 @@ from .steps import Call, Do, Each, EachSpeed, Pass, Pick, Spread, Step
 _HOLDS = {
     **dict.fromkeys(("own", "free", "moving", "hinged", "known"), True),
     **dict.fromkeys(
-        ("parts", "staged", "section", "outward", "modal", "imposed", "distance", "plane",
+        ("parts", "whole", "staged", "section", "outward", "modal", "imposed", "distance", "plane",
          "rolling", "coupled", "soft", "corrected", "gaping", "placing", "slipping", "refined",
          "inverse", "balance", "kept", "unmoved"), False,
     ),

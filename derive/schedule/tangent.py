@@ -213,17 +213,25 @@ def _along_hinge(b: str, g: str, b_p: str, laws: str) -> tuple[Step, ...]:
 
 
 _HINGE = (
-    _CARRIER,
-    Along(
-        of="free",
-        steps=(
-            *_along_hinge(
-                "tangent.B[9 * c]", "tangent.G[6 * c]", "place.B[9 * c]", "tangent.laws[nu * c]"
+    call("hinge.directions", when="directed", **COORDINATES, s="body.s", motion="body.motion",
+         f="body.e", J="body.rotor", laws="tangent.laws", along="tangent.along", rate="step.rate",
+         scale="step.s", sq="step.q", **{name: f"tangent.{name}" for name in "BGWH"}),
+    *only(
+        "!directed",
+        _CARRIER,
+        Along(
+            of="free",
+            steps=(
+                *_along_hinge(
+                    "tangent.B[9 * c]", "tangent.G[6 * c]", "place.B[9 * c]",
+                    "tangent.laws[nu * c]",
+                ),
+                Pick(to="tangent.W[speeds * c]", source="local.change"),
             ),
-            Pick(to="tangent.W[speeds * c]", source="local.change"),
         ),
+        Pick(to="tangent.H", source="hinge.H", rows=6),
     ),
-)
+)  # fmt: skip
 
 LAG = Pass(
     "lag", "body", "How the coordinates of a hinge follow its speeds within a step.",
@@ -323,7 +331,7 @@ _TH = {"Rc": "body.R", "r": "body.r", "w_I": "parent.w", "v": "hinge.v", "w": "h
 #: What a body brings, linear in what its unknowns change: nothing here is eliminated.
 _COLUMNS = (
     *only("modal section", *_section("bend")),
-    *only("moving", *_HINGE, Pick(to="tangent.H", source="hinge.H", rows=6)),
+    *only("moving", *_HINGE),
     *only("outward", *_section("port")),
 )
 _ELIMINATED = (

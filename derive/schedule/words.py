@@ -289,6 +289,7 @@ inboard.S | 54 | tangent.S of the parent
 inboard.place | 54 | place.S of the parent
 inboard.z | 9 | place.z of the parent
 step.rate | 1 | change of the speeds along the unknowns
+step.s | 1 | change of the accelerations along them
 step.closing | 1 | accelerations that close a gap of one within a step
 step.q | 1 | inverse time by which coordinates follow speeds
 step.kappa | 1 | whether the rates' own slopes count
@@ -318,6 +319,8 @@ FIELDS = ("moments", "drag", "section")
 TRAITS: dict[str, str] = {
     "own": "the hinge's own kernels sweep across it, one a pass",
     "parts": "the hinge's motion is known; the steps for any hinge sweep across it",
+    "whole": "by parts, where one kernel gives the motion across the hinge and that of the body",
+    "directed": "a kernel of the hinge gives all its directions, nothing that goes by place",
     "staged": "by parts, and stage by stage: code for one scene, in which what is known folds",
     "axial": "the hinge is a screw about z that leaves its H as it is",
     "special": "every speed is free and without rotor, and the hinge has its own elimination",

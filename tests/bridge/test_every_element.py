@@ -20,8 +20,10 @@ ELEMENTS = [
 ]
 #: Elements whose kernels are those of others where some numbers are known.
 INSTANCES = {("sweep", "planar_pin")}
-#: Kernels made from others: all derivatives of an output.
-JACOBIANS = {"load_by_motion", "rates_by_coordinates", "rates_by_speeds"}
+#: Kernels made from others: all derivatives of an output, several steps in one.
+MADE = {
+    "load_by_motion", "rates_by_coordinates", "rates_by_speeds", "forward_kept", "directions",
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +43,7 @@ def test_element_agrees(kind: str, name: str, reports: dict[tuple[str, str], Rep
     report = reports[kind, name] = crosscheck(kind, name, points=1)
     assert report.passed, str(report)
     for kernel in report.kernels:
-        derived = kernel.kernel.endswith("_slope") or kernel.kernel in JACOBIANS
+        derived = kernel.kernel.endswith("_slope") or kernel.kernel in MADE
         derived |= (kind, name) in INSTANCES
         assert (kernel.equations is None) == derived
         assert kernel.compiled is not None
@@ -71,7 +73,7 @@ def test_what_no_run_calls_has_no_c() -> None:
         "hinge", "forward", "condense", "recover", "angle", "singularity", "inertia", "bias_load",
         "energy", "wrench", "linear", "full", "rotation", "six",
     }  # fmt: skip
-    by_name |= {f"{name}_slope" for name in by_name} | JACOBIANS
+    by_name |= {f"{name}_slope" for name in by_name} | MADE
     for (kind, name), element in prebuilt.elements().items():
         family = "generic" if name.startswith("generic") else short.get((kind, name))
         plain = kind in ("hinge", "body", "force") or name.startswith(("link_", "laws"))

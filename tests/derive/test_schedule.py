@@ -166,9 +166,9 @@ def test_a_pass_is_printed_from_its_description_alone() -> None:
     whole = Pass(
         "power_of_links", "body", "Power at P.",
         (
-            call("frames.velocity", when="own", Rc="body.R", r="body.r", v_I="parent.v",
+            call("frames.velocity", when="rigid", Rc="body.R", r="body.r", v_I="parent.v",
                  w_I="parent.w", v_rel="hinge.v", v="local.v"),
-            call("frames.speed_power", when="!own", tau="body.tau[2]", u="given.T", P="local.P"),
+            call("frames.speed_power", when="!rigid", tau="body.tau[2]", u="given.T", P="local.P"),
         ),
         skip="idle", given=("given.T",),
     )  # fmt: skip
@@ -176,6 +176,6 @@ def test_a_pass_is_printed_from_its_description_alone() -> None:
     assert "mstmm_at_power_of_links(mstmm_state *state, int index, real *given_T)" in text
     assert "if (mstmm_idle(state->observed, body)) return 0;" in text
     assert "real v[3]; real P[1];" in text
-    assert "if (!body->generic) {" in text
+    assert "if (body->kernels->rigid) {" in text
     assert "} else {" in text
     assert ".tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + 2, .u = given_T, .P = P" in text

@@ -12,8 +12,9 @@ static inline void mstmm_aim_nowhere(mstmm_state *state, const mstmm_body *body)
 {
     real *q = mstmm_aimed(state->slope->q) + body->q, *u = mstmm_aimed(state->slope->u) + body->u;
     real *given = mstmm_aimed(state->slope->given) + body->u;
-    for (int i = 0; i < body->nq; i++) q[i] = 0;
-    for (int j = 0; j < body->nu; j++) u[j] = given[j] = 0;
+    mstmm_set_zero(q, body->nq);
+    mstmm_set_zero(u, body->nu);
+    mstmm_set_zero(given, body->nu);
 }
 
 /* A coordinate alone, a speed alone. */

@@ -39,6 +39,11 @@ MSTMM_COMPLEX mstmm_complex mstmm_complex_plain(double number)
     return (mstmm_complex){number + (mstmm_lanes){0}, (mstmm_lanes){0}};
 }
 
+MSTMM_COMPLEX void mstmm_complex_set_zero(mstmm_complex *to, int n)
+{
+    for (int j = 0; j < n; j++) to[j] = mstmm_complex_plain(0);
+}
+
 MSTMM_COMPLEX mstmm_complex mstmm_complex_inverse(mstmm_complex a)
 {
     const mstmm_lanes square = a.re * a.re + a.im * a.im;

@@ -44,6 +44,7 @@ typedef struct {
     void (*hinge)(void), (*forward)(void), (*condense)(void), (*recover)(void);
     void (*inertia)(void), (*bias_load)(void), (*energy)(void);
     void (*rates_by_coordinates)(void), (*rates_by_speeds)(void);
+    void (*forward_kept)(void), (*directions)(void); /* NULL: step by step */
     void (*hinge_slope)(void), (*bias_load_slope)(void), (*load_by_motion)(void);
     /* NULL: no such connection */
     void (*link_angle)(void), (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
@@ -472,6 +473,30 @@ int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real 
 /* Its derivative along the direction at hand. */
 int mstmm_given_effort_slope(mstmm_state *state, const mstmm_tape *slope, const real *length,
                              const real *d_length, real *d_value);
+
+/* Compilers make calls of loops that set or copy numbers, which costs more than the few numbers of a
+ * hinge do; an empty piece of assembler keeps them loops. */
+#ifdef __GNUC__
+#define MSTMM_ONE_BY_ONE __asm__ volatile("")
+#else
+#define MSTMM_ONE_BY_ONE (void)0
+#endif
+
+static inline void mstmm_set_zero(real *to, int n)
+{
+    for (int j = 0; j < n; j++) {
+        to[j] = 0;
+        MSTMM_ONE_BY_ONE;
+    }
+}
+
+static inline void mstmm_set(real *to, const real *from, int n)
+{
+    for (int j = 0; j < n; j++) {
+        to[j] = from[j];
+        MSTMM_ONE_BY_ONE;
+    }
+}
 
 static const real mstmm_zeros[42] = {0};
 static const real mstmm_identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};

@@ -18,7 +18,7 @@ from .modal import ModalRecords
 
 _HINGE = (
     "hinge", "forward", "condense", "recover", "hinge_slope", "rates_by_coordinates",
-    "rates_by_speeds",
+    "rates_by_speeds", "forward_kept", "directions",
 )  # fmt: skip
 _BODY = ("inertia", "bias_load", "energy")
 #: Kernels that elements of earlier versions do not have.
