@@ -53,9 +53,10 @@ class _Stated:
         line = equation(shown, layout(right))
         if self.measure.line(line):
             return [line]
-        if isinstance(right, sp.BlockMatrix):
+        lines = self.hoisted(shown, right) or [line]
+        if isinstance(right, sp.BlockMatrix) and not self.measure.line(lines[0]):
             return self.of_blocks(shown, right)
-        return self.hoisted(shown, right) or [line]
+        return lines
 
     def rooted(self, matrix: sp.MatrixBase) -> tuple[list[Node], sp.MatrixBase]:
         """Long roots that stand in many places by a name, each stated once."""
