@@ -22,7 +22,6 @@ from scene.scenes import one
         ("1e3 mm", "write 1"),
         ("120 rpm", "write 12.5663706144"),
         ("3 bananas", "write the number alone, without quotes, in SI units and rad"),
-        ("30", "found '30'; write the number without quotes"),
     ],
 )
 def test_a_number_as_text_is_answered_with_the_number_to_write(written: str, words: str) -> None:

@@ -20,7 +20,7 @@ from pydantic_core import CoreSchema, core_schema
 from ...errors import ExpressionError
 from ...numbers.rotations import norm, unit
 from . import written
-from .units import instead, is_number, with_unit
+from .units import instead, with_unit
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 #: A body of the scene: its name, or the place of a chain's member, "rope[3]" or "rope[last]".
@@ -174,15 +174,14 @@ def finite(value: Any, expected: str, *place: str | int) -> float:
 def _of_text(text: str, expected: str, *place: str | int) -> float:
     """The number of a constant expression, or Refused."""
     hint, calculates = instead(text), bool(set(text) & _OPERATORS)
-    if not is_number(text):
-        try:
-            result = written.as_number(text)
-        except ExpressionError as error:
-            hint = with_unit(text) or (f"; {error}" if calculates else hint)
-        else:
-            if result is not None:
-                return result
-            hint = written.unknown(text) if calculates or written.constants() else hint
+    try:
+        result = written.as_number(text)
+    except ExpressionError as error:
+        hint = with_unit(text) or (f"; {error}" if calculates else hint)
+    else:
+        if result is not None:
+            return result
+        hint = written.unknown(text) if calculates or written.constants() else hint
     raise refuse(f"expected {expected}, found {found(text)}{hint}", *place)
 
 
