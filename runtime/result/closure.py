@@ -39,12 +39,14 @@ class Closure:
 
 
 def closure(model: Compiled, run: Trajectory) -> Closure | None:
-    """None for a tree, for hinges that are let go, whose gaps are none, and without samples."""
-    if model.closed is None or model.packed.releases or not len(run.t):
+    """None for a tree and without samples; loops that a release has opened have no gaps."""
+    if model.closed is None or not len(run.t):
         return None
     calls, gap, slip = LoopCalls(model.looped, np.array(run.q[0])), 0.0, 0.0
     for k in np.unique(np.linspace(0, len(run.t) - 1, _SAMPLES).astype(int)):
         q, u, t = np.array(run.q[k]), np.array(run.u[k]), float(run.t[k])
+        if model.packed.releases:
+            calls.memory = np.array(run.memory[k])
         gap = max(gap, _largest(calls, calls.gap, q, u, t))
         slip = max(slip, _largest(calls, calls.slip, q, u, t))
     alone = run.settings.method.endswith(ON_POSITIONS)
@@ -54,6 +56,8 @@ def closure(model: Compiled, run: Trajectory) -> Closure | None:
 def _largest(calls: LoopCalls, level: int, q: Array, u: Array, t: float) -> float:
     """Of what the rows lack at one state; nan where it cannot be evaluated."""
     try:
-        return float(np.abs(calls.correction(level, q, u, t=t)[1]).max(initial=0.0))
+        missing = calls.correction(level, q, u, t=t)[1]
+        missing[calls.let_go()] = 0.0
+        return float(np.abs(missing).max(initial=0.0))
     except NumericalFailure:
         return np.nan

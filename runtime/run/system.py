@@ -13,6 +13,7 @@ from mstmm.arrays import Array
 from mstmm.border.failures import Failed
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.ir.tape import Tape
+from mstmm.scene import Scene
 
 from ..engine.calls import Probe
 from ..engine.engine import Engine
@@ -138,7 +139,8 @@ class SceneSystem:
         run.event_tape = c_tape(ffi, tape, self.kept)
         probes = [Probe(*engine.packed.end(b + (f".{e}" if e else ""))) for b, e in ends]
         records = engine.probes(probes)
-        numbers = np.zeros(6 * len(probes) + int(engine.lib.MSTMM_PROBE_NUMBERS))
+        scratch = int(engine.lib.MSTMM_PROBE_NUMBERS) + engine.nq + engine.nu
+        numbers = np.zeros(6 * len(probes) + scratch)
         run.probes, run.n_probes = records, len(probes)
         run.probe_values = engine.pointer(numbers)
         table = ffi.new("mstmm_event_action[]", max(1, len(actions)))
@@ -147,6 +149,7 @@ class SceneSystem:
         for bounce in engine.packed.watched.bounces:
             self._bounce(table[bounce.event], bounce)
         run.events, run.n_events = table, len(actions)
+        run.closes = int(engine.packed.system.closes and _read_states(engine.packed.scene))
         run.n_switches = min(len(self.switches), MOST)
         self.kept += [records, numbers, table]
 
@@ -191,6 +194,13 @@ class SceneSystem:
     def components(self) -> StateNames:
         """A name per component of the state."""
         return StateNames(self.engine.packed.layout, self.with_power)
+
+
+def _read_states(scene: Scene) -> bool:
+    """Whether events or releases go by more than time."""
+    conditions = [one.when for one in scene.event]
+    conditions += [one.release for one in scene.hinge if one.release is not None]
+    return any(name.text != "t" for one in conditions for name in one.names)
 
 
 def _actions(engine: Engine) -> tuple[list[tuple[int, int]], list[str]]:

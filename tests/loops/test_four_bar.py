@@ -179,6 +179,8 @@ def test_a_hinge_that_lets_go(kind: str, cut: str) -> None:
     result = one.simulate(0.7, rtol=1e-10, atol=1e-12, output_times=[0.0, 0.2, 0.7])
     assert result.success, result.message
     assert np.abs(result.q[1] - result.q[0]).max() < 1e-9
+    closure = result.certificate.closure
+    assert closure is not None and closure.gap < 1e-12 and closure.slip < 1e-11
     if kind == "pin":
         free = linkage(cut, laws=False)
         free["hinge"][0]["initial"].pop("u")

@@ -225,17 +225,20 @@ static void remember_twists(mstmm_scene_run *run, const real *y)
     }
 }
 
-int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y)
+/* Unit quaternions, what drives say, and loops closed. */
+static int put_in_order(mstmm_scene_run *run, real t, real *y)
 {
     const mstmm_model *model = run->model;
     mstmm_unit_quaternions(run->n_quaternions, run->quaternions, y);
-    const int driven = mstmm_fill_driven(model, run->workspace, t, y, y + model->nq, run->memory,
-                                         &run->failure);
-    if (driven) return driven;
-    if (model->looped) {
-        const int code = mstmm_scene_close_loops(run, t, y);
-        if (code) return code;
-    }
+    const int code = mstmm_fill_driven(model, run->workspace, t, y, y + model->nq, run->memory,
+                                       &run->failure);
+    return code || !model->looped ? code : mstmm_scene_close_loops(run, t, y);
+}
+
+int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y)
+{
+    const int code = put_in_order(run, t, y);
+    if (code) return code;
     remember_twists(run, y);
     if (run->base) run->base->known = 0;
     return 0;
@@ -280,12 +283,23 @@ int mstmm_probes_seen(mstmm_scene_run *run, real t, const real *y, const real *u
     return 0;
 }
 
+/* A state inside a step, to be put in order behind the numbers of the probes. */
+static int seen_inside(mstmm_scene_run *run, real t, const real **y)
+{
+    real *own = run->probe_values + 6 * run->n_probes + MSTMM_PROBE_NUMBERS;
+    if (!run->closes) return 0;
+    memcpy(own, *y, (size_t)(run->model->nq + run->model->nu) * sizeof(real));
+    *y = own;
+    return put_in_order(run, t, own);
+}
+
 static int scene_events(void *context, double t, const double *y, double *g)
 {
     mstmm_scene_run *run = context;
+    int code = seen_inside(run, t, &y);
     const real *u = y + run->model->nq;
     mstmm_state state = state_of(run->model, run->workspace, t, run->memory, &run->failure);
-    const int code = mstmm_probes_seen(run, t, y, u);
+    if (!code) code = mstmm_probes_seen(run, t, y, u);
     if (code) return code;
     const real *inputs[] = {&t, y, u, run->probe_values, mstmm_input_numbers(&state)};
     real *outputs[] = {g};

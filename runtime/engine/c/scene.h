@@ -92,7 +92,8 @@ typedef struct {
     const mstmm_tape *event_tape; /* t, q, u, probe positions and velocities -> values */
     int n_probes;
     const mstmm_probe *probes;
-    real *probe_values; /* n_probes x 6, and MSTMM_PROBE_NUMBERS of scratch */
+    real *probe_values; /* n_probes x 6, MSTMM_PROBE_NUMBERS of scratch, and nq + nu of a state */
+    int closes;         /* events read states inside a step, whose loops must be closed first */
     int n_controllers;
     const struct mstmm_controller *controllers; /* see control.h */
     /* Code compiled for this scene, or NULL: see mstmm_scene_compiled */

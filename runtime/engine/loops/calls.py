@@ -62,6 +62,11 @@ class LoopCalls(LoopNumbers):
             raise engine.failed(failure, t, q, u)
         return change, missing[: self.count]
 
+    def let_go(self) -> list[int]:
+        """Rows of hinges that have been let go by `memory`."""
+        releases = (int(self.model.rows[row].release) for row in range(self.count))
+        return [row for row, place in enumerate(releases) if place >= 0 and self.memory[place]]
+
     def stressed(self, q: Array, asked: Array, give: float) -> Array:
         """Multipliers (rows,) of rows that lack `asked` and yield by `give`; see sweep.h."""
         engine, found = self.engine, np.zeros(max(1, self.count))
