@@ -125,8 +125,8 @@ def _controller(engine: Naming, element: int, at: str, code: int) -> str:
 def _loop(engine: Naming, element: int, at: str, code: int) -> str:
     return (
         f"{engine.closing(element)} {at}: the loop that it closes is open, and no state near "
-        "closes it; start from model.assemble(q, u), or see whether a drive asks for more than the "
-        "mechanism can do"
+        "closes it; start from model.assemble(q, u), or see whether links are stretched out in "
+        "line (model.loops.singular), or a drive asks for more than the mechanism can do"
     )
 
 

@@ -587,7 +587,7 @@ class Model(Compiled):
         """Integrate n independent trajectories to `t_end` (s).
 
         Args:
-            initial_states: q (n, nq) and u (n, nu); one of them may be a single row for all.
+            initial_states: q (n, nq) and u (n, nu); a single row serves all.
             parameters: numbers by name (as in `with_parameters`), (n,) or one for all.
             inputs: what inputs of the scene are, by their names: as in `simulate`, and numbers (n,)
                 for each, or (times, values) and the keys of a [[signal]] with values (n, m).

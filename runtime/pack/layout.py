@@ -195,6 +195,11 @@ class Layout:
                 yield replace(slots, name=_shown(slots.name))
         yield from self.modal.values()
 
+    def along(self, constraint: str) -> HingeSlots:
+        """Slots of a point's way along the curve of a constraint."""
+        ways = (self.slots(number) for number in self.internal)
+        return next(one for one in ways if one.name == f"{constraint}{OF_CONSTRAINT}")
+
     def _modal_at(self, entry: int, letter: str) -> HingeSlots | None:
         """The flexible body to which an entry of q or u belongs."""
         for slots in self.modal.values():

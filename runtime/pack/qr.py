@@ -9,6 +9,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
+from ..integrate.steppers import EXPLICIT_METHODS
 from .loops.refusal import refuse
 
 if TYPE_CHECKING:
@@ -74,5 +75,5 @@ def refuse_steps(packed: Packed) -> None:
     if packed.qr:
         raise SceneError(
             'sweep = "qr" makes accelerations, which implicit and classical methods do not ask '
-            'for; use an explicit one (dop853, dopri5, rk4), or sweep = "riccati"'
+            f'for; use {EXPLICIT_METHODS}, or sweep = "riccati"'
         )

@@ -14,6 +14,7 @@ from mstmm.ir.graph import Graph, Node
 from mstmm.ir.tape import Tape, compile_tape
 from mstmm.numbers.pieces import COUNT
 from mstmm.scene import Hinge
+from mstmm.scene.checks.names import ALONG
 
 from .layout import Layout
 
@@ -86,6 +87,9 @@ def resolver(
             first = slots.q if quantity == "q" else slots.u
             _refuse_beyond(name, hinge, index, slots.q_names if quantity == "q" else slots.u_names)
             return graph.element(quantity, first + index)
+        if quantity in ALONG and name.owner:
+            way, kind = layout.along(name.owner), "qu"[ALONG.index(quantity)]
+            return graph.element(kind, getattr(way, kind))
         if quantity in ("q", "u") and length:
             return graph.element("length", 0 if quantity == "q" else 1)
         if own is not None and quantity in own.parameters:

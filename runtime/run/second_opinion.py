@@ -23,6 +23,7 @@ from ..engine.jacobian import Jacobian
 from ..host.interruptible import interruptible
 from ..integrate.loop import Failure, Samples, Statistics, Status, failure_text
 from ..integrate.settings import Settings
+from ..integrate.steppers import EXPLICIT_METHODS
 from ..pack.loops.refusal import refuse
 from . import sundials
 from .crossings import Crossings, Sight, dip, just_before
@@ -135,7 +136,7 @@ def integrate(
     Raises SceneError for a fixed step, and by SUNDIALS for a scene without coordinates;
     EnvironmentFailure where the package is not installed.
     """
-    refuse(model.packed, f'method "{settings.method}"', "use dop853, dopri5 or rk4")
+    refuse(model.packed, f'method "{settings.method}"', f"use {EXPLICIT_METHODS}")
     if settings.step is not None:
         raise SceneError(f'method "{settings.method}" chooses its own steps: leave step out')
     if settings.method in sundials.METHODS:

@@ -185,6 +185,7 @@ def test_what_else_closes_is_counted_behind_the_hinges() -> None:
         (wire(curve=["s", "abs(s)", 0]), "curve[1]: it has no slope where 'abs(s)' switches"),
         (wire(curve=["s", "sqrt(s)", 0]), "its first two slopes is not finite at s = 0"),
         (wire(curve=["s^2", "cos(s)", 1]), "curve: it stands still at s = 0, so it has no"),
+        (wire(name="work"), '"work" is a quantity of every result; choose another name'),
         (wire(radius=1), 'radius: a "point-on-curve" has no radius; leave it out'),
         (arm(constraint=[{"type": "rolling", "from": "ground", "to": "rod2", "normal": [0, 1, 0]}]),
          "radius: missing; expected a number in m, more than 0"),

@@ -4,7 +4,7 @@ couple."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
 from ...expression.drive import motion_at
@@ -123,17 +123,23 @@ def _no_row(scene: SceneTables, coupling: Coupling) -> Iterator[str | None]:
     elif coupling.speeds is not None and rest:
         yield "it has a part without speeds; write that in equals"
     else:
-        yield _not_finite(scene, row)
+        yield _no_slope(scene, row, kept)
         yield _all_driven(scene, kept)
 
 
-def _not_finite(scene: SceneTables, row: Expression) -> str | None:
+def _no_slope(scene: SceneTables, row: Expression, kept: Collection[Name]) -> str | None:
+    """A row that is not finite at the start, or does not change there with any of what it keeps."""
     known = {name: _start(scene, name) for name in row.names}
-    values = [row.evaluate(known.__getitem__), *slopes(row, known.__getitem__).values()]
-    if all(map(math.isfinite, values)):
-        return None
+    found = slopes(row, known.__getitem__)
     at = ", ".join(f"{name.text} = {known[name]:g}" for name in row.names[:4])
-    return f"it or one of its slopes is not finite at the start ({at}); start elsewhere"
+    if not all(map(math.isfinite, (row.evaluate(known.__getitem__), *found.values()))):
+        return f"it or one of its slopes is not finite at the start ({at}); start elsewhere"
+    if not any(found[name] for name in kept):
+        return (
+            f"all of its slopes are 0 at the start ({at}), so nothing tells which way it goes; "
+            "start beside, or write what it keeps without the square"
+        )
+    return None
 
 
 def _start(scene: SceneTables, name: Name) -> float:

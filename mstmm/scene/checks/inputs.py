@@ -33,12 +33,16 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
         for i, element in enumerate(getattr(scene, table)):
             problem = problem_with_name(element.name)
             if not problem and element.name in OF_SCENE:
-                problem = f'"{element.name}" is a quantity of every result; choose another name'
+                problem = _taken(element.name)
             if not problem and taken.get(element.name, word) != word:
                 problem = f'"{element.name}" is also the name of {taken[element.name]}; rename one'
             taken[element.name] = word
             if problem:
                 yield (table, i, "name"), problem
+    for table in ("constraint", "coupling"):
+        for i, element in enumerate(getattr(scene, table)):
+            if element.name in OF_SCENE:
+                yield (table, i, "name"), _taken(element.name)
     yield from _outputs(scene)
     yield from _controllers(scene)
     signals = [signal.name for signal in scene.signal]
@@ -56,6 +60,10 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
                     (*place, "parameters"),
                     f'"{name}" is also the name of {taken[name]} of the scene; rename that',
                 )
+
+
+def _taken(name: str) -> str:
+    return f'"{name}" is a quantity of every result; choose another name'
 
 
 def _outputs(scene: SceneTables) -> Iterator[Problem]:

@@ -26,6 +26,8 @@ def flexible(scene: SceneTables) -> dict[str, Modal]:
     return beams | {elastic.name: None for elastic in scene.elastic}
 
 
+#: Of a point on a curve: where along it, and how fast.
+ALONG = ("s", "s_rate")
 POSITIONS = ("x", "y", "z", "vx", "vy", "vz")
 
 
@@ -36,7 +38,7 @@ class Scope:
     `own` is the hinge whose `q`, `u` and parameters need no prefix, `spring` means that `q` and
     `u` are a length and its rate, `positions` allows x, y, z, vx, vy, vz of bodies and ends.
     `flexible` are the flexible bodies by name, whose q and u are the modal coordinates; `inputs`
-    are the names of inputs and signals.
+    are the names of inputs and signals, `curves` of constraints to a curve.
     """
 
     hinges: Hinges
@@ -46,12 +48,15 @@ class Scope:
     positions: bool = False
     flexible: Mapping[str, Modal] = field(default_factory=dict)
     inputs: Collection[str] = ()
+    curves: Collection[str] = ()
 
 
 def problem_with(name: Name, scope: Scope) -> str | None:
     """Why the name means nothing in this scope; None where it means something."""
     if len(name.parts) == 1:
         return _bare(name, scope)
+    if name.owner in scope.curves:
+        return _along(name)
     if name.owner in scope.flexible and name.quantity not in POSITIONS:
         return _modal(name, scope.flexible[name.owner])
     if name.quantity in ("q", "u") and (len(name.parts) == 2 or name.is_member):
@@ -98,6 +103,14 @@ def _modal(name: Name, modes: Modal) -> str | None:
         f"{name.text!r} is unknown; of a flexible body there is {name.owner}.q[0], "
         f"{name.owner}.u[0], and in events x, y, z, vx, vy, vz of it and its ends"
     )
+
+
+def _along(name: Name) -> str | None:
+    """A point's way along a curve: wire.s, wire.s_rate."""
+    if len(name.parts) == 2 and name.quantity in ALONG and name.index is None:
+        return None
+    own = " and ".join(f"{name.owner}.{one}" for one in ALONG)
+    return f"{name.text!r} is unknown; of a point on a curve there is {own}"
 
 
 def _indexed(name: Name, hinge: Hinge, called: str) -> str | None:

@@ -13,6 +13,7 @@ from ...risk import Risk
 from ..rules.inertia import negative_moment, triangle_excess
 from ..rules.messages import MAX_PROBLEMS, TABLES, Problem, near
 from ..rules.values import GROUND, Location, split
+from ..tables.closures import CURVE
 from . import constraints, couplings, inputs, topology
 from . import flexible as flexible_bodies
 from .angles import notes
@@ -197,7 +198,8 @@ def risks(scene: SceneTables) -> tuple[Risk, ...]:
 
 def _expressions(scene: SceneTables) -> Iterator[Problem]:
     hinges, bodies = scene.hinges, scene.skeleton.bodies
-    anywhere = Scope(hinges, bodies, flexible=flexible(scene), inputs=scene.channels)
+    curves = {one.name for one in scene.constraint if one.type == CURVE}
+    anywhere = Scope(hinges, bodies, flexible=flexible(scene), inputs=scene.channels, curves=curves)
     in_events = replace(anywhere, positions=True)
     for i, hinge in enumerate(scene.hinge):
         own = replace(anywhere, own=hinge)

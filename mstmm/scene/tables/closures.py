@@ -140,6 +140,12 @@ class Coupling(Table):
         return row
 
     @property
+    def goes_by_time(self) -> bool:
+        """Whether it moves what it couples, as a drive does."""
+        by = self.equals
+        return by is not None and not by.is_zero if self.speeds else bool(by and by.names)
+
+    @property
     def names(self) -> tuple[Name, ...]:
         """What it couples."""
         return self.row.names

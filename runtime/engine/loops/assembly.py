@@ -172,7 +172,8 @@ class Assembly:
 
     def _rest(self, q: Array) -> float:
         missing = self.calls.correction(self.calls.gap, q, self._still, _ALONE)[1]
-        return float(np.sum(self._weights * missing**2))
+        with np.errstate(over="ignore"):  # what is asked may be beyond all squares
+            return float(np.sum(self._weights * missing**2))
 
     def _largest(self, missing: Array) -> float:
         return float(np.abs(missing).max(initial=0.0))

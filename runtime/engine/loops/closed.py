@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -135,6 +135,12 @@ class Closed:
         rank, calls = rank_at(self.engine, q), LoopCalls(self.engine, q)
         packed, records = self.engine.packed, calls.records
         names = self._names(calls)
+        if rank.stuck and not self._is_led:
+            raise SceneError(
+                f"scene: {_ending(names[row][0] for row in sorted(rank.here))} in a pose that no "
+                "motion leaves, stretched out or folded in line; change a length or the place of "
+                "a hinge a little, so that they close in more than this pose"
+            )
         met = [row for row in range(calls.count) if not records.yields(row)]
         rows = len(met) - len(rank.here)
         couplings = {one.coupling.name for one in records.couplings if one.row in rank.going}
@@ -164,17 +170,20 @@ class Closed:
         return told, {row: names[row] for row in sorted(rank.going)}
 
     def _refuse_structure(self) -> None:
-        """SceneError where nothing can move, and nobody drives it."""
-        packed = self.engine.packed
-        if self.loops.mobility > 0 or packed.system.driven or packed.releases:
+        """SceneError where nothing can move, and nothing that goes by time moves it."""
+        if self.loops.mobility > 0 or self._is_led:
             return
-        closing = list(dict.fromkeys(name for name, _ in self.loops.rows))
-        cut = ", ".join(f'"{name}"' for name in closing[:_NAMED])
-        more = " ..." if len(closing) > _NAMED else ""
         raise SceneError(
-            f"scene: no freedom is left with the loops closed that end at {cut}{more}: a "
+            f"scene: no freedom is left, and {_ending(name for name, _ in self.loops.rows)}: a "
             "structure; take a hinge with more coordinates, or a [[spring]] in place of one of them"
         )
+
+    @property
+    def _is_led(self) -> bool:
+        """Whether drives, couplings that go by time or releases may move what nothing else does."""
+        packed = self.engine.packed
+        led = any(one.goes_by_time for one in packed.described.coupling)
+        return led or bool(packed.system.driven or packed.releases)
 
     def _refuse_locked(
         self, calls: LoopCalls, repeating: Mapping[int, tuple[str, str]], much: float
@@ -225,6 +234,12 @@ class Closed:
                 coupling.coupling.name, _COUPLED[coupling.coupling.of_speeds]
             )  # fmt: skip
         return names
+
+
+def _ending(closing: Iterable[str]) -> str:
+    """Loops by what closes them, the first by name."""
+    names = [f'"{name}"' for name in dict.fromkeys(closing)]
+    return f"loops close at {', '.join(names[:_NAMED])}{' ...' if len(names) > _NAMED else ''}"
 
 
 def _words(sizes: Array) -> list[str]:

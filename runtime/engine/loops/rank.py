@@ -28,6 +28,8 @@ from .stress import not_unique
 REPEATED = 1e-6
 #: Closed states nearby: how many, and how far (rad, m).
 _NEIGHBOURS, _AWAY = 3, 3e-2
+#: A closed state that is nearer than this part of the way asked for is the pose itself.
+_BACK = 0.1
 #: A row that repeats others here does so there too where its pivot is not this many times larger,
 #: or not larger than rounding, in parts of the mobility.
 _RAISED, _ROUNDING = 1e2, 1e-12
@@ -42,7 +44,8 @@ class Rank:
     of these that go: the others take the place of another row of their hinge where that one says
     nothing, at a pose farther away.  `states` are those that were looked at, this one first,
     `not_unique` the components of loads that rows which always repeat others leave open, and
-    `nearby` is how few repeat others in any of the states.
+    `nearby` is how few repeat others in any of the states.  `stuck`: motions that close the loops
+    to first order lead back to the pose from wherever they go, as of links stretched out in line.
     """
 
     here: frozenset[int]
@@ -51,6 +54,7 @@ class Rank:
     states: tuple[Array, ...]
     not_unique: Mapping[str, tuple[str, ...]]
     nearby: int
+    stuck: bool = False
 
     @property
     def singular(self) -> bool:
@@ -68,17 +72,29 @@ def rank_at(engine: Engine, q: Array) -> Rank:
     raised = _RAISED * np.abs(calls.pivots()) + _ROUNDING * calls.mobility
     level[list(here)] = np.minimum(level, raised)[list(here)]
     always, draw, states, nearby = here, np.random.default_rng(0), [q], len(here)
+    ways = list[float]()
     for _ in range(_NEIGHBOURS):
         near = _neighbour(calls, q, draw.uniform(-1.0, 1.0, engine.nu))
         if near is not None:
             there = _repeating(calls, near, level)
             always, nearby = always & there, min(nearby, len(there))
             states.append(near)
+            ways.append(_way(calls, near - q))
+    stuck = max(ways, default=_AWAY) < _BACK * _AWAY
     gaps = calls.correction(calls.gap, q, np.zeros(engine.nu))[1]
     closed = np.abs(gaps).max() <= _CLOSED
     going = always - _stand_ins(calls, q, always) if closed else always
     loads = not_unique(calls, q if here == always else states[-1]) if always else {}
-    return Rank(here, always, going, tuple(states), loads, nearby)
+    return Rank(here, always, going, tuple(states), loads, nearby, stuck)
+
+
+def _way(calls: LoopCalls, change: Array) -> float:
+    """The largest change of q (nq,), own coordinates of cut hinges left out, which follow."""
+    own, packed = change.copy(), calls.engine.packed
+    for cut in packed.expanded.cuts:
+        if cut.constraint is None:
+            own[packed.layout.hinges[cut.hinge].q_slice] = 0.0
+    return float(np.abs(own).max(initial=0.0))
 
 
 def judging(engine: Engine, q: Array) -> LoopCalls:

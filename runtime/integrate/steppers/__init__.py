@@ -21,6 +21,7 @@ __all__ = [
     "AUTO_EXPLICIT",
     "BUILT_IN",
     "EXPLICIT",
+    "EXPLICIT_METHODS",
     "IMPLICIT",
     "ON_POSITIONS",
     "TANGENTS",
@@ -45,6 +46,9 @@ IMPLICIT = (
     "genalpha-index3", "hht-index3",
 )  # fmt: skip
 BUILT_IN = EXPLICIT + IMPLICIT
+
+#: Explicit methods, as messages name those that follow what others cannot.
+EXPLICIT_METHODS = f"{', '.join(EXPLICIT[:-1])} or {EXPLICIT[-1]}"
 
 #: Methods that leave a spectral radius to infinitely fast motion, which a run may choose.
 WITH_RADIUS = ("genalpha", "dttmm", "genalpha-index3")

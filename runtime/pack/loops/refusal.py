@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 from mstmm.errors import SceneError
 from mstmm.scene.checks.topology import build
 
+from ...integrate.steppers import EXPLICIT_METHODS
 from .unknown import named_loop
 
 if TYPE_CHECKING:
     from ..packed import Packed
 
 #: What does follow closed loops.
-INSTEAD = "accelerations and simulate with dop853, dopri5 or rk4 do"
+INSTEAD = f"accelerations and simulate with {EXPLICIT_METHODS} do"
 
 
 def refuse(packed: Packed, what: str, instead: str) -> None:

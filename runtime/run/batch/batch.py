@@ -26,12 +26,13 @@ from ...breaks.acting import acting
 from ...integrate.loop import Failure, Run, Status, failure_text
 from ...integrate.settings import Settings, checked
 from ...integrate.steppers import AUTO, check_size, check_steps, get
+from ...pack.parameters import changed
 from ...pack.switches import has_switches
 from .. import classical, second_opinion
 from ..simulate import advance, choice_of, make_run, said, settled, trajectory
 from ..stretches import Stretch
 from ..system import SceneCode, SceneSystem
-from .inputs import BatchInput, BatchInputs, batch_inputs
+from .inputs import BatchInput, BatchInputs, batch_inputs, rows_of
 from .lanes import LaneInputs, Lanes, run_lanes
 from .threads import on_threads
 
@@ -90,26 +91,33 @@ def simulate_batch(
     threads: int | None,
 ) -> BatchResult:
     """See `Model.simulate_batch`; settings hold the output times."""
+    if len(q) == 1:  # one start serves as many as there are numbers
+        given = by_name("parameters", parameters) | by_name("inputs", inputs or {})
+        many = max([1, *(rows_of(name, value) for name, value in given.items())])
+        q, u = np.repeat(q, many, axis=0), np.repeat(u, many, axis=0)
     n, times = len(q), np.asarray(settings.output_times)
     alone_only = settings.method == AUTO or get(settings.method).implicit
-    models, given = _models(model, parameters, n), batch_inputs(model, inputs, n)
-    alone_only = alone_only or (n > 0 and given.moves_breaks(model))
+    made, by_row = _models(model, parameters, n), batch_inputs(model, inputs, n)
+    models = [model if isinstance(one, MstmmError) else one for one in made]
+    failed = np.array([isinstance(one, MstmmError) for one in made], bool)
+    alone_only = alone_only or (n > 0 and by_row.moves_breaks(model))
     library = None if alone_only else _lanes(model)
     count = min(threads_of(threads) or os.cpu_count() or 1, max(1, n))
     rows = _Rows(
-        np.full((n, len(times), model.nq + model.nu), np.nan),
-        np.zeros(n, dtype=bool), [""] * n, np.zeros(n, dtype=np.int64), [()] * n,
+        np.full((n, len(times), model.nq + model.nu), np.nan), np.zeros(n, dtype=bool),
+        [str(one) if isinstance(one, MstmmError) else "" for one in made],
+        np.zeros(n, dtype=np.int64), [()] * n,
     )  # fmt: skip
     alike = _of_equal_times(model, models, settings)
     closing = bool(model.packed.system.closures)  # by numbers that all share
     ours = np.array([library is not None and alike[id(m)] and m.fusion.lanes is library
-                     and (m is model or not closing) for m in models], bool)  # fmt: skip
+                     and (m is model or not closing) for m in models], bool) & ~failed  # fmt: skip
     if library is not None and ours.any():
         which = np.flatnonzero(ours)
-        _side_by_side(model, library, models, given, settings, q, u, which, rows, count)
-    alone = np.flatnonzero(~ours)
+        _side_by_side(model, library, models, by_row, settings, q, u, which, rows, count)
+    alone = np.flatnonzero(~(ours | failed))
     if len(alone):
-        _one_by_one(models, given, settings, q, u, alone, rows, count)
+        _one_by_one(models, by_row, settings, q, u, alone, rows, count)
     how = "one after the other" if library is None else f"{library.lanes} side by side"
     nq = model.nq
     return BatchResult(
@@ -119,8 +127,11 @@ def simulate_batch(
     )  # fmt: skip
 
 
-def _models(model: Compiled, parameters: Mapping[str, ArrayLike], n: int) -> list[Compiled]:
-    """The model of each trajectory; equal numbers share one.
+def _models(
+    model: Compiled, parameters: Mapping[str, ArrayLike], n: int
+) -> list[Compiled | MstmmError]:
+    """The model of each trajectory, or why there is none, as where its loops stay open; equal
+    numbers share one.
 
     Raises SceneError for a name or a value that the scene refuses, naming the trajectory.
     """
@@ -132,17 +143,25 @@ def _models(model: Compiled, parameters: Mapping[str, ArrayLike], n: int) -> lis
         if column.shape not in ((), (n,)):
             raise SceneError(f'parameter "{name}" has shape {column.shape}, expected ({n},)')
         columns[name] = np.broadcast_to(column, (n,))
-    made: dict[tuple[float, ...], Compiled] = {}
+    made: dict[tuple[float, ...], Compiled | MstmmError] = {}
     found = []
     for i in range(n):
         row = tuple(float(column[i]) for column in columns.values())
         if row not in made:
-            try:
-                made[row] = model.with_parameters(dict(zip(columns, row, strict=True)))
-            except SceneError as error:
-                raise SceneError(f"trajectory {i}: {error}") from None
+            made[row] = _made(model, dict(zip(columns, row, strict=True)), i)
         found.append(made[row])
     return found
+
+
+def _made(model: Compiled, numbers: dict[str, float], i: int) -> Compiled | MstmmError:
+    try:
+        return model.with_parameters(numbers)
+    except MstmmError as error:
+        try:
+            changed(model.scene, numbers)
+        except SceneError as refused:
+            raise SceneError(f"trajectory {i}: {refused}") from None
+        return error
 
 
 def _of_equal_times(model: Compiled, models: list[Compiled], settings: Settings) -> dict[int, bool]:

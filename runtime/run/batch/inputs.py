@@ -82,6 +82,17 @@ def batch_inputs(model: Compiled, inputs: Mapping[str, BatchInput] | None, n: in
     return BatchInputs(rows)
 
 
+def rows_of(name: str, value: Any) -> int:
+    """For how many trajectories a number or an input is given; 1 where it serves all."""
+    if isinstance(value, str):
+        return 1
+    over_time, of_each = isinstance(value, Mapping) or _is_pair(value), value
+    if over_time:
+        of_each = value.get("values", 0.0) if isinstance(value, Mapping) else value[1]
+    found = numbers(name, of_each)
+    return len(found) if found.ndim == 1 + over_time else 1
+
+
 def _refuse_drives(model: Compiled, given: Mapping[str, Any]) -> None:
     for one in acting(model.scene):
         driving = [name for name in one.inputs if one.drive and name in given]

@@ -129,7 +129,7 @@ BAD: dict[str, tuple[list[Scene], Scene, Scene, str]] = {
     "given speeds": ([GEAR], {"initial": {"u": 1.0}}, {"initial": {"u": 1.0}},
                      'given for "A", "B" contradict each other by 4 in coupling "gear"; give'),
     "two on one freedom": ([GEAR, {"expression": "A.q + 2*B.q"}], {}, {},
-                           'no freedom is left .* at "gear", "coupling2": a structure; take'),
+                           'no freedom is left, .* at "gear", "coupling2": a structure; take'),
     "both driven": ([GEAR], {"drive": "t"}, {"drive": "2*t"},
                     "a drive says already how A.q and B.q goes; leave one drive or"),
 }  # fmt: skip

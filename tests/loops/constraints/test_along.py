@@ -1,0 +1,55 @@
+"""Loads and events that read how far a point has come along its curve."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.integrate
+
+import mstmm
+
+from .scenes import Scene
+
+#: Slope of a straight wire, what the wind gives by the way, and what drags, N and N s.
+SLOPE, WIND, DRAG = 0.5, 0.1, 0.7
+
+
+def bead(when: str) -> Scene:
+    """1 kg on a straight wire; s is x."""
+    return {
+        "gravity": [0, -9.81, 0],
+        "body": [{"name": "bead", "mass": 1.0, "inertia": [0.1, 0.1, 0.1]}],
+        "hinge": [{"name": "free", "type": "free", "inboard": "ground", "outboard": "bead"}],
+        "constraint": [{"name": "wire", "type": "point-on-curve", "from": "ground", "to": "bead",
+                        "curve": ["s", f"-{SLOPE}*s", "0"]}],
+        "load": [{"name": "wind", "on": "bead",
+                  "force": [f"{WIND}*wire.s - {DRAG}*wire.s_rate", 0, 0]}],
+        "event": [{"name": "there", "when": when, "do": "stop"}],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("when", "entry"), [("wire.s > 1", 0), ("wire.s_rate > 1", 1)])
+def test_a_bead_against_its_own_equation(when: str, entry: int) -> None:
+    """(1 + slope^2) s'' = g slope + wind s - drag s', by SciPy."""
+
+    def rates(t: float, y: np.ndarray[tuple[int], np.dtype[np.float64]]) -> list[float]:
+        push = 9.81 * SLOPE + WIND * y[0] - DRAG * y[1]
+        return [float(y[1]), float(push) / (1 + SLOPE**2)]
+
+    def there(t: float, y: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
+        return float(y[entry]) - 1.0
+
+    there.terminal = True  # type: ignore[attr-defined]
+    found = scipy.integrate.solve_ivp(
+        rates, (0.0, 2.0), [0.0, 0.0], "DOP853", events=there, rtol=1e-12, atol=1e-13
+    )
+    run = mstmm.compile(mstmm.Scene(**bead(when)), engine="looped").simulate(2.0, rtol=1e-10)
+    assert "stopped by event" in run.message
+    assert run.t[-1] == pytest.approx(found.t[-1], abs=1e-8)
+    assert [run.q[-1, -1], run.u[-1, -1]] == pytest.approx(found.y[:, -1], abs=1e-8)
+
+
+@pytest.mark.parametrize("when", ["wire.q > 1", "wire.s[0] > 1", "wire.x > 1"])
+def test_what_a_curve_does_not_have(when: str) -> None:
+    with pytest.raises(mstmm.SceneError, match=r"unknown; .* there is wire.s and wire.s_rate"):
+        mstmm.Scene(**bead(when))
