@@ -16,14 +16,15 @@ from .doctor import doctor
 from .generate import generate
 from .import_robot import import_robot
 from .listing import list_elements
+from .pictures.plot import plot
+from .pictures.view import view
+from .pictures.write_report import report
 from .show import show
 from .simulate import simulate
 from .studies.advise import advise
 from .studies.chart import chart
 from .studies.linear import frf, linearize, modes
 from .studies.stability import stability
-from .view import view
-from .write_report import report
 
 
 class Commands(TyperGroup):
@@ -77,6 +78,7 @@ app.command("demo")(demo)
 app.command("simulate")(simulate)
 app.command("view")(view)
 app.command("report")(report)
+app.command("plot")(plot)
 app.command("chart")(chart)
 app.command("advise")(advise)
 app.command("linearize")(linearize)

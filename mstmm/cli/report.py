@@ -70,36 +70,18 @@ def method_lines(result: Result, width: int) -> list[str]:
 
 def fitting_table(result: Result, names: tuple[str, ...], rows: int, width: int) -> str:
     """Some samples; columns that nobody asked for are left out where the terminal is narrow."""
+    from mstmm.runtime.result.output.table import default_names
+
     pictures = result.pictures()
     numbers = [name for name in names if name not in pictures]
     if numbers:
         return result.table(*numbers, rows=rows)
-    chosen = [*default_quantities(result), "energy"]
+    chosen = [*default_names(result), "energy"]
     text = result.table(*chosen, rows=rows)
     while len(chosen) > 1 and max(map(len, text.splitlines())) > width:
         del chosen[-2]
         text = result.table(*chosen, rows=rows)
     return text
-
-
-def default_quantities(result: Result) -> list[str]:
-    """What to show if nobody asked: hinge coordinates, or where the last body's last end is.
-
-    The second is for scenes whose coordinates are all quaternions.
-    """
-    from mstmm.runtime.result.output.table import default_names
-
-    scene = result.model.scene
-    body = scene.skeleton.bodies[-1]
-    tip = ".".join([body.name, *list(body.ends)[-1:]])
-    return default_names(result) or [f"{tip}.{axis}" for axis in "xyz"]
-
-
-def default_panels(result: Result) -> list[str]:
-    """What to draw if nobody asked: shapes of flexible bodies, and what the table shows."""
-    from mstmm.runtime.result.output.table import default_pictures
-
-    return [*default_pictures(result), *default_quantities(result)] or ["energy"]
 
 
 def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:

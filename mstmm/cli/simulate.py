@@ -33,6 +33,7 @@ from .options import (
     times,
     with_inputs,
 )
+from .pictures.plot import PICTURES, RESULTS
 from .progress import Bar, bar, waiting
 
 if TYPE_CHECKING:
@@ -41,8 +42,6 @@ if TYPE_CHECKING:
     from mstmm.runtime.result.verdict import Verdict
     from mstmm.scene import Scene
 
-RESULTS = (".nc", ".csv")
-PICTURES = (".png", ".svg", ".pdf")
 
 #: A run shorter than this (s) is followed by the second one that estimates its error.
 SHORT = 2.0
@@ -160,8 +159,8 @@ def simulate(
     ] = None,
     output: Annotated[
         str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Result, .nc or .csv; by default the "
-                     "scene's name, here."),
+        typer.Option("--output", "-o", metavar="FILE", help="Result, .nc, .csv or .mat; by default "
+                     "the scene's name, here."),
     ] = None,
     plot: Annotated[
         str | None,
@@ -241,7 +240,6 @@ def simulate(
     )  # fmt: skip
     _refuse_endless(plan)
     _refuse_beside_error(plan)
-    from . import report
 
     need_for(plan.output, "--output")
     if plan.plot is not None:
@@ -256,8 +254,7 @@ def simulate(
         with _kept_if_it_fails(plan.checkpoint):
             result = _saved(plan, result, seconds, progress)
     if plan.plot is not None:
-        names = plan.quantities or report.default_panels(result)
-        result.plot(*names, path=plan.plot, title=Path(plan.scene).stem)
+        result.plot(*plan.quantities, path=plan.plot, title=Path(plan.scene).stem)
     _report(plan, result, seconds + result.trajectory.before, json, refused)
     if interrupted(result):
         raise typer.Exit(130)

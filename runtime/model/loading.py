@@ -17,6 +17,7 @@ from ..host.files import refuse_special, seal_is_broken
 from ..kernels import store
 from ..kernels.identity import kernels_hash
 from ..result.output import provenance
+from ..result.output.columns import READERS, Columns
 from ..result.result import Result
 from ..run.stability import check_step
 from ..run.trajectory import Trajectory
@@ -24,12 +25,26 @@ from .model import Model
 from .results import result_of
 
 
-def load_result(path: str | Path) -> Result:
-    """A result saved as NetCDF, with its scene compiled again, so that every quantity is there.
+def load_result(path: str | Path) -> Result | Columns:
+    """A result that was saved: of NetCDF with its scene compiled again, so that every quantity is
+    there; of CSV and MATLAB files (.csv, .mat) the columns, which can be drawn and compared.
 
     Raises SceneError if the file is no such result, EnvironmentFailure if the extra io is missing.
     """
     path = Path(path)
+    refuse_special(path, "result file")
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        return load_netcdf(path)
+    if not path.is_file():
+        raise SceneError(f'result file "{path}": there is no such file')
+    found = reader(path)
+    found.lost = frozenset(dir(Result)) - frozenset(dir(found))
+    return found
+
+
+def load_netcdf(path: Path) -> Result:
+    """A result saved as NetCDF; see `load_result`."""
     refuse_special(path, "result file")
     try:
         import h5netcdf  # noqa: F401

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -14,6 +14,7 @@ from .certificate import Certificate
 from .record import Record
 
 if TYPE_CHECKING:
+    from .plotting.shown import Shown
     from .view.view import View
 
 
@@ -60,6 +61,12 @@ class Result(Record):
 
         return tuple(names(self))
 
+    def candidates(self) -> list[str]:
+        """Names of what `plot` and `table` choose from if nobody chooses."""
+        from .plotting.choice import candidates
+
+        return candidates(self)
+
     # --- out ------------------------------------------------------------------------------------
 
     def to_xarray(self) -> Any:
@@ -69,7 +76,8 @@ class Result(Record):
         return dataset(self)
 
     def save(self, path: str | Path) -> Path:
-        """Write ".nc" (NetCDF, extra: io) or ".csv" (a column per number); returns the path.
+        """Write ".nc" (NetCDF, extra: io), ".csv" (a column per number) or ".mat" (for MATLAB, a
+        variable per number); returns the path.
 
         The file appears under its name when it is whole; then the checkpoint of a run that has
         ended is removed.  EnvironmentFailure if the extra is missing or the file cannot be written.
@@ -87,16 +95,41 @@ class Result(Record):
 
         return table(self, names, rows)
 
-    def plot(self, *names: str, path: str | Path | None = None, title: str | None = None) -> Any:
+    def plot(
+        self,
+        *names: str,
+        path: str | Path | None = None,
+        title: str | None = None,
+        ax: Any = None,
+        against: str | None = None,
+        kind: str = "time",
+        beside: Mapping[str, Shown] | None = None,
+        label: str = "this run",
+    ) -> Any:
         """`matplotlib` figure of quantities by name, one panel per unit (extra: plot).
 
-        Names of `pictures` draw flexible bodies.  Without names, the hinge coordinates, and the
-        shapes and tip deflections of flexible bodies.  With `path`, also written there (.png, .svg,
-        .pdf).
-        """
-        from .output.plot import plot
+        Names of `pictures` draw flexible bodies.  Without names: the shapes of flexible bodies, and
+        of the outputs of the scene, or else of coordinates, Euler angles and deflections, those
+        that move most; the legend says what was left out.  With `path`, also written there (.png,
+        .svg, .pdf).
 
-        return plot(self, names, None if path is None else Path(path), title)
+        Args:
+            ax: axes of a figure of yours to draw into, or a list with one for each panel.
+            against: a quantity to draw over, instead of the time.
+            kind: "time"; "phase", the rate of each quantity over itself; "spectrum", amplitudes
+                over the frequency in Hz (Hann's window, the mean taken away).
+            beside: other runs by their labels, drawn into the same panels; `label` is that of this
+                one.  They may be files of columns, or of other scenes.
+
+        Raises SceneError for names, kinds and files that there are not, and for a phase or spectrum
+        of what has none.
+        """
+        from .plotting.figure import plot_of
+
+        return plot_of(
+            self, names, path=path, title=title, ax=ax, against=against, kind=kind, beside=beside,
+            label=label,
+        )  # fmt: skip
 
     def view(
         self,

@@ -1,7 +1,9 @@
-"""`mstmm view` and `mstmm report`: what they write and print, and what they refuse."""
+"""`mstmm view`, `report` and `plot`: what they write and print, and what they refuse."""
 
 from __future__ import annotations
 
+import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -57,3 +59,59 @@ def test_a_report(mstmm: Command, folder: Path) -> None:
     assert "read.html: a page" in done.out
     assert (folder / "read.html").stat().st_size > 100_000
     assert mstmm("report", "pendulum.toml").code == 2
+
+
+@pytest.fixture
+def runs(mstmm: Command, folder: Path) -> Path:
+    for name, rtol in (("run.nc", "1e-8"), ("loose.csv", "1e-2")):
+        options = ("--t-end", "1", "--times", "60", "--rtol", rtol, "-o", name, "--no-certify")
+        assert mstmm("simulate", "pendulum.toml", *options).code == 0
+    return folder
+
+
+def test_curves_of_results(mstmm: Command, runs: Path) -> None:
+    done = mstmm("plot", "run.nc", "loose.csv", "-o", "a.png", "-o", "a.svg", "--title", "both")
+    assert done.code == 0, done.err
+    assert done.out.splitlines() == [
+        "angle of hinge pivot (rad): pivot.angle", "wrote a.png and a.svg",
+    ]  # fmt: skip
+    with Image.open(runs / "a.png") as picture:
+        assert picture.size[0] == 1125
+    names = ("-q", "pivot.motion", "-q", "rod.tip.velocity", "-q", "energy")
+    assert mstmm("plot", "run.nc", *names).code == 2
+    done = mstmm("plot", "run.nc", "loose.csv", *names[2:], "--json")
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    assert told["files"] == ["run.png"] and told["runs"] == ["run", "loose"]
+    assert [panel["title"] for panel in told["panels"]] == [
+        "velocity of rod.tip (m/s)", "total energy (J)",
+    ]  # fmt: skip
+    assert told["panels"][1]["curves"] == ["run", "loose"]
+    for kind, title in (("--phase", "rate of angle of"), ("--spectrum", "amplitude of angle of")):
+        done = mstmm("plot", "run.nc", "loose.csv", "-q", "pivot.angle", kind, "-o", "a.pdf")
+        assert done.code == 0, done.err
+        assert done.out.startswith(title)
+    done = mstmm("plot", "run.nc", "-q", "rod.tip.y", "--against", "rod.tip.x", "-o", "a.pdf")
+    assert done.code == 0, done.err
+
+
+def test_curves_that_are_refused(
+    mstmm: Command, runs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cases = {
+        ("run.nc", "-q", "pivot.angel"): 'did you mean "pivot.angle"',
+        ("loose.csv", "-q", "pivot.angel"): 'did you mean "pivot.angle"',
+        ("run.nc", "-q", "pivot.angle", "--against", "nothing"): "there is no such quantity",
+        ("pendulum.toml",): "expected a saved result, .nc, .csv, .mat",
+        ("missing.csv",): "there is no such file",
+        ("run.nc", "-o", "a.html"): ".png or .svg or .pdf",
+        ("run.nc", "--phase", "--spectrum"): "take one of them",
+        ("run.nc", "-q", "energy", "--phase"): "its rate is not known",
+    }
+    for arguments, message in cases.items():
+        done = mstmm("plot", *arguments)
+        assert done.code == 2, arguments
+        assert message in " ".join(done.err.split())
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    done = mstmm("plot", "loose.csv")
+    assert done.code == 3 and "pip install 'mstmm[plot]'" in done.err

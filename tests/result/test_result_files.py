@@ -13,9 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
+from scipy.io import loadmat
 from support.result_scenes import motor, pins, tree
 
 import mstmm
+from mstmm.runtime.result.output.columns import Columns
+from mstmm.runtime.result.output.tabled import matlab_names
 from mstmm.runtime.result.result import Result
 
 
@@ -109,6 +112,67 @@ def test_csv_has_names_units_and_every_digit(run: Result, tmp_path: Path) -> Non
                                   run.coordinate("wrist")[:, 0])  # fmt: skip
 
 
+@pytest.mark.parametrize("ending", ["csv", "mat"])
+def test_columns_come_back_from_tables(run: Result, tmp_path: Path, ending: str) -> None:
+    path = run.save(tmp_path / f"run.{ending}")
+    again = mstmm.load_result(path)
+    assert isinstance(again, Columns) and len(again.names()) > 200
+    np.testing.assert_array_equal([again.t, again.event], [run.t, run.event])
+    for name in again.names():
+        ours, theirs = again.quantity(name), run.quantity(name)
+        np.testing.assert_array_equal(ours.values, theirs.values)
+        assert ours.unit == theirs.unit
+    second = mstmm.load_result(again.save(tmp_path / "again.csv"))
+    assert second.names() == again.names()
+    assert "elbow.angle1" in again.table(rows=3)
+    with pytest.raises(mstmm.SceneError, match=r'"certificate" needs the scene of the run'):
+        again.certificate  # noqa: B018
+    for name in (
+        "arm.tip.orientation",
+        "arm.tip.velocity",
+        "wrist.moment",
+        "momentum",
+        "arm.euler",
+    ):
+        np.testing.assert_array_equal(again.quantity(name).values, run.quantity(name).values)
+        assert again.quantity(name).labels == run.quantity(name).labels
+    with pytest.raises(mstmm.SceneError, match=r'did you mean "elbow\.angle1"'):
+        again.quantity("elbow.angel1")
+    assert not hasattr(again, "model") and not hasattr(again, "nothing")
+
+
+def test_matlab_finds_names_units_and_the_scene(run: Result, tmp_path: Path) -> None:
+    data = loadmat(run.save(tmp_path / "run.mat"))
+    np.testing.assert_array_equal(data["elbow_angle1"][:, 0], run.coordinate("elbow")[:, 0])
+    rows = {str(row[1][0]): (str(row[0][0]), row[2]) for row in data["names"]}
+    assert rows["energy"][0] == "energy" and str(rows["elbow.angle1"][1][0]) == "rad"
+    assert "[[hinge]]" in str(data["scene"][0])
+    assert matlab_names(["a" * 80, "a" * 81, "1.x", "t"]) == [
+        "a" * 63,
+        "a" * 61 + "_2",
+        "x1_x",
+        "t_2",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "first columns"),
+        ("a,b\n1,2\n", "first columns"),
+        ("time [s],event,x\n0,0\n", "line 2 has 2 entries, expected 3"),
+        ("time [s],event,x\n0,0,1\n1,0,one\n", "line 3.*'one'"),
+    ],
+)
+def test_tables_of_others_are_refused(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(mstmm.SceneError, match=rf"a\.csv.*{message}"):
+        mstmm.load_result(tmp_path / "a.csv")
+    (tmp_path / "a.mat").write_text(text)
+    with pytest.raises(mstmm.SceneError, match=r"a\.mat.*not a result of mstmm"):
+        mstmm.load_result(tmp_path / "a.mat")
+
+
 @pytest.mark.parametrize("name, package", [("a.nc", "xarray"), ("b.nc", "h5netcdf")])
 def test_a_missing_extra_is_named(
     run: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, package: str
@@ -139,7 +203,7 @@ def test_a_full_disk_keeps_the_old_file_and_the_result(
 
 
 def test_words_for_paths_that_make_no_sense(run: Result, tmp_path: Path) -> None:
-    with pytest.raises(mstmm.SceneError, match=r"ends in \.nc or \.csv"):
+    with pytest.raises(mstmm.SceneError, match=r"ends in \.nc, \.csv or \.mat"):
         run.save(tmp_path / "run.xlsx")
     with pytest.raises(mstmm.EnvironmentFailure, match="cannot be written"):
         run.save(tmp_path / "nowhere" / "run.csv")

@@ -7,13 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 from support.models import model_of
 from support.result_scenes import motor, pins, tree
 
 import mstmm
 from mstmm.runtime.result.names import Quantity
-from mstmm.runtime.result.output.curves import curve
+from mstmm.runtime.result.plotting.choice import choose
+from mstmm.runtime.result.plotting.curves import curve
+from mstmm.runtime.result.plotting.spectra import spectrum
 from mstmm.runtime.result.result import Result
 
 
@@ -25,8 +28,11 @@ def run() -> Result:
 def test_one_panel_per_unit_with_names_and_units(run: Result) -> None:
     figure = run.plot("elbow.angle1", "arm.tip.y", "elbow.angle2", "wrist.force", "energy")
     panels = figure.axes
-    assert [p.get_ylabel() for p in panels] == ["rad", "arm.tip.y in m", "N", "energy in J"]
-    assert panels[-1].get_xlabel() == "time in s"
+    assert [p.get_title("left") for p in panels] == [
+        "angles of hinge elbow (rad)", "position of arm.tip, y (m)",
+        "force of the inboard on the outboard side of hinge wrist (N)", "total energy (J)",
+    ]  # fmt: skip
+    assert panels[-1].get_xlabel() == "time (s)"
     names = [[text.get_text() for text in p.get_legend().get_texts()]
              for p in panels if p.get_legend()]  # fmt: skip
     assert names == [["elbow.angle1", "elbow.angle2"], [f"wrist.force.{x}" for x in "xyz"]]
@@ -44,6 +50,93 @@ def test_curves_between_samples_follow_the_motion() -> None:
     straight = np.interp(t, angle.t, angle.q[:, 0]) - exact.q[:, 0]
     smooth = values[:, 0] - exact.q[:, 0]
     assert np.abs(smooth).max() < 0.1 * np.abs(straight).max() < 0.1
+
+
+def test_of_many_hinges_those_are_drawn_that_move_most() -> None:
+    scene = pins(40, [0.1 * k for k in range(40)])
+    run = mstmm.compile(scene, engine="looped").simulate(0.2, output_times=np.linspace(0, 0.2, 9))
+    (chosen,) = choose(run)
+    moved = np.ptp(run.q, axis=0)
+    largest = sorted(np.argsort(-moved)[:6].tolist())
+    assert chosen.names == tuple(f"pin{k}.angle" for k in largest)
+    seventh = np.sort(moved)[-7]
+    assert chosen.more == f"34 more that move by {seventh:.2g} rad or less"
+    (panel,) = run.plot().axes
+    assert panel.get_title("left") == "angle of 6 hinges (rad)" and len(panel.lines) == 7
+    told = panel.get_legend().get_texts()[-1].get_text().replace("\n", " ")
+    assert told == chosen.more and chosen.other in chosen.sentence
+
+
+def test_one_quantity_over_another_and_its_rate_over_itself(run: Result) -> None:
+    (panel,) = run.plot("arm.tip.y", against="arm.tip.x").axes
+    x, y = panel.lines[0].get_data()
+    assert (panel.get_xlabel(), panel.get_title("left")) == (
+        "position of arm.tip, x (m)", "position of arm.tip, y (m)",
+    )  # fmt: skip
+    place = run.position("arm.tip")
+    for row in place[::7, :2]:
+        assert np.min(np.hypot(x - row[0], y - row[1])) < 1e-12
+    (panel,) = run.plot("elbow.angle1", kind="phase").axes
+    angle, rate = panel.lines[0].get_data()
+    assert panel.get_title("left") == "rate of angle1 of hinge elbow (rad/s)"
+    for q, u in zip(run.coordinate("elbow")[::7, 0], run.speed("elbow")[::7, 0], strict=True):
+        assert np.min(np.hypot(angle - q, rate - u)) < 1e-12
+    with pytest.raises(mstmm.SceneError, match="its rate is not known"):
+        run.plot("energy", kind="phase")
+    with pytest.raises(mstmm.SceneError, match=r"take one, such as arm\.tip\.position\.x"):
+        run.plot("arm.tip.y", against="arm.tip.position")
+    with pytest.raises(mstmm.SceneError, match="take one of them"):
+        run.plot("arm.tip.y", against="arm.tip.x", kind="spectrum")
+    with pytest.raises(mstmm.SceneError, match="expected one of time, phase, spectrum"):
+        run.plot("arm.tip.y", kind="polar")
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_a_spectrum_shows_amplitudes_in_the_unit(even: bool) -> None:
+    t = np.linspace(0.0, 20.0, 2001)
+    if not even:
+        t = t + 0.004 * np.sin(7 * t) * (t > 0) * (t < 20)
+    two = 2 + 0.3 * np.sin(2 * np.pi * 2.5 * t) + 0.01 * np.cos(2 * np.pi * 11.25 * t)
+    frequencies, amplitudes = spectrum(t, Quantity("x", two, "m", "x"))
+    for frequency, height in ((2.5, 0.3), (11.25, 0.01)):
+        near = np.abs(frequencies - frequency) < 0.5
+        top = np.argmax(amplitudes[near, 0])
+        assert frequencies[near][top] == pytest.approx(frequency, abs=0.02)
+        assert amplitudes[near, 0][top] == pytest.approx(height, rel=0.02)
+    far = np.abs(frequencies - 6.5) < 1
+    assert amplitudes[far].max() < 2e-4 and amplitudes[0] < 1e-3
+    with pytest.raises(mstmm.SceneError, match="needs 16 samples or more, there are 5"):
+        spectrum(t[:5], Quantity("x", two[:5], "m", "x"))
+
+
+def test_runs_over_each_other_and_axes_of_others(run: Result, tmp_path: Path) -> None:
+    loose = model_of(run).simulate(1.0, rtol=1e-3)
+    table = mstmm.load_result(loose.save(tmp_path / "loose.csv"))
+    (panel,) = run.plot("energy", beside={"loose": table}, label="tight").axes
+    assert [x.get_text() for x in panel.get_legend().get_texts()] == ["tight", "loose"]
+    assert panel.lines[1].get_ydata()[-1] == loose.energy()[-1]
+    both = run.plot("elbow.angle1", "elbow.angle2", beside={"loose": loose}).axes[0]
+    names = [x.get_text() for x in both.get_legend().get_texts()]
+    assert names[1] == "elbow.angle2, this run" and names[3] == "elbow.angle2, loose"
+    colours = [line.get_color() for line in both.lines]
+    assert colours[:2] == colours[2:] and colours[0] != colours[1]
+    mine = Figure().subplots(2)
+    assert run.plot("elbow.angle1", "energy", ax=mine) is mine[0].figure
+    assert [len(axis.lines) for axis in mine] == [1, 1]
+    with pytest.raises(mstmm.SceneError, match="there are 2 panels, one for each unit, and 1 axes"):
+        run.plot("elbow.angle1", "energy", ax=mine[0])
+    with pytest.raises(mstmm.SceneError, match='"a" is the label of another run'):
+        run.plot("energy", beside={"a": loose}, label="a")
+
+
+def test_what_one_of_several_runs_lacks_is_said(run: Result) -> None:
+    other = mstmm.compile(motor("1")).simulate(1.0)
+    panel = run.plot("elbow.angle1", "motor.angle", beside={"other": other}).axes[0]
+    assert len(panel.lines) == 3
+    told = " ".join(panel.get_legend().get_texts()[-1].get_text().split())
+    assert told == "this run has no motor.angle; other has no elbow.angle1"
+    with pytest.raises(mstmm.SceneError, match=r'did you mean "elbow\.angle1"'):
+        run.plot("elbow.angel1", beside={"other": other})
 
 
 def test_curves_break_where_an_event_makes_them_jump() -> None:

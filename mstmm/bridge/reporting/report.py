@@ -33,9 +33,9 @@ def report(
     """Write one page that needs no network: what the run is and whether it can be trusted, how it
     moves, curves, certificate, equations of its elements, provenance; returns the path.
 
-    Extras: plot, and view for what moves.  `quantities` are those of the curves, by default the
-    hinge coordinates and the energy; `trails` as in `Result.view`.  SceneError for a path that does
-    not end in .html and for names that there are not; EnvironmentFailure without the extras.
+    Extras: plot, and view for what moves.  `quantities` are those of the curves, by default what
+    `Result.plot` chooses, and the energy; `trails` as in `Result.view`.  SceneError for a path that
+    does not end in .html and for names that there are not; EnvironmentFailure without the extras.
     """
     path = Path(path)
     if path.suffix.lower() not in (".html", ".htm"):
@@ -49,7 +49,7 @@ def report(
     sections = (
         ("mechanism", "The mechanism", _seen(seen) + words.mechanism(result)),
         ("run", "The run", words.made(result)),
-        ("curves", "Curves", curves(result, list(quantities) or _usual(result))),
+        ("curves", "Curves", curves(result, quantities)),
         ("certificate", "The certificate", words.certificate(result)),
         ("equations", "The equations", formulas),
         ("provenance", "Where it comes from", words.provenance(result)),
@@ -58,12 +58,6 @@ def report(
     with replacing(path) as part:
         part.write_text(page, encoding="utf-8")
     return path
-
-
-def _usual(result: Result) -> list[str]:
-    from ...runtime.result.output.table import default_names
-
-    return [*default_names(result), "energy"]
 
 
 def _seen(view: View | None) -> str:

@@ -14,8 +14,8 @@ from mstmm.errors import MstmmError
 
 from ..extras import need_for
 from ..options import output_file
+from ..pictures.view import ENDINGS, title_of
 from ..simulate import compiled, use_files
-from ..view import ENDINGS, title_of
 
 if TYPE_CHECKING:
     from mstmm.runtime.linear.linear import Linear

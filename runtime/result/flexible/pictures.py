@@ -14,7 +14,7 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene import split
 
-from ..output.curves import curve
+from ..plotting.curves import curve
 from . import motion as observe
 from .plot_shapes import (
     SHAPES,

@@ -1,10 +1,8 @@
-"""Results into files: NetCDF through xarray and h5netcdf (extra: io), and CSV."""
+"""Results into files: NetCDF through xarray and h5netcdf (extra: io), CSV and MATLAB's."""
 
 from __future__ import annotations
 
-import csv
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 from mstmm.errors import EnvironmentFailure, SceneError
@@ -13,17 +11,24 @@ from mstmm.extras import missing
 from ...host.files import replacing, seal
 from ..record import Record
 from .dataset import MOST_SPEEDS, dataset
+from .tabled import TABLES, write
 
 
 def save(result: Record, path: Path) -> Path:
     """Write a result; the suffix says how."""
-    writers: dict[str, Callable[[Record, Path], None]] = {".nc": _netcdf, ".csv": _csv}
-    writer = writers.get(path.suffix.lower())
-    if writer is None:
-        raise SceneError(f'result file "{path}": expected a name that ends in .nc or .csv')
-    with replacing(path) as temporary:
-        writer(result, temporary)
-    return path
+    if path.suffix.lower() == ".nc":
+        with replacing(path) as temporary:
+            _netcdf(result, temporary)
+        return path
+    if path.suffix.lower() not in TABLES:
+        raise SceneError(f'result file "{path}": expected a name that ends in .nc, .csv or .mat')
+    if result.model.nu > MOST_SPEEDS:
+        raise SceneError(
+            f'result file "{path}": a table of a scene with {result.model.nu} speeds has too many '
+            "columns; write .nc, or the quantities you need (result.quantity)"
+        )
+    quantities = [result.quantity(name) for name in result._quantities.scalars()]
+    return write(result.t, result.event, quantities, path, result.model.scene.to_toml())
 
 
 def _netcdf(result: Record, path: Path) -> None:
@@ -49,20 +54,3 @@ def _room_for(size: int, path: Path) -> None:
             f'"{path.parent}" has {free / 1e6:.1f} MB left, a NetCDF file of this result needs '
             f"{size / 1e6:.1f} MB; make room, take fewer samples or another place"
         )
-
-
-def _csv(result: Record, path: Path) -> None:
-    """One row per sample, one column per number; the header holds names and units."""
-    if result.model.nu > MOST_SPEEDS:
-        raise SceneError(
-            f'result file "{path}": a table of a scene with {result.model.nu} speeds has too many '
-            "columns; write .nc, or the quantities you need (result.quantity)"
-        )
-    quantities = [result.quantity(name) for name in result._quantities.scalars()]
-    header = ["time [s]", "event"]
-    header += [f"{q.name} [{q.unit}]" if q.unit else q.name for q in quantities]
-    columns = [result.t.tolist(), result.event.tolist(), *(q.values.tolist() for q in quantities)]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(header)
-        writer.writerows(zip(*columns, strict=True))

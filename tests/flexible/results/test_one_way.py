@@ -344,7 +344,7 @@ def test_the_response_begins_with_the_run_whatever_is_sampled(
     np.testing.assert_allclose(response_of(loaded).eta[-1], whole.eta[-1], rtol=1e-6, atol=1e-12)
 
 
-def response_of(run: mstmm.Result) -> Response:
+def response_of(run: object) -> Response:
     assert isinstance(run, OneWayResult)
     return run.response("arm")
 

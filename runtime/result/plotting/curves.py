@@ -30,7 +30,7 @@ def curve(t: Array, quantity: Quantity) -> tuple[Array, Array]:
         x, y = t[piece], values[piece]
         if len(t) < POINTS and len(piece) > 1 and np.isfinite(y).all():
             x = fine(x, POINTS / max(t[-1] - t[0], 1e-300))
-            y = _between(t[piece], y, None if rates is None else rates[piece], x)
+            y = between(t[piece], y, None if rates is None else rates[piece], x)
         times += [x, np.array([np.nan])]
         drawn += [y, np.full((1, values.shape[1]), np.nan)]
     return np.concatenate(times[:-1]), np.concatenate(drawn[:-1])
@@ -45,7 +45,8 @@ def fine(t: Array, density: float) -> Array:
     return np.concatenate([*parts, t[-1:]])
 
 
-def _between(t: Array, values: Array, rates: Array | None, x: Array) -> Array:
+def between(t: Array, values: Array, rates: Array | None, x: Array) -> Array:
+    """Values (m, k) at the times x between those at t (n,): see `curve`."""
     from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
 
     if rates is not None and np.isfinite(rates).all():

@@ -9,8 +9,8 @@ import typer
 
 from mstmm.errors import MstmmError
 
-from .extras import need_for
-from .options import output_file
+from ..extras import need_for
+from ..options import output_file
 
 
 def report(
@@ -23,7 +23,7 @@ def report(
     quantity: Annotated[
         list[str] | None,
         typer.Option("--quantity", "-q", metavar="NAME", help="What the curves show, such as "
-                     "rod1.tip.position; may be repeated.  By default the hinges' coordinates."),
+                     "rod1.tip.position; may be repeated.  By default what moves most."),
     ] = None,
     trail: Annotated[
         list[str] | None,
@@ -31,7 +31,7 @@ def report(
     ] = None,
 ) -> None:  # fmt: skip
     """Write one page that tells a run: can it be trusted, how it moves, curves, equations."""
-    from . import output as terminal
+    from .. import output as terminal
 
     source = Path(result)
     if source.suffix.lower() != ".nc":
@@ -40,8 +40,9 @@ def report(
     need_for(target, "--output")
     need_for(target.with_suffix(".png"), "--output")
     import mstmm
+    from mstmm.runtime.model.loading import load_netcdf
 
-    run = mstmm.load_result(source)
+    run = load_netcdf(source)
     mstmm.report(
         run, target, title=source.stem, quantities=quantity or (), trails=tuple(trail or ())
     )

@@ -9,10 +9,10 @@ import typer
 
 from mstmm.errors import MstmmError
 
-from .extras import need_for
-from .options import Elements, output_file, output_folder, positive
-from .progress import bar
-from .simulate import compiled, load_method, use_files
+from ..extras import need_for
+from ..options import Elements, output_file, output_folder, positive
+from ..progress import bar
+from ..simulate import compiled, load_method, use_files
 
 if TYPE_CHECKING:
     from mstmm.runtime.result.result import Result
@@ -58,7 +58,7 @@ def view(
     hinge: Elements = None,
 ) -> None:  # fmt: skip
     """Look at a scene, or at a run of it, in three dimensions."""
-    from . import output as terminal
+    from .. import output as terminal
 
     named = output or ([] if frames else [f"{Path(what).stem or 'scene'}.html"])
     targets = [output_file(name, ENDINGS) for name in named]
@@ -77,11 +77,12 @@ def view(
 def _result(what: str, t_end: float | None) -> Result:
     """What is looked at: a saved result, a scene at its start, or a run of a scene."""
     import mstmm
+    from mstmm.runtime.model.loading import load_netcdf
 
     if Path(what).suffix.lower() == _RESULT:
         if t_end is not None:
             raise MstmmError("--t-end: a result has run already; give the scene to run it again")
-        return mstmm.load_result(what)
+        return load_netcdf(Path(what))
     model = compiled(what, mstmm.load_scene(what))
     if t_end is None:
         return model.simulate(t_end=0.0, method="dop853")

@@ -1,0 +1,1 @@
+"""Commands that show a run: pages, strips and films, curves, a report."""
