@@ -1,11 +1,11 @@
 """What one implicit step costs, in evaluations of the accelerations by the same engine.
 
-    python -m benchmarks.stiff.steps [--quick]
+    python -m benchmarks.stiff.steps [--quick] [--rounds 15]
 
 By the looped engine: residual R, tangent T with its elimination, solution S and product P of chains
-from 10 to 100 000 bodies; tangent L and solution X by laws alone.  By code of a scene's own: whole
-steps of an arm of six pins.  All of a row alternate in one process; CPU times, the minimum of the
-rounds counts.
+from 10 to 100 000 bodies; tangent L and solution X by laws alone.  A sum of numbers that no cache
+holds is taken beside them: what memory gives at best.  By code of a scene's own: whole steps of an
+arm of six pins.  All of a row alternate in one process; CPU times, the least of the rounds counts.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 import mstmm
+from mstmm.runtime.engine.engine import Engine
 from mstmm.runtime.engine.tangent import Tangent
 
 from ..common import measure
@@ -32,6 +33,12 @@ CHAINS: dict[str, Callable[[int], scenes.Scene]] = {
 }
 METHODS = ("genalpha", "dttmm", "rodas4p2", "kvaerno5")
 STEP, STEPS = 1e-4, 20_000  # s
+#: Bodies that a cache holds, and that none does.
+FEW, MANY = 1000, 100_000
+#: What one Newton iteration is made of.
+ITERATION = "RTS"
+#: Bytes of an array that no cache holds.
+STREAM = 256_000_000
 #: 1/s, of a step within which no chain leaves by itself under the weight of 100 000 rods.
 SHARP = 5000.0
 
@@ -45,6 +52,19 @@ def least(calls: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, f
             call()
             found[name] = min(found[name], time.process_time() - begin)
     return found
+
+
+def stream(rounds: int) -> float:
+    """Nanoseconds a byte that is read once, from front to back."""
+    numbers = np.ones(STREAM // 8)
+    return 1e9 * least({"sum": numbers.sum}, rounds)["sum"] / STREAM
+
+
+def numbers_a_body(engine: Engine, tangent: Tangent) -> dict[str, float]:
+    """Bytes a body of what evaluations, and of what an iteration works on."""
+    n = engine.packed.system.count
+    more = tangent.work.nbytes + tangent.numbers.nbytes
+    return {"E": tangent.workspace.nbytes / n, ITERATION: (tangent.workspace.nbytes + more) / n}
 
 
 def chain(name: str, n: int, rounds: int) -> dict[str, Any]:
@@ -72,7 +92,8 @@ def chain(name: str, n: int, rounds: int) -> dict[str, Any]:
     repeats = max(1, 20_000 // n)
     many = {k: (lambda f=f: [f() for _ in range(repeats)]) for k, f in calls.items()}
     found = least(many, rounds)
-    return {"chain": name, "bodies": n, **{k: 1e9 * x / n / repeats for k, x in found.items()}}
+    times = {k: 1e9 * x / n / repeats for k, x in found.items()}
+    return {"chain": name, "bodies": n, **times, "bytes": numbers_a_body(engine, tangent)}
 
 
 def fused(rounds: int) -> dict[str, Any]:
@@ -89,15 +110,44 @@ def fused(rounds: int) -> dict[str, Any]:
     return {"E": microseconds.pop("rk4") / 4, **microseconds}
 
 
+def iteration(row: Mapping[str, Any]) -> float:
+    """Nanoseconds a body of one Newton iteration."""
+    return float(sum(row[k] for k in ITERATION))
+
+
+def growth(result: Mapping[str, Any]) -> list[str]:
+    """What a body costs in many against few, beside what memory costs."""
+    lines = [
+        f"Memory, read once and in order: {result['stream']:.3f} ns a byte.  Per body, in {MANY}"
+        f" against {FEW}:",
+        "",
+        "| chain | E | R+T+S | numbers of E | numbers of R, T and S | read once |",
+        "|---|---|---|---|---|---|",
+    ]
+    rows = {(row["chain"], row["bodies"]): row for row in result["looped"]}
+    for name in CHAINS:
+        few, many = rows[name, FEW], rows[name, MANY]
+        held = many["bytes"]
+        lines.append(
+            f"| {name} | {many['E'] / few['E']:.2f} | {iteration(many) / iteration(few):.2f} |"
+            f" {held['E']:.0f} B | {held[ITERATION]:.0f} B |"
+            f" {held[ITERATION] * result['stream']:.0f} ns |"
+        )
+    return lines
+
+
 def table(result: dict[str, Any]) -> str:
     """The result as Markdown."""
     lines = [
-        "| chain | bodies | E, ns a body | R/E | T/E | S/E | P/E | L/E | X/E |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| chain | bodies | E, ns a body | R/E | T/E | S/E | (R+T+S)/E | P/E | L/E | X/E |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in result["looped"]:
-        ratios = " | ".join(f"{row[k] / row['E']:.2f}" for k in "RTSPLX")
+        whole = row | {ITERATION: iteration(row)}
+        ratios = " | ".join(f"{whole[k] / row['E']:.2f}" for k in (*"RTS", ITERATION, *"PLX"))
         lines.append(f"| {row['chain']} | {row['bodies']} | {row['E']:.0f} | {ratios} |")
+    if any(row["bodies"] == MANY for row in result["looped"]):
+        lines += ["", *growth(result)]
     arm = result["fused"]
     lines += ["", f"Arm of six pins by its own code, one evaluation {arm['E']:.3f} us:", ""]
     lines += ["| method | us a step | evaluations |", "|---|---|---|"]
@@ -109,13 +159,18 @@ def main() -> None:
     """Measure, write steps.json and steps.md, print the table."""
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="try whether it runs; writes nothing")
-    quick = parser.parse_args().quick
-    sizes, rounds = ((10, 100), 2) if quick else ((10, 100, 1000, 10_000, 100_000), 15)
+    parser.add_argument("--rounds", type=int, default=15)
+    options = parser.parse_args()
+    sizes = (10, 100) if options.quick else (10, 100, FEW, 10_000, MANY)
+    rounds = 1 if options.quick else options.rounds
     looped = [chain(name, n, rounds) for name in CHAINS for n in sizes]
-    result = {"machine": measure.machine(), "looped": looped, "fused": fused(rounds)}
+    result = {
+        "machine": measure.machine(), "looped": looped, "stream": stream(rounds),
+        "fused": fused(rounds),
+    }  # fmt: skip
     text = table(result)
     print(text)
-    if not quick:
+    if not options.quick:
         (HERE / "steps.json").write_text(json.dumps(result, indent=1) + "\n")
         (HERE / "steps.md").write_text(text)
 
