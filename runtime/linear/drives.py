@@ -115,20 +115,24 @@ def followers(model: Compiled, name: str, t: float) -> Moves:
 
 
 def columns_of(engine: Engine, state: State, moves: Moves) -> Columns:
-    """What drives that go along with one motion ask for."""
-    parts = [[factor * x for x in _columns(engine, state, speed)] for speed, factor in moves]
-    return Columns(*(np.sum(some, axis=0) for some in zip(*parts, strict=True)))
+    """(nu,) what drives of a tree that go along with one motion ask for."""
+    along = np.zeros(engine.nu)
+    for speed, factor in moves:
+        along[speed] += factor
+    return slopes_along(engine, state, along)
 
 
-def _columns(engine: Engine, state: State, speed: int) -> Columns:
-    """Of the drive at the place of a speed."""
-    slots = engine.packed.layout.hinge_of_speed(speed)
+def slopes_along(engine: Engine, state: State, along: Array) -> Columns:
+    """(nu,) slopes of the residual along a motion of all speeds, driven ones (whose rates are
+    speeds) too."""
+    first, driven = engine.packed.system.places["u"], engine.packed.system.driven
     engine = _undriven(engine)
-    tangent = Tangent(engine)
+    tangent, still = Tangent(engine), np.zeros(engine.nu)
+    moved, at_rest = tangent.rates(state.q, along), np.zeros(engine.nq)
+    for speed in (int(first[place]) + k for place, k in driven):
+        slots = engine.packed.layout.hinge_of_speed(speed)
+        moved[slots.q + speed - slots.u] = along[speed]
     tangent.residual(state.t, state.q, state.u, state.a)
-    still, along = np.zeros(engine.nu), np.eye(1, engine.nu, speed)[0]
-    moved = np.eye(1, engine.nq, slots.q + speed - slots.u)[0]
-    at_rest = np.zeros(engine.nq)
     return Columns(
         tangent.slope(0.0, moved, still, still),
         tangent.slope(0.0, at_rest, along, still),

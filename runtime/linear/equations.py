@@ -16,7 +16,7 @@ from mstmm.errors import SceneError
 from ..pack.layout import refuse_dense
 from ..run.system import SceneSystem
 from .channels import Channel, columns
-from .drives import columns_of, coordinate
+from .drives import Columns, Moves, columns_of, coordinate
 from .loops.mechanism import Mechanism
 from .matrices import Matrices, State, matrices
 from .pencil import Pencil
@@ -195,12 +195,17 @@ class Equations:
     @cached_property
     def _moved(self) -> tuple[Array, Array]:
         """K_driven and C_driven."""
-        found = [
-            columns_of(self.model.looped, self.state, ((speed, 1.0),)) for speed in self.drives
-        ]
+        found = [self.driving(((speed, 1.0),)) for speed in self.drives]
         both = [(one.stiffness, one.damping) for one in found]
-        wide = np.reshape(both, (len(found), 2, self.model.nu))[:, :, list(self.free)]
+        wide = np.reshape(both, (len(found), 2, len(self)))
         return wide[:, 0].T, wide[:, 1].T
+
+    def driving(self, moves: Moves) -> Columns:
+        """(n,): what drives that go along with one motion ask for."""
+        if self.mechanism is not None:
+            return self.mechanism.driven(self.state, moves)
+        wide = columns_of(self.model.looped, self.state, moves)
+        return Columns(*(one[list(self.free)] for one in wide))
 
     @property
     def C_driven(self) -> Array:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from mstmm.arrays import Array
 
 from .channels import Channel
-from .drives import columns_of
 
 if TYPE_CHECKING:
     from .equations import Equations
@@ -37,8 +36,8 @@ class Pushed:
         powers = [2 - one.drive if one.drive >= 0 else 0 for one in pushes]
         for j, one in enumerate(pushes):
             if one.drive >= 0:
-                moved = columns_of(linear.model.looped, linear.state, one.moves)
-                columns += [-moved.stiffness, -moved.damping]
+                moved = linear.driving(one.moves)
+                columns += [-_placed(linear, x) for x in (moved.stiffness, moved.damping)]
                 powers += [-one.drive, 1 - one.drive]
                 owners += [j, j]
         parts = np.eye(len(pushes))[owners]
@@ -60,3 +59,10 @@ class Pushed:
                 speeds, factors = zip(*one.moves, strict=True)
                 found[j] = -one.drive, rows[:, speeds] @ np.array(factors)
         return found
+
+
+def _placed(linear: Equations, x: Array) -> Array:
+    """(nu,) entries of x (n,) in the places of its speeds."""
+    found = np.zeros(linear.model.nu)
+    found[list(linear.free)] = x
+    return found

@@ -35,7 +35,6 @@ from .harmonic.losses import Losses, stiffer
 from .harmonic.prescribed import Ratios, modal_damping
 from .harmonic.refused import given, refuse_drives, refuse_in_motion, refuse_ratios
 from .harmonic.steady import refuse_turning, refuse_unsteady
-from .loops.mechanism import refuse_motions
 from .matrices import Matrices
 from .output.outputs import outputs_of, read_by, rows_of
 from .output.seen import Seen
@@ -187,8 +186,6 @@ def frequency_response(
     if beams is not None:
         refuse_distributed(beams, pushes)
     refuse_drives(pushes, beams is not None or given(structural))
-    if linear.mechanism is not None:
-        refuse_motions(pushes)
     shown = outputs_of(linear, None if outputs is None else some_names("outputs", outputs))
     refuse_unsteady(linear, pushes, shown)
     values = _Sweep(linear, pushes, shown, structural, modal, beams).values(frequencies)

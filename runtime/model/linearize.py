@@ -15,7 +15,7 @@ from ..engine.sizes import speed_sizes
 from ..linear.channels import GROUND, Channel, inputs_of, pushes_of
 from ..linear.judged import refuse_unrest
 from ..linear.linear import Linear
-from ..linear.loops.mechanism import mechanism_at, refuse_motions
+from ..linear.loops.mechanism import mechanism_at
 from ..linear.matrices import State, matrices
 from ..pack.loops.refusal import refuse_bending
 from ..run.start import initial_state
@@ -65,8 +65,6 @@ class Linearising:
         if about is None:
             state = State(t, q, u, self._accelerations(t, q, u))
             loops = mechanism_at(model, state)
-            if loops is not None:
-                refuse_motions((*pushes, *others))
             found = Linear(model, state, pushes, others, self._turning(state), mechanism=loops)
             refuse_unrest(found)
             return found

@@ -8,11 +8,14 @@ N^T J^T = 0 wherever the loops are closed, so that the equations are N^T R = 0 a
 
 with lambda as it stands there: what turning loads add is K of the closed scene, whose tangent has
 the loads of its loops in it, less that of the tree.
+
+Where a drive goes by d, all else goes along: dq = N x + n d, x being zero in n, and what it asks
+for are the same slopes along n.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,6 +28,7 @@ from ...engine.engine import Engine
 from ...pack.loops.variants import torn
 from ...pack.pack import packed_system
 from ..channels import Channel, columns
+from ..drives import Columns, Moves, coordinate, slopes_along
 from ..matrices import Matrices, State, matrices
 
 
@@ -38,8 +42,10 @@ class Mechanism:
         places: those of the n independent ones, which x are.
         ways: (nu, n) all speeds for a unit of each.
         turned: (n, n) stiffness of the loads that the loops carry.
+        model: whose mechanism it is.
     """
 
+    model: Compiled = field(repr=False)
     tree: Engine
     free: tuple[int, ...]
     places: tuple[int, ...]
@@ -52,25 +58,48 @@ class Mechanism:
         return Matrices(found.M, found.C, found.K + self.turned)
 
     def pushed(self, state: State, channels: Sequence[Channel]) -> Array:
-        """(n, channels): what a unit of each push does along x."""
-        every = list(range(len(self.ways)))
-        return np.asarray(self.ways.T @ columns(self.tree, state, channels, every))
-
-    def rows(self, wide: Array) -> Array:
-        """Rows (k, nu) of what goes with all speeds, as rows of x in the places of these."""
-        found = np.zeros_like(wide)
-        found[:, self.places] = wide @ self.ways
+        """(n, channels): what a unit of each push does along x, of drives their accelerations."""
+        every, found = list(range(len(self.ways))), np.zeros((len(self.places), len(channels)))
+        still = [k for k, one in enumerate(channels) if one.drive < 0]
+        pushes = [channels[k] for k in still]
+        found[:, still] = self.ways.T @ columns(self.tree, state, pushes, every)
+        for k, one in enumerate(channels):
+            if one.drive >= 0:
+                found[:, k] = -self.driven(state, one.moves).inertia
         return found
 
+    def driven(self, state: State, moves: Moves) -> Columns:
+        """Along x (n,): what drives that go along with one motion ask for."""
+        along = np.sum([factor * self._driving(state, speed) for speed, factor in moves], axis=0)
+        closed, tree = self.model.looped, self.tree
+        rows = _with_own_still(self.model, self.ways)
+        return Columns(
+            rows.T @ slopes_along(closed, state, along).stiffness,
+            self.ways.T @ slopes_along(tree, state, along).damping,
+            self.ways.T @ slopes_along(tree, state, along).inertia,
+        )
 
-def refuse_motions(channels: Sequence[Channel]) -> None:
-    """SceneError for motions of drives, which loops pass on."""
-    for one in channels:
-        if one.drive >= 0:
+    def _driving(self, state: State, speed: int) -> Array:
+        """n (nu,): all speeds for a unit of one that is imposed.  SceneError where loops do not let
+        it move."""
+        freedom = self.model.freedom
+        assert freedom is not None
+        along = freedom.driving(state.q, speed)
+        if not np.isfinite(along).all():
             raise SceneError(
-                f'"{one.name}": motions of drives are no inputs of linear models with closed loops '
-                "yet; push by an effort or a force at an end"
+                f'"{coordinate(self.model, speed)}": the loops do not let this drive move at this '
+                "state; take a state beside it, or another input"
             )
+        return np.asarray(along - self.ways @ along[list(self.places)])
+
+    def rows(self, state: State, wide: Array, drives: Collection[int]) -> Array:
+        """Rows (k, nu) of what goes with all speeds, as rows of x and of drives in the places of
+        these."""
+        found = np.zeros_like(wide)
+        found[:, self.places] = wide @ self.ways
+        for speed in drives:
+            found[:, speed] = wide @ self._driving(state, speed)
+        return found
 
 
 def mechanism_at(model: Compiled, state: State) -> Mechanism | None:
@@ -87,7 +116,7 @@ def mechanism_at(model: Compiled, state: State) -> Mechanism | None:
     tree = Engine(packed_system(torn(packed.system), packed))
     carried = _along(model.looped, state, free, ways, _with_own_still(model, ways)).K
     alone = _along(tree, state, free, ways, ways).K
-    return Mechanism(tree, free, places, ways, carried - alone)
+    return Mechanism(model, tree, free, places, ways, carried - alone)
 
 
 def _refuse_moving(model: Compiled, state: State) -> None:

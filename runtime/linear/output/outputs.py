@@ -137,7 +137,11 @@ def rows_of(linear: Equations, outputs: Sequence[Seen], pushes: Sequence[Channel
             if name in places:
                 through[k, places[name]] += slope
     if linear.mechanism is not None:
-        orders = {order: linear.mechanism.rows(wide) for order, wide in orders.items()}
+        drives = {speed for one in pushes for speed, _ in one.moves} | {*linear.drives}
+        orders = {
+            order: linear.mechanism.rows(linear.state, wide, drives)
+            for order, wide in orders.items()
+        }
     return Rows(_with_turning(linear, orders), through)
 
 
