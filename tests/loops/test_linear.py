@@ -187,7 +187,7 @@ def test_motions_of_drives() -> None:
     model = compiled(scene)
     assert model.linearize().coordinates == ("foot.angle",)
     shaken = model.linearize(inputs=["mast.angle_acceleration"])
-    assert shaken.V == pytest.approx(np.array([[-1e-3]]), rel=1e-12)
+    assert abs(shaken.V[0, 0] + 1e-3) < 1e-15
     assert not shaken.K_driven.any() and not shaken.C_driven.any()
 
 
