@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from .bridge.charting import chart
     from .bridge.compilation import compile_scene as compile
     from .bridge.compilation import generate_file, register
+    from .bridge.equations import equations
     from .bridge.reporting.report import report
     from .runtime.advice.record import Advice
     from .runtime.chart.chart import Chart
@@ -54,6 +55,7 @@ _LAZY = {
     "chart": (".bridge.charting", "chart"),
     "compile": (".bridge.compilation", "compile_scene"),
     "register": (".bridge.compilation", "register"),
+    "equations": (".bridge.equations", "equations"),
     "report": (".bridge.reporting.report", "report"),
     "generate_file": (".bridge.compilation", "generate_file"),
     "Advice": (".runtime.advice.record", "Advice"),
@@ -68,8 +70,8 @@ _LAZY = {
 __all__ = [
     "Advice", "Atlas", "Chart", "ElementError", "EnvironmentFailure", "ExpressionError", "Model",
     "MstmmError", "NumericalFailure", "Result", "RiskRefused", "Scene", "SceneError", "advise",
-    "chart", "compile", "generate_file", "import_robot", "load_result", "load_scene", "register",
-    "report", "stability",
+    "chart", "compile", "equations", "generate_file", "import_robot", "load_result", "load_scene",
+    "register", "report", "stability",
 ]  # fmt: skip
 
 

@@ -48,10 +48,14 @@ def show(element: str, at: str, format: str, registry: Callable[[str], ElementVi
 
 def show_view(view: ElementView, at: str = "equations", format: str = "text") -> str:
     """The page of a view: complete HTML, a LaTeX fragment (amsmath), or text of 100 columns."""
+    return printed(view.title, lambda measure: document(view, at, measure), format)
+
+
+def printed(title: str, items: Callable[[Columns], list[Item]], format: str) -> str:
+    """What `items` makes of formulas that fit, as `show_view` prints it."""
     if format not in FORMATS:
         raise ElementError(f"no format {format!r}; there are {', '.join(FORMATS)}")
-    measure = Columns() if format == "text" else Paper()
-    return FORMATS[format](view.title, document(view, at, measure))
+    return FORMATS[format](title, items(Columns() if format == "text" else Paper()))
 
 
 # --- text -------------------------------------------------------------------------------------
@@ -79,7 +83,7 @@ def _text_item(item: Item) -> list[str]:
         return _text_table(item.rows)
     if isinstance(item, Formula):
         return _text_formula(item)
-    return ["", *item.text.split("\n")]
+    return ["", *item.text.split("\n"), ""]
 
 
 def _text_formula(item: Formula) -> list[str]:
@@ -153,8 +157,13 @@ def _latex_item(item: Item) -> str:
     return _VERBATIM.format("\n".join(map(_code_line, item.text.split("\n"))))
 
 
+#: Lines of trees in letters that every font has.
+_PLAIN = str.maketrans({"└": "+", "├": "+", "│": "|", "─": "-", "→": "->"})
+
+
 def _code_line(line: str) -> str:
     """A line of code, broken where it is wider than the page."""
+    line = line.translate(_PLAIN)
     if len(line) <= WIDTH:
         return line
     options = {"subsequent_indent": " " * 8, "drop_whitespace": True, "break_on_hyphens": False}
@@ -202,7 +211,7 @@ def _symbol(symbol: Node) -> str:
 
 
 def _parting(word: str) -> str:
-    return escaped(word).replace(r"\_", r"\_\allowbreak{}")
+    return escaped(word).replace(r"\_", r"\_\allowbreak{}").replace(".", r".\allowbreak{}")
 
 
 def _latex_formula(item: Formula) -> str:

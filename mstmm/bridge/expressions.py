@@ -16,6 +16,13 @@ from ..numbers.formula import Atom, Formula, Monomial, exact
 _ROUNDING = 1e-14
 #: Operations in an entry up to which sines and cosines of sums are looked for.
 _SHORT = 100
+#: Functions of SymPy whose names are not those of the IR.
+_PLAIN = {
+    "inverse": lambda x: 1 / x, "sqrt": sp.sqrt, "pow": sp.Pow, "min": sp.Min, "max": sp.Max,
+    "lt": sp.Lt, "le": sp.Le, "eq": sp.Eq,
+}  # fmt: skip
+_LOGIC = {"and": sp.And, "or": sp.Or, "not": sp.Not}
+_TRUTHS = {"lt", "le", "eq", *_LOGIC}
 
 
 class Writer:
@@ -65,10 +72,24 @@ class Writer:
     def _made(self, atom: Atom) -> sp.Expr:
         if atom.op == "symbol":
             return sp.Symbol(atom.name, real=True)
+        if atom.op == "select":
+            condition, *values = atom.args
+            one, other = map(self._expression, values)
+            return sp.Piecewise((one, self._condition(condition)), (other, True))
+        if atom.op in _LOGIC:
+            return _LOGIC[atom.op](*map(self._condition, atom.args))
         args = [self._expression(arg) for arg in atom.args]
-        plain = {"inverse": lambda x: 1 / x, "sqrt": sp.sqrt, "pow": sp.Pow}
-        function = plain.get(atom.op) or getattr(sp, OPERATIONS[atom.op].sympy)
+        function = _PLAIN.get(atom.op) or getattr(sp, OPERATIONS[atom.op].sympy)
         return function(*args)
+
+    def _condition(self, formula: Formula) -> sp.Basic:
+        """A formula of which matters whether it is zero."""
+        if formula.fixed:
+            return sp.true if formula.value else sp.false
+        ((monomial, c), *more) = formula.terms.items()
+        ((atom, power), *others) = monomial
+        truth = atom.op in _TRUTHS and (c, power) == (1, 1) and not more and not others
+        return self._atom(atom) if truth else sp.Ne(self._expression(formula), 0)
 
 
 def _weight(monomial: Monomial) -> float:

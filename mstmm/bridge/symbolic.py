@@ -208,12 +208,16 @@ class _Equations:
     def _run(
         self, kernel: KernelIR, p: list[Any], u: list[Formula], a: list[Formula]
     ) -> dict[str, list[Formula]]:
-        memory = next(port for port in kernel.inputs if port.name == "memory").length()
-        given = {
-            "p": p, "t": [self._linear.state.t], "q": self._q, "u": u, "a": a,
-            "memory": [0.0] * memory,
-        }  # fmt: skip
-        return run(kernel, given, FormulaArithmetic(), None)
+        given = {"p": p, "t": [self._linear.state.t], "q": self._q, "u": u, "a": a}
+        return replayed(kernel, given, FormulaArithmetic())
+
+
+def replayed(
+    kernel: KernelIR, given: dict[str, list[Any]], arithmetic: FormulaArithmetic
+) -> dict[str, list[Formula]]:
+    """What a kernel of a scene gives on formulas, where no law remembers anything."""
+    memory = next(port for port in kernel.inputs if port.name == "memory").length()
+    return run(kernel, given | {"memory": [0.0] * memory}, arithmetic, None)
 
 
 def _rounded(x: float) -> Formula:

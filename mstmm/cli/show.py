@@ -34,8 +34,8 @@ def show(
         str,
         typer.Argument(
             metavar="ELEMENT",
-            help="Name of an element (mstmm list), the Python file that defines your own, or "
-            "sweep: the schedule of the sweep.",
+            help="Name of an element (mstmm list), the Python file that defines your own, a scene "
+            "(.toml), or sweep: the schedule of the sweep.",
         ),
     ],
     at: Annotated[
@@ -55,13 +55,23 @@ def show(
     output: Annotated[
         str | None, typer.Option("--output", "-o", metavar="FILE", help="Write to a file instead.")
     ] = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--keep", metavar="NAME", help="A number of the scene that stays a symbol; repeat it."
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Show an element's equations, matrix, intermediate form or C, with units and sources."""
     from .output import emit_json, note, put
 
     target = None if output is None else output_file(output, ())
-    if element == "sweep":
+    if element.endswith(".toml"):
+        pages = {element: _scene(element, at, format, keep or [])}
+    elif keep:
+        raise ElementError("--keep names numbers of a scene: mstmm show SCENE.toml --keep NAME")
+    elif element == "sweep":
         pages = {element: _schedule(at, format)}
     else:
         pages = {view.name: _page(view, at, format) for view in _views(element, at)}
@@ -83,6 +93,17 @@ def _schedule(at: str, format: str) -> str:
     from . import stored
 
     return sweep_page(at, format, stored.specs)
+
+
+def _scene(file: str, at: str, format: str, keep: list[str]) -> str:
+    from mstmm.bridge.equations import equations
+
+    if at != "equations":
+        raise ElementError(
+            f"a scene has no stage {at!r}, its elements have: mstmm show ELEMENT --at {at}"
+        )
+    shown = equations(file, keep)
+    return {"text": shown.text, "latex": shown.latex, "html": shown.html}[format]
 
 
 def _page(view: ElementView, at: str, format: str) -> str:

@@ -21,11 +21,12 @@ _WHOLE = 16
 
 
 class FormulaArithmetic:
-    """Arithmetic of `ir.replay.run` on Formulas."""
+    """Arithmetic of `ir.replay.run` on Formulas; with `branches` every branch stays in what comes
+    out, and holds for all values."""
 
-    def __init__(self) -> None:
+    def __init__(self, branches: bool = False) -> None:
         every = {op: partial(_function, op) for op in OPERATIONS}
-        self.operations: Operations = every | _OPERATIONS
+        self.operations: Operations = every | _OPERATIONS | (_BRANCHES if branches else {})
 
     def number(self, value: Any) -> Formula:
         return formula(value)
@@ -65,6 +66,20 @@ def _root(x: Formula) -> Formula:
     return root(x) if x.value >= 0 else _decided("sqrt", x)
 
 
+def _choice(condition: Formula, a: Formula, b: Formula) -> Formula:
+    """a where the condition holds, else b."""
+    if condition.fixed or a.terms == b.terms:
+        return a if true(condition.value) else b
+    return _function("select", condition, a, b)
+
+
+def _positive_root(x: Formula) -> Formula:
+    """The root, which is negative nowhere."""
+    found = _root(x)
+    plain = found.fixed or any(atom.op == "sqrt" for m in found.terms for atom, _ in m)
+    return found if plain else _function("abs", found)
+
+
 def _turn(angle: Formula) -> tuple[Formula, Formula]:
     return turn(angle, *cos_sin(angle.value))
 
@@ -84,4 +99,10 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "max": lambda a, b: a if OPERATIONS["max"].value(a.value, b.value) == a.value else b,
     "select": lambda c, a, b: a if true(c.value) else b,
     **{op: partial(_decided, op) for op in ("sign", "floor", "lt", "le", "eq", "and", "or", "not")},
+}  # fmt: skip
+_BRANCHES: dict[str, Callable[..., Any]] = {
+    "sqrt": _positive_root,
+    "select": _choice,
+    **{op: partial(_function, op) for op in ("abs", "min", "max", "sign", "floor")},
+    **{op: partial(_function, op) for op in ("lt", "le", "eq", "and", "or", "not")},
 }  # fmt: skip

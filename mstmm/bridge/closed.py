@@ -1,0 +1,177 @@
+"""The closed equations M(q) u' + h(q, u, t) = tau of a small scene, by replay on formulas.
+
+The schedule of inverse dynamics, which gives the efforts that accelerations need, is run on symbols
+for coordinates, speeds, accelerations and time; it is linear in the accelerations, so that M is
+what stands by them.  No second derivation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from ..derive.fuse.linear import fuse_required
+from ..errors import SceneError
+from ..ir.formulas import FormulaArithmetic
+from ..ir.structure import Structure
+from ..numbers.formula import Book, Formula, formula, share
+from ..numbers.pieces import COUNT
+from ..runtime.kernels import store
+from ..runtime.pack import parameters
+from ..runtime.pack.slopes import refuse_folded, seeded
+from ..runtime.pack.structure import structure_and_numbers
+from .expressions import Writer
+from .fusion import kernels_of
+from .symbolic import replayed
+
+if TYPE_CHECKING:
+    from ..runtime.model.model import Model
+
+#: More speeds than this are refused, and more products of terms (some seconds).
+MOST_SPEEDS, MOST_PRODUCTS = 12, 300_000
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A coordinate or a speed: its symbol, its name in the scene, its unit."""
+
+    symbol: Any
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedEquations:
+    """M(q) u' + h(q, u, t) = tau of the speeds that nobody imposes, SI units.
+
+    Attributes:
+        M: (n, n) `sympy.ImmutableMatrix`.
+        h: (n, 1): what the motion needs at u' = 0, gravity, laws and loads in it.
+        coordinates, speeds: all of the scene, in its order; `free` are the places of the n.
+        accelerations: symbols of those that drives impose, which stand in h.
+        inputs, parameters: symbols by name.
+        numbers: what symbols are at the start; `M.subs(numbers)` is the mass matrix there.
+    """
+
+    M: Any = field(repr=False)
+    h: Any = field(repr=False)
+    coordinates: tuple[Motion, ...]
+    speeds: tuple[Motion, ...]
+    free: tuple[int, ...]
+    accelerations: tuple[Any, ...]
+    inputs: Mapping[str, Any]
+    parameters: Mapping[str, Any]
+    numbers: Mapping[Any, float] = field(repr=False)
+
+
+def closed(model: Model, keep: Sequence[str] = ()) -> ClosedEquations:
+    """The closed equations of a tree, in numbers of the scene that are kept by name ("rod1.mass").
+
+    Every branch of what switches stays, as a Piecewise.
+
+    Raises SceneError for closed loops, laws with a memory, hinges that are released, numbers of
+    flexible bodies, names that the scene does not have, and scenes that are too large.
+    """
+    _refuse(model)
+    if isinstance(keep, str):
+        raise SceneError(f'keep = {keep!r}: expected a list of names such as ["rod1.mass"]')
+    refuse_folded(model.scene, list(keep), "formula; take other numbers")
+    return _Closing(model, keep).equations()
+
+
+def _refuse(model: Model) -> None:
+    scene = model.packed
+    if model.nu > MOST_SPEEDS:
+        raise SceneError(
+            f"closed equations of {model.nu} speeds fill pages; the limit is {MOST_SPEEDS}; take "
+            "mass_matrix and inverse_dynamics, which are numbers"
+        )
+    if model.loops.cut:
+        raise SceneError(
+            "closed equations are those of trees, and this scene has closed loops; open them, or "
+            "take linearize, which knows them"
+        )
+    if scene.releases:
+        raise SceneError(
+            f'hinge "{next(iter(scene.releases))}" is released during the run, so that the '
+            "equations change their form; take the release out"
+        )
+
+
+class _Closing:
+    """Symbols of one scene, and what inverse dynamics makes of them."""
+
+    def __init__(self, model: Model, keep: Sequence[str]) -> None:
+        self.model, self.book = model, Book(MOST_PRODUCTS)
+        names = parameters.resolved(model.scene, keep)
+        values = model.parameters
+        self.kept = {name: self.book.symbol(name, values[name]) for name in names}
+        seeds = list(self.kept.values())
+        known = model.known or {}
+        system, _ = seeded(model.scene, known, names, lambda _, k: seeds[k])
+        self.structure, self.p = structure_and_numbers(system, known)
+        self.inputs = dict(self._inputs(self.structure, system.inputs_at(0.0).tolist()))
+        q, u = (x.tolist() for x in model.initial_state())
+        owners = list(model.layout.owners)
+        self.q = [
+            self.book.symbol(name, x)
+            for name, x in zip(
+                (_short("q", o.name, n, o.nq) for o in owners for n in o.q_names), q, strict=True
+            )
+        ]
+        speeds = [(_short("", o.name, n, o.nu)) for o in owners for n in o.u_names]
+        self.u = [self.book.symbol("u" + name, x) for name, x in zip(speeds, u, strict=True)]
+        self.a = [self.book.symbol("udot" + name, 1.0) for name in speeds]
+        self.t = self.book.symbol("t", 0.0)
+
+    def _inputs(self, structure: Structure, given: list[float]) -> Iterator[tuple[str, Formula]]:
+        """Symbols of the inputs, put where their values stand; their slopes are those of now."""
+        places = dict(structure.inputs)
+        for entry, place in places.items():
+            self.p[place] = given[entry]
+        for name, number in self.model.layout.inputs.items():
+            if COUNT * number in places:
+                found = self.book.symbol(name, given[COUNT * number])
+                self.p[places[COUNT * number]] = found
+                yield name, found
+
+    def equations(self) -> ClosedEquations:
+        required = self._required()
+        free = self.model.free_speeds
+        pushed = [self.a[j] for j in free]
+        mass = [[share(required[i], a) for a in pushed] for i in free]
+        rest = [[_without(required[i], pushed)] for i in free]
+        writer = Writer()
+        write = writer.symbol
+        numbers = {write(x): x.value for x in (*self.q, *self.u, *self.kept.values())}
+        layout = self.model.layout
+        q = zip(self.q, layout.q_names, (x for o in layout.owners for x in o.q_units), strict=True)
+        u = zip(self.u, layout.u_names, (x for o in layout.owners for x in o.u_units), strict=True)
+        return ClosedEquations(
+            writer.matrix(mass), writer.matrix(rest),
+            tuple(Motion(write(x), name, unit) for x, name, unit in q),
+            tuple(Motion(write(x), name, unit) for x, name, unit in u),
+            free, tuple(write(x) for k, x in enumerate(self.a) if k not in free),
+            {name: write(x) for name, x in self.inputs.items()},
+            {name: write(x) for name, x in self.kept.items()}, numbers,
+        )  # fmt: skip
+
+    def _required(self) -> list[Formula]:
+        _, definitions = store.known(store.needed(self.model.scene))
+        made = {key: one.spec for key, one in (self.model.known or {}).items() if one.spec}
+        kernel = fuse_required(self.structure, kernels_of({**definitions, **made}))
+        given = {"p": self.p, "t": [self.t], "q": self.q, "u": self.u, "a": self.a}
+        return replayed(kernel, given, FormulaArithmetic(branches=True))["required"]
+
+
+def _short(letter: str, owner: str, name: str, count: int) -> str:
+    """q_pivot of a hinge with one coordinate, q_ball.x of one with several."""
+    return f"{letter}_{owner}" if count == 1 else f"{letter}_{owner}.{name}"
+
+
+def _without(x: Formula, symbols: Sequence[Formula]) -> Formula:
+    """The terms without any of these symbols."""
+    atoms = {atom for symbol in symbols for monomial in symbol.terms for atom, _ in monomial}
+    kept = {m: c for m, c in x.terms.items() if not any(atom in atoms for atom, _ in m)}
+    return formula(0.0) if not kept else Formula(x.value, kept)

@@ -1,0 +1,176 @@
+"""`mstmm.equations`: elements and whole scenes as formulas, which a notebook shows."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING
+
+import sympy as sp
+
+from ..derive.show.document import (
+    Code,
+    Formula,
+    Heading,
+    Item,
+    Paragraph,
+    Quantities,
+    QuantityRow,
+    document,
+)
+from ..derive.show.formulas import stated
+from ..derive.show.layout import layout
+from ..derive.show.measure import Columns
+from ..derive.show.page import printed
+from ..derive.show.subjects import of_element, view
+from ..errors import ElementError, SceneError
+from ..scene import Scene
+from ..scene.checks.types import types
+from .closed import ClosedEquations, Motion, closed
+from .drawing import path, tree
+
+if TYPE_CHECKING:
+    from ..derive.catalogue.registry import Element
+    from ..runtime.model.model import Model
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """A page of equations: `text`, `latex` (needs amsmath) and `html`; notebooks show it.
+
+    Attributes:
+        closed: M(q) u' + h = tau of a scene, in SymPy; None for an element, and for a scene that
+            has none, whose page says why.
+    """
+
+    title: str
+    items: Callable[[Columns], list[Item]]
+    closed: ClosedEquations | None = None
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __repr__(self) -> str:
+        return f"<Equations: {self.title}>"
+
+    @property
+    def text(self) -> str:
+        """Lines of 100 columns."""
+        return printed(self.title, self.items, "text")
+
+    @property
+    def latex(self) -> str:
+        """A fragment for a document."""
+        return printed(self.title, self.items, "latex")
+
+    @property
+    def html(self) -> str:
+        """One page that needs nothing else."""
+        return printed(self.title, self.items, "html")
+
+    def _repr_latex_(self) -> str:
+        return self.latex
+
+    def _repr_html_(self) -> str:
+        page = escape(self.html)
+        return f'<iframe srcdoc="{page}" style="width: 100%; height: 32rem; border: 0"></iframe>'
+
+
+def equations(
+    of: str | os.PathLike[str] | Scene | Model | Element, keep: Sequence[str] = ()
+) -> Equations:
+    """The equations of an element, or of a scene: its tree, the way of the sweep, and, where it is
+    a small tree, M(q) u' + h(q, u, t) = tau in closed form.
+
+    Args:
+        of: name of an element ("pin", "force_spring"; `mstmm list`), an element of your own, a
+            scene, the path of its file, or its model.
+        keep: numbers of the scene that stay symbols, such as "rod1.mass" or "gravity[1]".
+
+    Raises ElementError for a name that is none, SceneError for what is wrong with a scene, and for
+    names in `keep` that it does not have.
+    """
+    if isinstance(of, str) and not of.endswith(".toml"):
+        return _of_element(of, keep)
+    if isinstance(of, str | os.PathLike | Scene):
+        from .compilation import compile_scene
+
+        return _of_model(compile_scene(of, engine="looped"), keep)
+    from ..runtime.model.model import Model
+
+    if isinstance(of, Model):
+        return _of_model(of, keep)
+    return _of_element(of, keep)
+
+
+def _of_element(of: str | Element, keep: Sequence[str]) -> Equations:
+    if keep:
+        raise ElementError("keep names numbers of a scene; those of elements are symbols already")
+    shown = view(of) if isinstance(of, str) else of_element(of() if isinstance(of, type) else of)
+    return Equations(shown.title, lambda measure: document(shown, "equations", measure))
+
+
+def _of_model(model: Model, keep: Sequence[str] = ()) -> Equations:
+    """See `equations`."""
+    found: ClosedEquations | None = None
+    refused = ""
+    try:
+        found = closed(model, keep)
+    except SceneError as error:
+        if keep:
+            raise
+        refused = str(error)
+    title = f"scene of {model.scene.summary}"
+    return Equations(title, lambda m: _items(model, title, found, refused, m), found)
+
+
+def _items(
+    model: Model, title: str, found: ClosedEquations | None, refused: str, measure: Columns
+) -> list[Item]:
+    elements = ", ".join(f"mstmm show {kind}_{name}" for kind, name in sorted(types(model.scene)))
+    items: list[Item] = [
+        Heading(title, 1),
+        Heading("Tree", 2),
+        Code("\n".join(tree(model))),
+        Paragraph(f"Equations of its elements: {elements}."),
+        Heading("Way of the sweep", 2),
+    ]
+    if model.loops.cut:
+        items.append(
+            Paragraph("What closes loops is found on top: mstmm show sweep_loops, mstmm show sweep")
+        )
+    for whole, lines in path(model):
+        items += [
+            Paragraph(f"{whole.name}, {whole.order}: {whole.purpose}"),
+            Code("\n".join(lines)),
+        ]
+    items.append(Heading("Closed equations", 2))
+    return items + (_closed(found, measure) if found else [Paragraph(refused, "sources")])
+
+
+def _closed(found: ClosedEquations, measure: Columns) -> list[Item]:
+    free = [found.speeds[k] for k in found.free]
+    rates = sp.Matrix([sp.Symbol(f"udot{str(one.symbol)[1:]}") for one in free])
+    n = len(free)
+    m, h, tau, u = (sp.MatrixSymbol(name, n, k) for name, k in
+                    (("M", n), ("h", 1), ("tau", 1), ("udot", 1)))  # fmt: skip
+    rows = [_row(one) for one in (*found.coordinates, *found.speeds)]
+    kept = [QuantityRow(layout(s), name, "1", "", "") for name, s in
+            (*found.parameters.items(), *found.inputs.items())]  # fmt: skip
+    return [
+        Quantities((*rows, *kept)),
+        Formula("equations of motion", tuple(stated(m * u + h, tau, measure=measure))),
+        Formula("accelerations", tuple(stated(u, rates, measure=measure))),
+        Formula("mass matrix", tuple(stated(m, found.M, measure=measure))),
+        Formula("inertia, gravity, laws and loads", tuple(stated(h, found.h, measure=measure))),
+        Paragraph(
+            "tau are efforts on the speeds beyond those of the laws. Numbers of the scene that are "
+            "not kept as symbols stand as they are."
+        ),
+    ]
+
+
+def _row(one: Motion) -> QuantityRow:
+    return QuantityRow(layout(one.symbol), one.name, "1", one.unit, "")
