@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from ..linear.motions import Modes
     from ..linear.response import FrequencyResponse
     from ..linear.waterfall import Waterfall
+    from ..result.batch import Batch
     from ..result.result import Result
-    from ..run.batch.batch import BatchResult
     from ..run.batch.inputs import BatchInput
     from .derivatives import Derivatives, Differentiation
     from .equilibrium import Equilibrium
@@ -583,7 +583,7 @@ class Model(Compiled):
         radius: float | None = None,
         tangent: str = "auto",
         threads: int | None = None,
-    ) -> BatchResult:
+    ) -> Batch:
         """Integrate n independent trajectories to `t_end` (s).
 
         Args:
@@ -604,6 +604,7 @@ class Model(Compiled):
 
         Raises SceneError for settings, shapes or parameters that make no sense.
         """
+        from ..result.batch import Batch
         from ..run.batch.batch import prepared, simulate_batch
 
         settings = Settings(
@@ -611,9 +612,10 @@ class Model(Compiled):
             radius=radius, tangent=tangent,
         )  # fmt: skip
         settings, q, u = prepared(self, settings, initial_states)
-        return simulate_batch(
+        found = simulate_batch(
             self, settings, q, u, {} if parameters is None else parameters, inputs, threads
         )
+        return Batch(**vars(found))
 
 
 __all__ = ["Model", "NumericalFailure"]

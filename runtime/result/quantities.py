@@ -269,7 +269,7 @@ class Quantities:
         held = packed.system.held.places[packed.layout.inputs[name]]
         if held >= 0:
             return lambda: self.run.memory[:, held]
-        channel = self.observed.references.scene.channels[name]
+        channel = packed.system.inputs[packed.layout.inputs[name]]
         return lambda: np.array([channel.value(t) for t in self.run.t.tolist()])
 
     def _kept(self, place: int) -> Values:

@@ -38,17 +38,23 @@ def dataset(result: Record) -> Any:
         import xarray
     except ImportError as error:
         raise missing("io", "an xarray Dataset", error) from None
-    variables, labels = _states(result), _labels(result)
-    if result.model.nu <= MOST_SPEEDS:
-        variables |= _bodies(result) | _hinges(result) | flexible.variables(result)
-        variables |= _acting(result)
-    else:
-        labels = {key: label for key, label in labels.items() if key not in _EVERYTHING}
-    variables |= _sums(result) | _given(result) | provenance.variables(result)
-    return xarray.Dataset(variables, labels, provenance.attributes(result))
+    found, labels = variables(result)
+    found |= provenance.variables(result)
+    return xarray.Dataset(found, labels, provenance.attributes(result))
 
 
 Variable = tuple[tuple[str, ...], Any, dict[str, str]]
+
+
+def variables(result: Record) -> tuple[dict[str, Variable], dict[str, Variable]]:
+    """What a run gave, and the labels of its dimensions; see `dataset`."""
+    found, labels = _states(result), _labels(result)
+    if result.model.nu <= MOST_SPEEDS:
+        found |= _bodies(result) | _hinges(result) | flexible.variables(result)
+        found |= _acting(result)
+    else:
+        labels = {key: label for key, label in labels.items() if key not in _EVERYTHING}
+    return found | _sums(result) | _given(result), labels
 
 
 def _words(values: list[str]) -> Any:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from mstmm.errors import EnvironmentFailure, SceneError
 from mstmm.extras import missing
@@ -17,9 +20,7 @@ from .tabled import TABLES, write
 def save(result: Record, path: Path) -> Path:
     """Write a result; the suffix says how."""
     if path.suffix.lower() == ".nc":
-        with replacing(path) as temporary:
-            _netcdf(result, temporary)
-        return path
+        return save_dataset(partial(dataset, result), path)
     if path.suffix.lower() not in TABLES:
         raise SceneError(f'result file "{path}": expected a name that ends in .nc, .csv or .mat')
     if result.model.nu > MOST_SPEEDS:
@@ -31,8 +32,14 @@ def save(result: Record, path: Path) -> Path:
     return write(result.t, result.event, quantities, path, result.model.scene.to_toml())
 
 
-def _netcdf(result: Record, path: Path) -> None:
-    data = dataset(result)
+def save_dataset(made: Callable[[], Any], path: Path) -> Path:
+    """Write a Dataset as NetCDF, with a hash of itself at its end."""
+    with replacing(path) as temporary:
+        _netcdf(made(), temporary)
+    return path
+
+
+def _netcdf(data: Any, path: Path) -> None:
     try:
         import h5netcdf  # noqa: F401
     except ImportError as error:

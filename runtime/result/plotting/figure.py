@@ -78,11 +78,6 @@ def drawn(
 
     Raises SceneError for an unknown name, EnvironmentFailure without the extra.
     """
-    try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise missing("plot", "a picture", error) from None
     for label, run in runs.items():
         if not len(run.t):
             which = f"{label}: " if len(runs) > 1 else ""
@@ -91,7 +86,23 @@ def drawn(
             )
     shapes, curves = _sorted(runs, wanted)
     made = panels(runs, replace(wanted, names=curves)) if curves or not wanted.names else []
-    pictures = [_shape(runs, name) for name in shapes]
+    return _composed([_shape(runs, name) for name in shapes], shapes, made, title, ax)
+
+
+def compose(made: Sequence[Panel], title: str | None = None, ax: Any = None) -> Drawn:
+    """Panels of curves in one figure.  EnvironmentFailure without the extra."""
+    return _composed([], (), made, title, ax)
+
+
+def _composed(
+    pictures: list[Picture], shapes: tuple[str, ...], made: Sequence[Panel], title: str | None,
+    ax: Any,
+) -> Drawn:  # fmt: skip
+    try:
+        import matplotlib as mpl
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise missing("plot", "a picture", error) from None
     pictures += [
         Picture(partial(_draw, one), _HEIGHT + (_EQUAL if one.alike else 0), one.kind == "time")
         for one in made

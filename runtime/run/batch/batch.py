@@ -42,6 +42,18 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
+class BatchModels:
+    """The model of each run, with its own numbers and inputs."""
+
+    models: tuple[Compiled, ...]
+    given: BatchInputs
+
+    def of(self, k: int) -> Compiled:
+        """That of run k."""
+        return self.given.model(self.models[k], k)
+
+
+@dataclass(frozen=True)
 class BatchResult:
     """What n runs gave.
 
@@ -55,6 +67,9 @@ class BatchResult:
         engine: how it was computed, in words.
         methods: n times what each run did, where runs choose among methods ("auto"); empty for
             those of one method.
+        memory: (n, m, memory) of events, turns and controllers.
+        settings: how all runs were made.
+        models: the model of each.
     """
 
     t: Array
@@ -65,9 +80,13 @@ class BatchResult:
     evaluations: NDArray[np.int64]
     engine: str
     methods: tuple[tuple[Stretch, ...], ...]
+    memory: Array
+    settings: Settings
+    models: BatchModels
 
     def __repr__(self) -> str:
-        return f"<BatchResult: {int(self.success.sum())} of {len(self.success)} runs succeeded>"
+        count = f"{int(self.success.sum())} of {len(self.success)}"
+        return f"<{type(self).__name__}: {count} runs succeeded>"
 
 
 @dataclass
@@ -79,6 +98,7 @@ class _Rows:
     messages: list[str]
     evaluations: NDArray[np.int64]
     methods: list[tuple[Stretch, ...]]
+    memory: Array  # (n, m, memory)
 
 
 def simulate_batch(
@@ -107,6 +127,7 @@ def simulate_batch(
         np.full((n, len(times), model.nq + model.nu), np.nan), np.zeros(n, dtype=bool),
         [str(one) if isinstance(one, MstmmError) else "" for one in made],
         np.zeros(n, dtype=np.int64), [()] * n,
+        np.full((n, len(times), model.packed.system.n_memory), np.nan),
     )  # fmt: skip
     alike = _of_equal_times(model, models, settings)
     closing = bool(model.packed.system.closures)  # by numbers that all share
@@ -123,7 +144,7 @@ def simulate_batch(
     return BatchResult(
         times, rows.samples[..., :nq].copy(), rows.samples[..., nq:].copy(), rows.success,
         tuple(rows.messages), rows.evaluations, f"{how} on {count} threads",
-        tuple(rows.methods),
+        tuple(rows.methods), rows.memory, settings, BatchModels(tuple(models), by_row),
     )  # fmt: skip
 
 
@@ -282,6 +303,7 @@ def _alone(
     found = trajectory(system, run, settings, status, said(system, run, status))
     places = np.searchsorted(np.asarray(settings.output_times), found.t)
     rows.samples[i, places] = np.concatenate([found.q, found.u], axis=1)
+    rows.memory[i, places] = found.memory
     rows.success[i], rows.messages[i] = found.success, found.message
     rows.evaluations[i] = found.statistics.evaluations
     rows.methods[i] = () if choice is None else tuple(choice.stretches)
