@@ -830,6 +830,8 @@ int mstmm_sweep_generic1_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic1_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic1_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic1_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic1_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e);
 int mstmm_sweep_generic1_push_on_ground(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
@@ -924,6 +926,8 @@ int mstmm_sweep_generic2_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic2_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic2_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic2_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic2_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e);
 int mstmm_sweep_generic2_push_on_ground(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
@@ -1018,6 +1022,8 @@ int mstmm_sweep_generic3_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic3_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic3_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic3_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic3_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e);
 int mstmm_sweep_generic3_push_on_ground(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
@@ -1112,6 +1118,8 @@ int mstmm_sweep_generic4_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic4_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic4_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic4_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic4_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e);
 int mstmm_sweep_generic4_push_on_ground(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
@@ -1206,6 +1214,8 @@ int mstmm_sweep_generic5_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic5_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic5_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic5_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic5_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e);
 int mstmm_sweep_generic5_push_on_ground(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
@@ -1300,6 +1310,8 @@ int mstmm_sweep_generic6_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic6_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic6_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic6_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic6_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e);
 int mstmm_sweep_generic6_push_on_ground(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,

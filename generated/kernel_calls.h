@@ -3225,6 +3225,22 @@ static inline int mstmm_generic_effort_by(int speeds, struct mstmm_generic_effor
 }
 #define mstmm_generic_effort(speeds, ...) mstmm_generic_effort_by(speeds, (struct mstmm_generic_effort){__VA_ARGS__})
 
+struct mstmm_generic_exerted {
+    const real *S;
+    const real *H;
+    const real *udot;
+    real *e;
+};
+typedef int mstmm_generic_exerted_kernel(
+    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+extern mstmm_generic_exerted_kernel *const mstmm_generic_exerted_table[];
+static inline int mstmm_generic_exerted_by(int speeds, struct mstmm_generic_exerted to)
+{
+    return mstmm_generic_exerted_table[speeds](
+        to.S, to.H, to.udot, to.e);
+}
+#define mstmm_generic_exerted(speeds, ...) mstmm_generic_exerted_by(speeds, (struct mstmm_generic_exerted){__VA_ARGS__})
+
 struct mstmm_generic_project {
     const real *Rc;
     const real *r;

@@ -86,6 +86,8 @@ int mstmm_sweep_generic1_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic1_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic1_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic1_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic1_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e);
 int mstmm_sweep_generic1_push_on_ground(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
@@ -4695,6 +4697,112 @@ static const mstmm_port mstmm_sweep_generic1_pull_outputs[] = {
     {"y_0", 1, "", 1, 0},
 };
 
+/* load of what a hinge with 1 speeds accelerates
+ * in  S[21] inertia of everything outboard, at P
+ * in  H[6] motion subspace
+ * in  udot[1] accelerations of the coordinates
+ * out e[6] (N, N*m) force part of f = S a + e, at P
+ */
+int mstmm_sweep_generic1_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e)
+{
+    const real t0 = S[0] * H[0];
+    const real t1 = S[1] * H[1];
+    const real t2 = t0 + t1;
+    const real t3 = S[2] * H[2];
+    const real t4 = t2 + t3;
+    const real t5 = S[3] * H[3];
+    const real t6 = t4 + t5;
+    const real t7 = S[4] * H[4];
+    const real t8 = t6 + t7;
+    const real t9 = S[5] * H[5];
+    const real t10 = t8 + t9;
+    const real t11 = udot[0] * t10;
+    e[0] = t11;
+    const real t12 = S[1] * H[0];
+    const real t13 = S[6] * H[1];
+    const real t14 = t12 + t13;
+    const real t15 = S[7] * H[2];
+    const real t16 = t14 + t15;
+    const real t17 = S[8] * H[3];
+    const real t18 = t16 + t17;
+    const real t19 = S[9] * H[4];
+    const real t20 = t18 + t19;
+    const real t21 = S[10] * H[5];
+    const real t22 = t20 + t21;
+    const real t23 = udot[0] * t22;
+    e[1] = t23;
+    const real t24 = S[2] * H[0];
+    const real t25 = S[7] * H[1];
+    const real t26 = t24 + t25;
+    const real t27 = S[11] * H[2];
+    const real t28 = t26 + t27;
+    const real t29 = S[12] * H[3];
+    const real t30 = t28 + t29;
+    const real t31 = S[13] * H[4];
+    const real t32 = t30 + t31;
+    const real t33 = S[14] * H[5];
+    const real t34 = t32 + t33;
+    const real t35 = udot[0] * t34;
+    e[2] = t35;
+    const real t36 = S[3] * H[0];
+    const real t37 = S[8] * H[1];
+    const real t38 = t36 + t37;
+    const real t39 = S[12] * H[2];
+    const real t40 = t38 + t39;
+    const real t41 = S[15] * H[3];
+    const real t42 = t40 + t41;
+    const real t43 = S[16] * H[4];
+    const real t44 = t42 + t43;
+    const real t45 = S[17] * H[5];
+    const real t46 = t44 + t45;
+    const real t47 = udot[0] * t46;
+    e[3] = t47;
+    const real t48 = S[4] * H[0];
+    const real t49 = S[9] * H[1];
+    const real t50 = t48 + t49;
+    const real t51 = S[13] * H[2];
+    const real t52 = t50 + t51;
+    const real t53 = S[16] * H[3];
+    const real t54 = t52 + t53;
+    const real t55 = S[18] * H[4];
+    const real t56 = t54 + t55;
+    const real t57 = S[19] * H[5];
+    const real t58 = t56 + t57;
+    const real t59 = udot[0] * t58;
+    e[4] = t59;
+    const real t60 = S[5] * H[0];
+    const real t61 = S[10] * H[1];
+    const real t62 = t60 + t61;
+    const real t63 = S[14] * H[2];
+    const real t64 = t62 + t63;
+    const real t65 = S[17] * H[3];
+    const real t66 = t64 + t65;
+    const real t67 = S[19] * H[4];
+    const real t68 = t66 + t67;
+    const real t69 = S[20] * H[5];
+    const real t70 = t68 + t69;
+    const real t71 = udot[0] * t70;
+    e[5] = t71;
+    return 0;
+}
+
+static int mstmm_sweep_generic1_exerted_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic1_exerted(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic1_exerted_inputs[] = {
+    {"S", 21, "", 0, 0},
+    {"H", 6, "", 0, 0},
+    {"udot", 1, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic1_exerted_outputs[] = {
+    {"e", 6, "N, N*m", 0, 0},
+};
+
 /* load of a column felt by a hinge on the ground with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -5913,6 +6021,18 @@ static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "exerted",
+        .function = (void (*)(void))mstmm_sweep_generic1_exerted,
+        .call = mstmm_sweep_generic1_exerted_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic1_exerted_inputs,
+        .outputs = mstmm_sweep_generic1_exerted_outputs,
+        .ir_hash = "1fabdff00b4298bee59ba91b7224345d746abc1e7e8756d533ff43e1d293534e",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "push_on_ground",
         .function = (void (*)(void))mstmm_sweep_generic1_push_on_ground,
         .call = mstmm_sweep_generic1_push_on_ground_call,
@@ -5990,7 +6110,7 @@ const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "5450f6653664393c3993755ae48481263ab0d080fe9075f4603e753586e2dd52",
+    .hash = "91917e96cd1e545e87f72684932de95628858e6e56e16cf28e3aba9dcc2df9f4",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -6000,6 +6120,6 @@ const mstmm_element mstmm_sweep_generic1 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 31,
+    .n_kernels = 32,
     .kernels = mstmm_sweep_generic1_kernels,
 };

@@ -86,6 +86,8 @@ int mstmm_sweep_generic2_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic2_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic2_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic2_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic2_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e);
 int mstmm_sweep_generic2_push_on_ground(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
@@ -6149,6 +6151,190 @@ static const mstmm_port mstmm_sweep_generic2_pull_outputs[] = {
     {"y_0", 2, "", 1, 0},
 };
 
+/* load of what a hinge with 2 speeds accelerates
+ * in  S[21] inertia of everything outboard, at P
+ * in  H[6][2] motion subspace
+ * in  udot[2] accelerations of the coordinates
+ * out e[6] (N, N*m) force part of f = S a + e, at P
+ */
+int mstmm_sweep_generic2_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e)
+{
+    const real t0 = S[0] * H[0];
+    const real t1 = S[1] * H[2];
+    const real t2 = t0 + t1;
+    const real t3 = S[2] * H[4];
+    const real t4 = t2 + t3;
+    const real t5 = S[3] * H[6];
+    const real t6 = t4 + t5;
+    const real t7 = S[4] * H[8];
+    const real t8 = t6 + t7;
+    const real t9 = S[5] * H[10];
+    const real t10 = t8 + t9;
+    const real t11 = udot[0] * t10;
+    const real t12 = S[0] * H[1];
+    const real t13 = S[1] * H[3];
+    const real t14 = t12 + t13;
+    const real t15 = S[2] * H[5];
+    const real t16 = t14 + t15;
+    const real t17 = S[3] * H[7];
+    const real t18 = t16 + t17;
+    const real t19 = S[4] * H[9];
+    const real t20 = t18 + t19;
+    const real t21 = S[5] * H[11];
+    const real t22 = t20 + t21;
+    const real t23 = udot[1] * t22;
+    const real t24 = t11 + t23;
+    e[0] = t24;
+    const real t25 = S[1] * H[0];
+    const real t26 = S[6] * H[2];
+    const real t27 = t25 + t26;
+    const real t28 = S[7] * H[4];
+    const real t29 = t27 + t28;
+    const real t30 = S[8] * H[6];
+    const real t31 = t29 + t30;
+    const real t32 = S[9] * H[8];
+    const real t33 = t31 + t32;
+    const real t34 = S[10] * H[10];
+    const real t35 = t33 + t34;
+    const real t36 = udot[0] * t35;
+    const real t37 = S[1] * H[1];
+    const real t38 = S[6] * H[3];
+    const real t39 = t37 + t38;
+    const real t40 = S[7] * H[5];
+    const real t41 = t39 + t40;
+    const real t42 = S[8] * H[7];
+    const real t43 = t41 + t42;
+    const real t44 = S[9] * H[9];
+    const real t45 = t43 + t44;
+    const real t46 = S[10] * H[11];
+    const real t47 = t45 + t46;
+    const real t48 = udot[1] * t47;
+    const real t49 = t36 + t48;
+    e[1] = t49;
+    const real t50 = S[2] * H[0];
+    const real t51 = S[7] * H[2];
+    const real t52 = t50 + t51;
+    const real t53 = S[11] * H[4];
+    const real t54 = t52 + t53;
+    const real t55 = S[12] * H[6];
+    const real t56 = t54 + t55;
+    const real t57 = S[13] * H[8];
+    const real t58 = t56 + t57;
+    const real t59 = S[14] * H[10];
+    const real t60 = t58 + t59;
+    const real t61 = udot[0] * t60;
+    const real t62 = S[2] * H[1];
+    const real t63 = S[7] * H[3];
+    const real t64 = t62 + t63;
+    const real t65 = S[11] * H[5];
+    const real t66 = t64 + t65;
+    const real t67 = S[12] * H[7];
+    const real t68 = t66 + t67;
+    const real t69 = S[13] * H[9];
+    const real t70 = t68 + t69;
+    const real t71 = S[14] * H[11];
+    const real t72 = t70 + t71;
+    const real t73 = udot[1] * t72;
+    const real t74 = t61 + t73;
+    e[2] = t74;
+    const real t75 = S[3] * H[0];
+    const real t76 = S[8] * H[2];
+    const real t77 = t75 + t76;
+    const real t78 = S[12] * H[4];
+    const real t79 = t77 + t78;
+    const real t80 = S[15] * H[6];
+    const real t81 = t79 + t80;
+    const real t82 = S[16] * H[8];
+    const real t83 = t81 + t82;
+    const real t84 = S[17] * H[10];
+    const real t85 = t83 + t84;
+    const real t86 = udot[0] * t85;
+    const real t87 = S[3] * H[1];
+    const real t88 = S[8] * H[3];
+    const real t89 = t87 + t88;
+    const real t90 = S[12] * H[5];
+    const real t91 = t89 + t90;
+    const real t92 = S[15] * H[7];
+    const real t93 = t91 + t92;
+    const real t94 = S[16] * H[9];
+    const real t95 = t93 + t94;
+    const real t96 = S[17] * H[11];
+    const real t97 = t95 + t96;
+    const real t98 = udot[1] * t97;
+    const real t99 = t86 + t98;
+    e[3] = t99;
+    const real t100 = S[4] * H[0];
+    const real t101 = S[9] * H[2];
+    const real t102 = t100 + t101;
+    const real t103 = S[13] * H[4];
+    const real t104 = t102 + t103;
+    const real t105 = S[16] * H[6];
+    const real t106 = t104 + t105;
+    const real t107 = S[18] * H[8];
+    const real t108 = t106 + t107;
+    const real t109 = S[19] * H[10];
+    const real t110 = t108 + t109;
+    const real t111 = udot[0] * t110;
+    const real t112 = S[4] * H[1];
+    const real t113 = S[9] * H[3];
+    const real t114 = t112 + t113;
+    const real t115 = S[13] * H[5];
+    const real t116 = t114 + t115;
+    const real t117 = S[16] * H[7];
+    const real t118 = t116 + t117;
+    const real t119 = S[18] * H[9];
+    const real t120 = t118 + t119;
+    const real t121 = S[19] * H[11];
+    const real t122 = t120 + t121;
+    const real t123 = udot[1] * t122;
+    const real t124 = t111 + t123;
+    e[4] = t124;
+    const real t125 = S[5] * H[0];
+    const real t126 = S[10] * H[2];
+    const real t127 = t125 + t126;
+    const real t128 = S[14] * H[4];
+    const real t129 = t127 + t128;
+    const real t130 = S[17] * H[6];
+    const real t131 = t129 + t130;
+    const real t132 = S[19] * H[8];
+    const real t133 = t131 + t132;
+    const real t134 = S[20] * H[10];
+    const real t135 = t133 + t134;
+    const real t136 = udot[0] * t135;
+    const real t137 = S[5] * H[1];
+    const real t138 = S[10] * H[3];
+    const real t139 = t137 + t138;
+    const real t140 = S[14] * H[5];
+    const real t141 = t139 + t140;
+    const real t142 = S[17] * H[7];
+    const real t143 = t141 + t142;
+    const real t144 = S[19] * H[9];
+    const real t145 = t143 + t144;
+    const real t146 = S[20] * H[11];
+    const real t147 = t145 + t146;
+    const real t148 = udot[1] * t147;
+    const real t149 = t136 + t148;
+    e[5] = t149;
+    return 0;
+}
+
+static int mstmm_sweep_generic2_exerted_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic2_exerted(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic2_exerted_inputs[] = {
+    {"S", 21, "", 0, 0},
+    {"H", 12, "", 0, 0},
+    {"udot", 2, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic2_exerted_outputs[] = {
+    {"e", 6, "N, N*m", 0, 0},
+};
+
 /* load of a column felt by a hinge on the ground with 2 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -7912,6 +8098,18 @@ static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "exerted",
+        .function = (void (*)(void))mstmm_sweep_generic2_exerted,
+        .call = mstmm_sweep_generic2_exerted_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic2_exerted_inputs,
+        .outputs = mstmm_sweep_generic2_exerted_outputs,
+        .ir_hash = "4a45955c76e87c466786a4b357c480a349d720b23243453f6233dd8547c87ddb",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "push_on_ground",
         .function = (void (*)(void))mstmm_sweep_generic2_push_on_ground,
         .call = mstmm_sweep_generic2_push_on_ground_call,
@@ -7989,7 +8187,7 @@ const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "5fb74ec496cf926997e87d36e770f5188c1e97278fc107491a5bd5e844a3ad3b",
+    .hash = "37bc397f6f8e58a78da3506e5cbbf0e2b76a85021e0c0b6e783da0735f3f74e6",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -7999,6 +8197,6 @@ const mstmm_element mstmm_sweep_generic2 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 31,
+    .n_kernels = 32,
     .kernels = mstmm_sweep_generic2_kernels,
 };

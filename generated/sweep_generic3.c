@@ -86,6 +86,8 @@ int mstmm_sweep_generic3_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic3_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic3_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic3_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic3_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e);
 int mstmm_sweep_generic3_push_on_ground(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
@@ -7815,6 +7817,268 @@ static const mstmm_port mstmm_sweep_generic3_pull_outputs[] = {
     {"y_0", 3, "", 1, 0},
 };
 
+/* load of what a hinge with 3 speeds accelerates
+ * in  S[21] inertia of everything outboard, at P
+ * in  H[6][3] motion subspace
+ * in  udot[3] accelerations of the coordinates
+ * out e[6] (N, N*m) force part of f = S a + e, at P
+ */
+int mstmm_sweep_generic3_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e)
+{
+    const real t0 = S[0] * H[0];
+    const real t1 = S[1] * H[3];
+    const real t2 = t0 + t1;
+    const real t3 = S[2] * H[6];
+    const real t4 = t2 + t3;
+    const real t5 = S[3] * H[9];
+    const real t6 = t4 + t5;
+    const real t7 = S[4] * H[12];
+    const real t8 = t6 + t7;
+    const real t9 = S[5] * H[15];
+    const real t10 = t8 + t9;
+    const real t11 = udot[0] * t10;
+    const real t12 = S[0] * H[1];
+    const real t13 = S[1] * H[4];
+    const real t14 = t12 + t13;
+    const real t15 = S[2] * H[7];
+    const real t16 = t14 + t15;
+    const real t17 = S[3] * H[10];
+    const real t18 = t16 + t17;
+    const real t19 = S[4] * H[13];
+    const real t20 = t18 + t19;
+    const real t21 = S[5] * H[16];
+    const real t22 = t20 + t21;
+    const real t23 = udot[1] * t22;
+    const real t24 = t11 + t23;
+    const real t25 = S[0] * H[2];
+    const real t26 = S[1] * H[5];
+    const real t27 = t25 + t26;
+    const real t28 = S[2] * H[8];
+    const real t29 = t27 + t28;
+    const real t30 = S[3] * H[11];
+    const real t31 = t29 + t30;
+    const real t32 = S[4] * H[14];
+    const real t33 = t31 + t32;
+    const real t34 = S[5] * H[17];
+    const real t35 = t33 + t34;
+    const real t36 = udot[2] * t35;
+    const real t37 = t24 + t36;
+    e[0] = t37;
+    const real t38 = S[1] * H[0];
+    const real t39 = S[6] * H[3];
+    const real t40 = t38 + t39;
+    const real t41 = S[7] * H[6];
+    const real t42 = t40 + t41;
+    const real t43 = S[8] * H[9];
+    const real t44 = t42 + t43;
+    const real t45 = S[9] * H[12];
+    const real t46 = t44 + t45;
+    const real t47 = S[10] * H[15];
+    const real t48 = t46 + t47;
+    const real t49 = udot[0] * t48;
+    const real t50 = S[1] * H[1];
+    const real t51 = S[6] * H[4];
+    const real t52 = t50 + t51;
+    const real t53 = S[7] * H[7];
+    const real t54 = t52 + t53;
+    const real t55 = S[8] * H[10];
+    const real t56 = t54 + t55;
+    const real t57 = S[9] * H[13];
+    const real t58 = t56 + t57;
+    const real t59 = S[10] * H[16];
+    const real t60 = t58 + t59;
+    const real t61 = udot[1] * t60;
+    const real t62 = t49 + t61;
+    const real t63 = S[1] * H[2];
+    const real t64 = S[6] * H[5];
+    const real t65 = t63 + t64;
+    const real t66 = S[7] * H[8];
+    const real t67 = t65 + t66;
+    const real t68 = S[8] * H[11];
+    const real t69 = t67 + t68;
+    const real t70 = S[9] * H[14];
+    const real t71 = t69 + t70;
+    const real t72 = S[10] * H[17];
+    const real t73 = t71 + t72;
+    const real t74 = udot[2] * t73;
+    const real t75 = t62 + t74;
+    e[1] = t75;
+    const real t76 = S[2] * H[0];
+    const real t77 = S[7] * H[3];
+    const real t78 = t76 + t77;
+    const real t79 = S[11] * H[6];
+    const real t80 = t78 + t79;
+    const real t81 = S[12] * H[9];
+    const real t82 = t80 + t81;
+    const real t83 = S[13] * H[12];
+    const real t84 = t82 + t83;
+    const real t85 = S[14] * H[15];
+    const real t86 = t84 + t85;
+    const real t87 = udot[0] * t86;
+    const real t88 = S[2] * H[1];
+    const real t89 = S[7] * H[4];
+    const real t90 = t88 + t89;
+    const real t91 = S[11] * H[7];
+    const real t92 = t90 + t91;
+    const real t93 = S[12] * H[10];
+    const real t94 = t92 + t93;
+    const real t95 = S[13] * H[13];
+    const real t96 = t94 + t95;
+    const real t97 = S[14] * H[16];
+    const real t98 = t96 + t97;
+    const real t99 = udot[1] * t98;
+    const real t100 = t87 + t99;
+    const real t101 = S[2] * H[2];
+    const real t102 = S[7] * H[5];
+    const real t103 = t101 + t102;
+    const real t104 = S[11] * H[8];
+    const real t105 = t103 + t104;
+    const real t106 = S[12] * H[11];
+    const real t107 = t105 + t106;
+    const real t108 = S[13] * H[14];
+    const real t109 = t107 + t108;
+    const real t110 = S[14] * H[17];
+    const real t111 = t109 + t110;
+    const real t112 = udot[2] * t111;
+    const real t113 = t100 + t112;
+    e[2] = t113;
+    const real t114 = S[3] * H[0];
+    const real t115 = S[8] * H[3];
+    const real t116 = t114 + t115;
+    const real t117 = S[12] * H[6];
+    const real t118 = t116 + t117;
+    const real t119 = S[15] * H[9];
+    const real t120 = t118 + t119;
+    const real t121 = S[16] * H[12];
+    const real t122 = t120 + t121;
+    const real t123 = S[17] * H[15];
+    const real t124 = t122 + t123;
+    const real t125 = udot[0] * t124;
+    const real t126 = S[3] * H[1];
+    const real t127 = S[8] * H[4];
+    const real t128 = t126 + t127;
+    const real t129 = S[12] * H[7];
+    const real t130 = t128 + t129;
+    const real t131 = S[15] * H[10];
+    const real t132 = t130 + t131;
+    const real t133 = S[16] * H[13];
+    const real t134 = t132 + t133;
+    const real t135 = S[17] * H[16];
+    const real t136 = t134 + t135;
+    const real t137 = udot[1] * t136;
+    const real t138 = t125 + t137;
+    const real t139 = S[3] * H[2];
+    const real t140 = S[8] * H[5];
+    const real t141 = t139 + t140;
+    const real t142 = S[12] * H[8];
+    const real t143 = t141 + t142;
+    const real t144 = S[15] * H[11];
+    const real t145 = t143 + t144;
+    const real t146 = S[16] * H[14];
+    const real t147 = t145 + t146;
+    const real t148 = S[17] * H[17];
+    const real t149 = t147 + t148;
+    const real t150 = udot[2] * t149;
+    const real t151 = t138 + t150;
+    e[3] = t151;
+    const real t152 = S[4] * H[0];
+    const real t153 = S[9] * H[3];
+    const real t154 = t152 + t153;
+    const real t155 = S[13] * H[6];
+    const real t156 = t154 + t155;
+    const real t157 = S[16] * H[9];
+    const real t158 = t156 + t157;
+    const real t159 = S[18] * H[12];
+    const real t160 = t158 + t159;
+    const real t161 = S[19] * H[15];
+    const real t162 = t160 + t161;
+    const real t163 = udot[0] * t162;
+    const real t164 = S[4] * H[1];
+    const real t165 = S[9] * H[4];
+    const real t166 = t164 + t165;
+    const real t167 = S[13] * H[7];
+    const real t168 = t166 + t167;
+    const real t169 = S[16] * H[10];
+    const real t170 = t168 + t169;
+    const real t171 = S[18] * H[13];
+    const real t172 = t170 + t171;
+    const real t173 = S[19] * H[16];
+    const real t174 = t172 + t173;
+    const real t175 = udot[1] * t174;
+    const real t176 = t163 + t175;
+    const real t177 = S[4] * H[2];
+    const real t178 = S[9] * H[5];
+    const real t179 = t177 + t178;
+    const real t180 = S[13] * H[8];
+    const real t181 = t179 + t180;
+    const real t182 = S[16] * H[11];
+    const real t183 = t181 + t182;
+    const real t184 = S[18] * H[14];
+    const real t185 = t183 + t184;
+    const real t186 = S[19] * H[17];
+    const real t187 = t185 + t186;
+    const real t188 = udot[2] * t187;
+    const real t189 = t176 + t188;
+    e[4] = t189;
+    const real t190 = S[5] * H[0];
+    const real t191 = S[10] * H[3];
+    const real t192 = t190 + t191;
+    const real t193 = S[14] * H[6];
+    const real t194 = t192 + t193;
+    const real t195 = S[17] * H[9];
+    const real t196 = t194 + t195;
+    const real t197 = S[19] * H[12];
+    const real t198 = t196 + t197;
+    const real t199 = S[20] * H[15];
+    const real t200 = t198 + t199;
+    const real t201 = udot[0] * t200;
+    const real t202 = S[5] * H[1];
+    const real t203 = S[10] * H[4];
+    const real t204 = t202 + t203;
+    const real t205 = S[14] * H[7];
+    const real t206 = t204 + t205;
+    const real t207 = S[17] * H[10];
+    const real t208 = t206 + t207;
+    const real t209 = S[19] * H[13];
+    const real t210 = t208 + t209;
+    const real t211 = S[20] * H[16];
+    const real t212 = t210 + t211;
+    const real t213 = udot[1] * t212;
+    const real t214 = t201 + t213;
+    const real t215 = S[5] * H[2];
+    const real t216 = S[10] * H[5];
+    const real t217 = t215 + t216;
+    const real t218 = S[14] * H[8];
+    const real t219 = t217 + t218;
+    const real t220 = S[17] * H[11];
+    const real t221 = t219 + t220;
+    const real t222 = S[19] * H[14];
+    const real t223 = t221 + t222;
+    const real t224 = S[20] * H[17];
+    const real t225 = t223 + t224;
+    const real t226 = udot[2] * t225;
+    const real t227 = t214 + t226;
+    e[5] = t227;
+    return 0;
+}
+
+static int mstmm_sweep_generic3_exerted_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic3_exerted(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic3_exerted_inputs[] = {
+    {"S", 21, "", 0, 0},
+    {"H", 18, "", 0, 0},
+    {"udot", 3, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic3_exerted_outputs[] = {
+    {"e", 6, "N, N*m", 0, 0},
+};
+
 /* load of a column felt by a hinge on the ground with 3 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -10152,6 +10416,18 @@ static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "exerted",
+        .function = (void (*)(void))mstmm_sweep_generic3_exerted,
+        .call = mstmm_sweep_generic3_exerted_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic3_exerted_inputs,
+        .outputs = mstmm_sweep_generic3_exerted_outputs,
+        .ir_hash = "c0b58e2f1ee79d14bce881d1051640cc2537ecc81263bb29d97ef12a79d9aa23",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "push_on_ground",
         .function = (void (*)(void))mstmm_sweep_generic3_push_on_ground,
         .call = mstmm_sweep_generic3_push_on_ground_call,
@@ -10229,7 +10505,7 @@ const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "ca947713ed845faa6b438ca42e1a0e5bec4b8a206b23eedceb33e99ad03f40b0",
+    .hash = "935b2ce9e7daf421adf11247325e678133fefbdac4e3c3c46df6215397db655b",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -10239,6 +10515,6 @@ const mstmm_element mstmm_sweep_generic3 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 31,
+    .n_kernels = 32,
     .kernels = mstmm_sweep_generic3_kernels,
 };

@@ -86,6 +86,8 @@ int mstmm_sweep_generic4_divide(const real *restrict F, const real *restrict y, 
 int mstmm_sweep_generic4_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
 int mstmm_sweep_generic4_answered(const real *restrict y, const real *restrict z, real *restrict l);
 int mstmm_sweep_generic4_pull(const real *restrict y, const real *restrict x, real *restrict y_0);
+int mstmm_sweep_generic4_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e);
 int mstmm_sweep_generic4_push_on_ground(const real *restrict H, const real *restrict e,
     const real *restrict tau, real *restrict y);
 int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
@@ -9692,6 +9694,346 @@ static const mstmm_port mstmm_sweep_generic4_pull_outputs[] = {
     {"y_0", 4, "", 1, 0},
 };
 
+/* load of what a hinge with 4 speeds accelerates
+ * in  S[21] inertia of everything outboard, at P
+ * in  H[6][4] motion subspace
+ * in  udot[4] accelerations of the coordinates
+ * out e[6] (N, N*m) force part of f = S a + e, at P
+ */
+int mstmm_sweep_generic4_exerted(const real *restrict S, const real *restrict H,
+    const real *restrict udot, real *restrict e)
+{
+    const real t0 = S[0] * H[0];
+    const real t1 = S[1] * H[4];
+    const real t2 = t0 + t1;
+    const real t3 = S[2] * H[8];
+    const real t4 = t2 + t3;
+    const real t5 = S[3] * H[12];
+    const real t6 = t4 + t5;
+    const real t7 = S[4] * H[16];
+    const real t8 = t6 + t7;
+    const real t9 = S[5] * H[20];
+    const real t10 = t8 + t9;
+    const real t11 = udot[0] * t10;
+    const real t12 = S[0] * H[1];
+    const real t13 = S[1] * H[5];
+    const real t14 = t12 + t13;
+    const real t15 = S[2] * H[9];
+    const real t16 = t14 + t15;
+    const real t17 = S[3] * H[13];
+    const real t18 = t16 + t17;
+    const real t19 = S[4] * H[17];
+    const real t20 = t18 + t19;
+    const real t21 = S[5] * H[21];
+    const real t22 = t20 + t21;
+    const real t23 = udot[1] * t22;
+    const real t24 = t11 + t23;
+    const real t25 = S[0] * H[2];
+    const real t26 = S[1] * H[6];
+    const real t27 = t25 + t26;
+    const real t28 = S[2] * H[10];
+    const real t29 = t27 + t28;
+    const real t30 = S[3] * H[14];
+    const real t31 = t29 + t30;
+    const real t32 = S[4] * H[18];
+    const real t33 = t31 + t32;
+    const real t34 = S[5] * H[22];
+    const real t35 = t33 + t34;
+    const real t36 = udot[2] * t35;
+    const real t37 = t24 + t36;
+    const real t38 = S[0] * H[3];
+    const real t39 = S[1] * H[7];
+    const real t40 = t38 + t39;
+    const real t41 = S[2] * H[11];
+    const real t42 = t40 + t41;
+    const real t43 = S[3] * H[15];
+    const real t44 = t42 + t43;
+    const real t45 = S[4] * H[19];
+    const real t46 = t44 + t45;
+    const real t47 = S[5] * H[23];
+    const real t48 = t46 + t47;
+    const real t49 = udot[3] * t48;
+    const real t50 = t37 + t49;
+    e[0] = t50;
+    const real t51 = S[1] * H[0];
+    const real t52 = S[6] * H[4];
+    const real t53 = t51 + t52;
+    const real t54 = S[7] * H[8];
+    const real t55 = t53 + t54;
+    const real t56 = S[8] * H[12];
+    const real t57 = t55 + t56;
+    const real t58 = S[9] * H[16];
+    const real t59 = t57 + t58;
+    const real t60 = S[10] * H[20];
+    const real t61 = t59 + t60;
+    const real t62 = udot[0] * t61;
+    const real t63 = S[1] * H[1];
+    const real t64 = S[6] * H[5];
+    const real t65 = t63 + t64;
+    const real t66 = S[7] * H[9];
+    const real t67 = t65 + t66;
+    const real t68 = S[8] * H[13];
+    const real t69 = t67 + t68;
+    const real t70 = S[9] * H[17];
+    const real t71 = t69 + t70;
+    const real t72 = S[10] * H[21];
+    const real t73 = t71 + t72;
+    const real t74 = udot[1] * t73;
+    const real t75 = t62 + t74;
+    const real t76 = S[1] * H[2];
+    const real t77 = S[6] * H[6];
+    const real t78 = t76 + t77;
+    const real t79 = S[7] * H[10];
+    const real t80 = t78 + t79;
+    const real t81 = S[8] * H[14];
+    const real t82 = t80 + t81;
+    const real t83 = S[9] * H[18];
+    const real t84 = t82 + t83;
+    const real t85 = S[10] * H[22];
+    const real t86 = t84 + t85;
+    const real t87 = udot[2] * t86;
+    const real t88 = t75 + t87;
+    const real t89 = S[1] * H[3];
+    const real t90 = S[6] * H[7];
+    const real t91 = t89 + t90;
+    const real t92 = S[7] * H[11];
+    const real t93 = t91 + t92;
+    const real t94 = S[8] * H[15];
+    const real t95 = t93 + t94;
+    const real t96 = S[9] * H[19];
+    const real t97 = t95 + t96;
+    const real t98 = S[10] * H[23];
+    const real t99 = t97 + t98;
+    const real t100 = udot[3] * t99;
+    const real t101 = t88 + t100;
+    e[1] = t101;
+    const real t102 = S[2] * H[0];
+    const real t103 = S[7] * H[4];
+    const real t104 = t102 + t103;
+    const real t105 = S[11] * H[8];
+    const real t106 = t104 + t105;
+    const real t107 = S[12] * H[12];
+    const real t108 = t106 + t107;
+    const real t109 = S[13] * H[16];
+    const real t110 = t108 + t109;
+    const real t111 = S[14] * H[20];
+    const real t112 = t110 + t111;
+    const real t113 = udot[0] * t112;
+    const real t114 = S[2] * H[1];
+    const real t115 = S[7] * H[5];
+    const real t116 = t114 + t115;
+    const real t117 = S[11] * H[9];
+    const real t118 = t116 + t117;
+    const real t119 = S[12] * H[13];
+    const real t120 = t118 + t119;
+    const real t121 = S[13] * H[17];
+    const real t122 = t120 + t121;
+    const real t123 = S[14] * H[21];
+    const real t124 = t122 + t123;
+    const real t125 = udot[1] * t124;
+    const real t126 = t113 + t125;
+    const real t127 = S[2] * H[2];
+    const real t128 = S[7] * H[6];
+    const real t129 = t127 + t128;
+    const real t130 = S[11] * H[10];
+    const real t131 = t129 + t130;
+    const real t132 = S[12] * H[14];
+    const real t133 = t131 + t132;
+    const real t134 = S[13] * H[18];
+    const real t135 = t133 + t134;
+    const real t136 = S[14] * H[22];
+    const real t137 = t135 + t136;
+    const real t138 = udot[2] * t137;
+    const real t139 = t126 + t138;
+    const real t140 = S[2] * H[3];
+    const real t141 = S[7] * H[7];
+    const real t142 = t140 + t141;
+    const real t143 = S[11] * H[11];
+    const real t144 = t142 + t143;
+    const real t145 = S[12] * H[15];
+    const real t146 = t144 + t145;
+    const real t147 = S[13] * H[19];
+    const real t148 = t146 + t147;
+    const real t149 = S[14] * H[23];
+    const real t150 = t148 + t149;
+    const real t151 = udot[3] * t150;
+    const real t152 = t139 + t151;
+    e[2] = t152;
+    const real t153 = S[3] * H[0];
+    const real t154 = S[8] * H[4];
+    const real t155 = t153 + t154;
+    const real t156 = S[12] * H[8];
+    const real t157 = t155 + t156;
+    const real t158 = S[15] * H[12];
+    const real t159 = t157 + t158;
+    const real t160 = S[16] * H[16];
+    const real t161 = t159 + t160;
+    const real t162 = S[17] * H[20];
+    const real t163 = t161 + t162;
+    const real t164 = udot[0] * t163;
+    const real t165 = S[3] * H[1];
+    const real t166 = S[8] * H[5];
+    const real t167 = t165 + t166;
+    const real t168 = S[12] * H[9];
+    const real t169 = t167 + t168;
+    const real t170 = S[15] * H[13];
+    const real t171 = t169 + t170;
+    const real t172 = S[16] * H[17];
+    const real t173 = t171 + t172;
+    const real t174 = S[17] * H[21];
+    const real t175 = t173 + t174;
+    const real t176 = udot[1] * t175;
+    const real t177 = t164 + t176;
+    const real t178 = S[3] * H[2];
+    const real t179 = S[8] * H[6];
+    const real t180 = t178 + t179;
+    const real t181 = S[12] * H[10];
+    const real t182 = t180 + t181;
+    const real t183 = S[15] * H[14];
+    const real t184 = t182 + t183;
+    const real t185 = S[16] * H[18];
+    const real t186 = t184 + t185;
+    const real t187 = S[17] * H[22];
+    const real t188 = t186 + t187;
+    const real t189 = udot[2] * t188;
+    const real t190 = t177 + t189;
+    const real t191 = S[3] * H[3];
+    const real t192 = S[8] * H[7];
+    const real t193 = t191 + t192;
+    const real t194 = S[12] * H[11];
+    const real t195 = t193 + t194;
+    const real t196 = S[15] * H[15];
+    const real t197 = t195 + t196;
+    const real t198 = S[16] * H[19];
+    const real t199 = t197 + t198;
+    const real t200 = S[17] * H[23];
+    const real t201 = t199 + t200;
+    const real t202 = udot[3] * t201;
+    const real t203 = t190 + t202;
+    e[3] = t203;
+    const real t204 = S[4] * H[0];
+    const real t205 = S[9] * H[4];
+    const real t206 = t204 + t205;
+    const real t207 = S[13] * H[8];
+    const real t208 = t206 + t207;
+    const real t209 = S[16] * H[12];
+    const real t210 = t208 + t209;
+    const real t211 = S[18] * H[16];
+    const real t212 = t210 + t211;
+    const real t213 = S[19] * H[20];
+    const real t214 = t212 + t213;
+    const real t215 = udot[0] * t214;
+    const real t216 = S[4] * H[1];
+    const real t217 = S[9] * H[5];
+    const real t218 = t216 + t217;
+    const real t219 = S[13] * H[9];
+    const real t220 = t218 + t219;
+    const real t221 = S[16] * H[13];
+    const real t222 = t220 + t221;
+    const real t223 = S[18] * H[17];
+    const real t224 = t222 + t223;
+    const real t225 = S[19] * H[21];
+    const real t226 = t224 + t225;
+    const real t227 = udot[1] * t226;
+    const real t228 = t215 + t227;
+    const real t229 = S[4] * H[2];
+    const real t230 = S[9] * H[6];
+    const real t231 = t229 + t230;
+    const real t232 = S[13] * H[10];
+    const real t233 = t231 + t232;
+    const real t234 = S[16] * H[14];
+    const real t235 = t233 + t234;
+    const real t236 = S[18] * H[18];
+    const real t237 = t235 + t236;
+    const real t238 = S[19] * H[22];
+    const real t239 = t237 + t238;
+    const real t240 = udot[2] * t239;
+    const real t241 = t228 + t240;
+    const real t242 = S[4] * H[3];
+    const real t243 = S[9] * H[7];
+    const real t244 = t242 + t243;
+    const real t245 = S[13] * H[11];
+    const real t246 = t244 + t245;
+    const real t247 = S[16] * H[15];
+    const real t248 = t246 + t247;
+    const real t249 = S[18] * H[19];
+    const real t250 = t248 + t249;
+    const real t251 = S[19] * H[23];
+    const real t252 = t250 + t251;
+    const real t253 = udot[3] * t252;
+    const real t254 = t241 + t253;
+    e[4] = t254;
+    const real t255 = S[5] * H[0];
+    const real t256 = S[10] * H[4];
+    const real t257 = t255 + t256;
+    const real t258 = S[14] * H[8];
+    const real t259 = t257 + t258;
+    const real t260 = S[17] * H[12];
+    const real t261 = t259 + t260;
+    const real t262 = S[19] * H[16];
+    const real t263 = t261 + t262;
+    const real t264 = S[20] * H[20];
+    const real t265 = t263 + t264;
+    const real t266 = udot[0] * t265;
+    const real t267 = S[5] * H[1];
+    const real t268 = S[10] * H[5];
+    const real t269 = t267 + t268;
+    const real t270 = S[14] * H[9];
+    const real t271 = t269 + t270;
+    const real t272 = S[17] * H[13];
+    const real t273 = t271 + t272;
+    const real t274 = S[19] * H[17];
+    const real t275 = t273 + t274;
+    const real t276 = S[20] * H[21];
+    const real t277 = t275 + t276;
+    const real t278 = udot[1] * t277;
+    const real t279 = t266 + t278;
+    const real t280 = S[5] * H[2];
+    const real t281 = S[10] * H[6];
+    const real t282 = t280 + t281;
+    const real t283 = S[14] * H[10];
+    const real t284 = t282 + t283;
+    const real t285 = S[17] * H[14];
+    const real t286 = t284 + t285;
+    const real t287 = S[19] * H[18];
+    const real t288 = t286 + t287;
+    const real t289 = S[20] * H[22];
+    const real t290 = t288 + t289;
+    const real t291 = udot[2] * t290;
+    const real t292 = t279 + t291;
+    const real t293 = S[5] * H[3];
+    const real t294 = S[10] * H[7];
+    const real t295 = t293 + t294;
+    const real t296 = S[14] * H[11];
+    const real t297 = t295 + t296;
+    const real t298 = S[17] * H[15];
+    const real t299 = t297 + t298;
+    const real t300 = S[19] * H[19];
+    const real t301 = t299 + t300;
+    const real t302 = S[20] * H[23];
+    const real t303 = t301 + t302;
+    const real t304 = udot[3] * t303;
+    const real t305 = t292 + t304;
+    e[5] = t305;
+    return 0;
+}
+
+static int mstmm_sweep_generic4_exerted_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_generic4_exerted(in[0], in[1], in[2], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_generic4_exerted_inputs[] = {
+    {"S", 21, "", 0, 0},
+    {"H", 24, "", 0, 0},
+    {"udot", 4, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_generic4_exerted_outputs[] = {
+    {"e", 6, "N, N*m", 0, 0},
+};
+
 /* load of a column felt by a hinge on the ground with 4 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -12642,6 +12984,18 @@ static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
         .guards = NULL,
     },
     {
+        .name = "exerted",
+        .function = (void (*)(void))mstmm_sweep_generic4_exerted,
+        .call = mstmm_sweep_generic4_exerted_call,
+        .n_inputs = 3,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_generic4_exerted_inputs,
+        .outputs = mstmm_sweep_generic4_exerted_outputs,
+        .ir_hash = "a7e6f4a31333396eb8117de78a5eca034cca1891ee991f0d601299186eb7b9cd",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
         .name = "push_on_ground",
         .function = (void (*)(void))mstmm_sweep_generic4_push_on_ground,
         .call = mstmm_sweep_generic4_push_on_ground_call,
@@ -12719,7 +13073,7 @@ const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "e9cd7aee9eae6924b99532c068af195f52f9442744fb507d8cf6f2957994f804",
+    .hash = "3373565d22e1cf8488610e76f554ca791c983cb180230fd1fd57d22fe9be3e83",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -12729,6 +13083,6 @@ const mstmm_element mstmm_sweep_generic4 = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 31,
+    .n_kernels = 32,
     .kernels = mstmm_sweep_generic4_kernels,
 };

@@ -49,6 +49,16 @@ mstmm_generic_effort_kernel *const mstmm_generic_effort_table[] = {
     mstmm_sweep_generic6_effort,
 };
 
+mstmm_generic_exerted_kernel *const mstmm_generic_exerted_table[] = {
+    NULL,
+    mstmm_sweep_generic1_exerted,
+    mstmm_sweep_generic2_exerted,
+    mstmm_sweep_generic3_exerted,
+    mstmm_sweep_generic4_exerted,
+    mstmm_sweep_generic5_exerted,
+    mstmm_sweep_generic6_exerted,
+};
+
 mstmm_generic_project_kernel *const mstmm_generic_project_table[] = {
     mstmm_sweep_generic0_project,
     mstmm_sweep_generic1_project,
@@ -5300,6 +5310,30 @@ static int mstmm_at_laws_column_answered(mstmm_state *state, int index)
     return 0;
 }
 
+/* Inertia of a body and of all that hangs on it, carried to the parent. */
+static int mstmm_at_composed(mstmm_state *state, int index)
+{
+    real unused_G[36];
+    real unused_g[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    const int nu = body->nu;
+    int code;
+    if (mstmm_idle(state->observed, body)) return 0;
+    if (!(body->generic || state->required)) {
+        code = mstmm_at_hinge_motion(state, index);
+        if (code) return code;
+    }
+    mstmm_set_zero(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), nu);
+    mstmm_generic_condense(0,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .H = mstmm_zeros,
+        .J = mstmm_zeros, .floor_ = mstmm_zeros, .S = block + MSTMM_BLOCK_S,
+        .e = block + MSTMM_BLOCK_E, .tau = mstmm_zeros, .G = unused_G, .g = unused_g,
+        .S_I = parent + MSTMM_BLOCK_S, .e_I = parent + MSTMM_BLOCK_E);
+    return 0;
+}
+
 /* Mass matrix of the frame, momentum and energy of a flexible body. */
 int mstmm_at_momentum(mstmm_state *state, int index, real *given_S, real *given_h, real *given_T)
 {
@@ -5350,6 +5384,40 @@ int mstmm_at_rates_change(mstmm_state *state, int index)
         (state->tangents->change + body->q)[j] = (state->slope->qdot + body->q)[j];
     for (int j = 0; j < nq; j++)
         (state->tangents->change + body->q)[j] += (state->tangents->rho + body->q)[j];
+    return 0;
+}
+
+/* Load of everything outboard under the hinge's given accelerations. */
+int mstmm_at_exerted(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_generic_exerted(nu,
+        .S = block + MSTMM_BLOCK_S, .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+        .udot = state->given + body->u, .e = block + MSTMM_BLOCK_E);
+    return 0;
+}
+
+/* What one hinge feels of a load, and the load on the parent. */
+int mstmm_at_felt_by(mstmm_state *state, int index)
+{
+    real tau[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    const int nu = body->nu;
+    mstmm_generic_effort(nu,
+        .H = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .f = block + MSTMM_BLOCK_E, .tau = tau);
+    for (int k = 0; k < body->nu; k++) {
+        mstmm_frames_driven_effort(
+            .felt = tau + k, .J = body->rotor + k, .udot = state->given + body->u + k,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
+            .tau_d = state->required + body->u + k);
+    }
+    mstmm_frames_transport(
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .e = block + MSTMM_BLOCK_E,
+        .e_I = parent + MSTMM_BLOCK_E);
     return 0;
 }
 
@@ -6469,6 +6537,27 @@ static int mstmm_pass_laws_column_answered(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_composed(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_HINGE_R, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(body->hinge_p, body->body_p);
+}
+static int mstmm_pass_composed(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->n_bodies - 1; i >= 0; i--) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_composed(state, i, -MSTMM_TILE);
+        const int code = mstmm_at_composed(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 MSTMM_AT_ONCE void mstmm_fetch_inverse_dynamics_chain(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -7008,6 +7097,34 @@ static int mstmm_tiles_laws_column_carried(mstmm_state *state)
         for (int i = end - 1; i >= first; i--) {
             if (mstmm_beyond_cache(model)) mstmm_fetch_laws_column_carried_tile(state, i, -MSTMM_TILE);
             code = mstmm_at_laws_column_carried(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_composition_chain(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
+    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
+}
+static int mstmm_chain_composition(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code;
+    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
+        const int end = mstmm_end_of_tile(model, first);
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_prescribed(state, i);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_composition_chain(state, i, MSTMM_TILE);
+            code = mstmm_at_forward(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
             if (code) return code;
         }
     }
@@ -7642,6 +7759,17 @@ int mstmm_run_laws_solution(mstmm_state *state)
     code = mstmm_tiles_laws_column_carried(state);
     if (code) return code;
     code = mstmm_pass_laws_column_answered(state);
+    if (code) return code;
+    return 0;
+}
+
+/* Inertia of everything outboard of each hinge, as if no hinge moved. */
+int mstmm_run_composition(mstmm_state *state)
+{
+    int code;
+    code = mstmm_chain_composition(state);
+    if (code) return code;
+    code = mstmm_pass_composed(state);
     if (code) return code;
     return 0;
 }

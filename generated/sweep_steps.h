@@ -12,6 +12,8 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta);
 int mstmm_at_momentum(mstmm_state *state, int index, real *given_S, real *given_h, real *given_T);
 int mstmm_at_lagged(mstmm_state *state, int index);
 int mstmm_at_rates_change(mstmm_state *state, int index);
+int mstmm_at_exerted(mstmm_state *state, int index);
+int mstmm_at_felt_by(mstmm_state *state, int index);
 int mstmm_run_given(mstmm_state *state);
 int mstmm_run_accelerations(mstmm_state *state);
 int mstmm_run_inverse_dynamics(mstmm_state *state);
@@ -28,6 +30,7 @@ int mstmm_run_tangent_solution(mstmm_state *state);
 int mstmm_run_tangent_beyond(mstmm_state *state);
 int mstmm_run_laws_alone(mstmm_state *state);
 int mstmm_run_laws_solution(mstmm_state *state);
+int mstmm_run_composition(mstmm_state *state);
 
 /* Pieces of the engine's own. */
 int mstmm_hook_coupling_slopes(mstmm_state *state);

@@ -147,7 +147,12 @@ def columns(name: str, value: ArrayLike, width: int) -> tuple[bool, Array]:
 
 def plain(value: ArrayLike, width: int) -> TypeGuard[Array]:
     """Whether it is one state as C reads it, which most calls give: so many doubles in a row."""
-    return _ready(value) and value.shape == (width,) and value.flags.c_contiguous
+    return (
+        type(value) is np.ndarray
+        and value.dtype is _DOUBLE
+        and value.shape == (width,)
+        and value.flags.c_contiguous
+    )
 
 
 #: How many numbers there are per state: one, a row of so many, or an array of such a shape.

@@ -146,6 +146,7 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
         *(Kernel(make.__name__, make(nu)) for make in _OF_SPEEDS if nu),
         Kernel("complement", complement(nu)),
         *(Kernel(make.__name__, make(nu)) for make in loops.OF_SPEEDS if nu),
+        *((Kernel("exerted", sweep.exerted(nu)),) if nu else ()),
         *((Kernel("push_on_ground", columns.push_on_ground(nu)),) if nu else ()),
         *((Kernel("eliminate", eliminate_factored(nu)),) if nu else ()),
         *((Kernel("recover_factored", recover_factored(nu)),) if nu else ()),

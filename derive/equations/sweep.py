@@ -361,6 +361,20 @@ def effort(nu: int) -> Derivation:
     )
 
 
+def exerted(nu: int) -> Derivation:
+    """e = S H udot: the load at P that the accelerations of a hinge ask for."""
+    h = Quantity(symbol("H", 6, nu), "", "motion subspace")
+    rates = Quantity(symbol("udot", nu), "", "accelerations of the coordinates")
+    whole = Quantity(S.symbol, "", "inertia of everything outboard, at P", symmetric=True)
+    return Derivation(
+        f"generic{nu}",
+        f"load of what a hinge with {nu} speeds accelerates",
+        (whole, h, rates),
+        (E,),
+        (Equation("e = S H udot", E.symbol, S.symbol * (h.symbol * rates.symbol)),),
+    )
+
+
 def project(nu: int) -> Derivation:
     """udot = (H^T H)^-1 H^T (delta - X delta_I): accelerations of a hinge between known motions."""
     h = Quantity(symbol("H", 6, nu), "", "motion subspace")

@@ -76,8 +76,8 @@ POINTED = {
 #: every number but none.
 MOST_SPEEDS = 6
 GENERIC = (
-    "forward", "condense", "recover", "effort", "project", "factor", "push", "push_on_ground",
-    "answer",
+    "forward", "condense", "recover", "effort", "exerted", "project", "factor", "push",
+    "push_on_ground", "answer",
     "qr_eliminate", "complement", "divide", "couple", "answered", "pull",
     "forward_slope", "effort_slope", "complement_slope", "answered_slope", "pull_slope",
     "tangent_carrier", "tangent_column",

@@ -163,7 +163,8 @@ class StepText:
             yield step.source, rows * MOST_SPEEDS
 
     def _callee(self, step: Call) -> Callee:
-        return self.kernels[step.kernel.replace("{nu}", "").replace("{free}", "")]
+        element, _, name = step.kernel.partition(".")
+        return self.kernels[f"{'generic' if element.startswith('generic') else element}.{name}"]
 
     def needs(self, step: Step) -> set[str]:
         """Variables that a step reads."""

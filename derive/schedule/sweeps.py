@@ -21,6 +21,7 @@ from .loops import (
     ROW_FOUND,
     UNLOADED,
 )
+from .mass import COMPOSITION, EXERTED, FELT_BY
 from .motion import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
 from .planar import in_plane
 from .qr import QR_CONDENSE, QR_OWN
@@ -153,11 +154,11 @@ SOLUTION = Sweep(
 
 SWEEPS = (GIVEN, ACCELERATIONS, INVERSE_DYNAMICS, CORRECTION, MOTION, POSED, FACTORISATION,
           SOLUTION, DIRECTIONAL, APPLIED_SLOPE, TANGENT, BROUGHT, TANGENT_SOLUTION,
-          TANGENT_BEYOND, LAWS_ALONE, LAWS_SOLUTION)  # fmt: skip
+          TANGENT_BEYOND, LAWS_ALONE, LAWS_SOLUTION, COMPOSITION)  # fmt: skip
 
 #: Passes that the looped engine's own C does for one subject at a time: links and what lies between
-#: their runs, observations.
+#: their runs, observations, ways to the root.
 SINGLY: tuple[Pass, ...] = (
     FORWARD, CONDENSE, RECOVER, HINGE_MOTION, SECTION_MOTION, MOMENTUM, LAGGED, RATES_CHANGE,
-    LINK_ANGLE, LINK_FORWARD, LINK_CONDENSE, LINK_RECOVER,
+    EXERTED, FELT_BY, LINK_ANGLE, LINK_FORWARD, LINK_CONDENSE, LINK_RECOVER,
 )  # fmt: skip

@@ -102,8 +102,18 @@ class Engine(Calls):
 
     def mass_matrix(self, q: Array) -> Array:
         """(nu, nu) symmetric, of one state; driven coordinates as if free."""
-        matrix = self.required_by_inertia(q, np.eye(self.nu)).T
-        return np.asarray((matrix + matrix.T) / 2)
+        if self.packed.layout.modal:
+            matrix = self.required_by_inertia(q, np.eye(self.nu)).T
+            return np.asarray((matrix + matrix.T) / 2)
+        engine, failure = self.inertia_alone, self.ffi.new("mstmm_failure *")
+        found, work = np.empty((self.nu, self.nu)), np.empty(2 * self.nu)
+        code = self.lib.mstmm_mass_matrix(
+            engine.packed.model, engine.workspace(), self.pointer(q),
+            self.pointer(engine.start_memory()), self.pointer(found), self.pointer(work), failure,
+        )  # fmt: skip
+        if code:
+            raise self.failed(failure, 0.0, q, np.zeros(self.nu))
+        return found
 
     def solve(self, q: Array, columns: Array, memory: Array | None = None) -> Array:
         """M(q)^-1 times n columns of efforts (n, nu), on the speeds that nobody imposes; zero on

@@ -26,6 +26,7 @@ from ..pack.layout import refuse_dense
 if TYPE_CHECKING:
     from ..engine.loops.closed import Loops
     from ..engine.solver import Solver
+    from ..engine.states.alone import Alone
     from ..linear.harmonic.counted import ExactModes
     from ..linear.harmonic.exact import Chosen
     from ..linear.harmonic.losses import Losses
@@ -150,12 +151,22 @@ class Model(Compiled):
         Raises SceneError for a shape that does not fit, NumericalFailure naming the state and the
         hinge whose motion is undetermined.
         """
-        from ..engine.batch import States, accelerations
+        if type(t) is float and threads is None:
+            found = self._alone.accelerations(t, q, u, efforts)
+            if found is not None:
+                return found
+        from ..engine.states.many import States, accelerations
 
         extra = () if efforts is None else (("efforts", efforts, self.nu),)
         lead, given = batch(("t", t, None), ("q", q, self.nq), ("u", u, self.nu), *extra)
         states = States(lead, given[0], given[1], given[2], given[3] if extra else None)
         return accelerations(self.looped, self.fusion, states, threads).reshape(*lead, self.nu)
+
+    @cached_property
+    def _alone(self) -> Alone:
+        from ..engine.states.alone import Alone
+
+        return Alone(self.looped, self.fusion)
 
     def inverse_dynamics(
         self,
@@ -185,6 +196,8 @@ class Model(Compiled):
             return actuated(self, q, u, udot, t, actuators)
         if actuators is not None:
             raise SceneError("actuators: no loop is closed in this scene, so that all speeds act")
+        if type(t) is float and (found := self._alone.efforts(t, q, u, udot)) is not None:
+            return found
         engine = self.looped
         memory, nu = engine.start_memory(), self.nu
         lead, (times, coordinates, speeds, rates) = batch(
@@ -204,13 +217,16 @@ class Model(Compiled):
         Raises SceneError for a shape that does not fit, NumericalFailure where the independent
         speeds do not decide the others.
         """
+        if self.freedom is None:
+            refuse_dense(self.nu, "the mass matrix")
+            if (alone := self._alone.mass_matrix(q)) is not None:
+                return alone
         lead, (states,) = batch(("q", q, self.nq))
         if self.freedom is not None:
             from .actuated import reduced_mass
 
             found = np.array([reduced_mass(self, one_state) for one_state in states])
             return found.reshape(*lead, *found.shape[1:])
-        refuse_dense(self.nu, "the mass matrix")
         matrices = [self.looped.mass_matrix(one_state) for one_state in states]
         return np.array(matrices).reshape(*lead, self.nu, self.nu)
 

@@ -10,7 +10,7 @@ from support.rod_scenes import chain, drawn_state
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.runtime.engine import batch
+from mstmm.runtime.engine.states import many
 
 ENGINES = ("fused", "looped")
 HINGES = ["pin", "ball"]
@@ -31,8 +31,8 @@ def states(n: int) -> tuple[Any, Any]:
 @pytest.fixture
 def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """Threads from a handful of states on."""
-    monkeypatch.setattr(batch, "_LEAST_LANES", 16)
-    monkeypatch.setattr(batch, "_LEAST_LOOPED", 8)
+    monkeypatch.setattr(many, "_LEAST_LANES", 16)
+    monkeypatch.setattr(many, "_LEAST_LOOPED", 8)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

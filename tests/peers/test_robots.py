@@ -37,8 +37,8 @@ def of_peers(robot: Robot) -> Robot:
 
 @cache
 def compared() -> dict[str, float]:
-    """Robot and base -> how far accelerations differ, in parts of the largest, beside the
-    condition of its mass matrix."""
+    """Robot and base -> how far accelerations (beside the condition of the mass matrix), efforts
+    and mass matrices differ, in parts of the largest number."""
     rng = np.random.default_rng(16)
     found: dict[str, float] = {}
     for path in published():
@@ -87,9 +87,23 @@ def difference(path: Path, one: Imported, base: str, rng: np.random.Generator) -
     wanted = pin.aba(peer, data, at, speeds, pushes)[theirs]
     got = model.accelerations(q, u, efforts=efforts)[ours]
     upper = np.triu(pin.crba(peer, data, at))
-    condition = np.linalg.cond(upper + np.triu(upper, 1).T)
+    whole = upper + np.triu(upper, 1).T
+    rates = np.zeros(model.nu)
+    rates[ours] = speeds[theirs]  # any accelerations will do; the base has none
+    required = model.inverse_dynamics(q, u, rates)[ours]
+    asked = pin.rnea(peer, data, at, speeds, speeds)[theirs]
+    mass = model.mass_matrix(q)[np.ix_(ours, ours)]
+    return max(
+        apart(got, wanted) / max(1.0, np.linalg.cond(whole) / 1e5),
+        apart(required, asked),
+        apart(mass, whole[np.ix_(theirs, theirs)]),
+    )
+
+
+def apart(found: Any, wanted: Any) -> float:
+    """The largest difference, in parts of the largest number."""
     scale = max(1.0, float(np.abs(wanted).max(initial=0.0)))
-    return float(np.abs(got - wanted).max(initial=0.0)) / scale / max(1.0, condition / 1e5)
+    return float(np.abs(found - wanted).max(initial=0.0)) / scale
 
 
 def test_published_robots_move_as_pinocchio_has_them() -> None:

@@ -1,6 +1,8 @@
 /* The linear equations of a scene about a state; see linear.h. */
 #include "linear.h"
 
+#include "finite.h"
+
 #include <string.h>
 
 int64_t mstmm_linear_numbers(const mstmm_linear_code *code)
@@ -9,35 +11,19 @@ int64_t mstmm_linear_numbers(const mstmm_linear_code *code)
     return code->fused->nu + 4 * n * n + n + code->fused->nq;
 }
 
-/* Sums of several are quicker than one after the other, and what is not finite makes its sum so; a
- * sum that alone is not finite is looked at again. */
-static int finite(int64_t count, const real *numbers)
-{
-    real sums[8] = {0};
-    int64_t k = 0;
-    for (; k + 8 <= count; k += 8)
-        for (int j = 0; j < 8; j++) sums[j] += numbers[k + j];
-    for (; k < count; k++) sums[0] += numbers[k];
-    for (int j = 1; j < 8; j++) sums[0] += sums[j];
-    if (isfinite(sums[0])) return 1;
-    for (k = 0; k < count; k++)
-        if (!isfinite(numbers[k])) return 0;
-    return 1;
-}
-
 int mstmm_linear_at(const mstmm_linear_code *code, real t, const real *q, const real *u,
                     const real *efforts, real *found)
 {
     const mstmm_fused *fused = code->fused;
     const int64_t n = code->n, square = n * n, count = mstmm_linear_numbers(code);
     real *a = found, *m = a + fused->nu, *r_t = m + 4 * square, *qdot = r_t + n;
-    if (!isfinite(t) || !finite(fused->nq, q) || !finite(fused->nu, u)) return 1;
+    if (!isfinite(t) || !mstmm_finite(fused->nq, q) || !mstmm_finite(fused->nu, u)) return 1;
     mstmm_renew_inputs(&code->live, t, code->memory, code->p);
     int failed = fused->accelerations(code->p, &t, q, u, code->memory, efforts, qdot, a);
     if (!failed)
         failed = fused->linear(code->p, &t, q, u, code->memory, a, m, m + square, m + 2 * square,
                                m + 3 * square, r_t);
-    return failed || !finite(count, found);
+    return failed || !mstmm_finite(count, found);
 }
 
 int mstmm_linear_swept(mstmm_tangent *at, real t, const real *q, const real *u, const real *a,
@@ -110,7 +96,7 @@ int mstmm_state_matrix(const mstmm_linear_code *code, const real *found, int tur
             for (int j = 0; j < n; j++) by_x[j] -= by_rate[k] * G[n * k + j];
         for (int j = 0; j < n; j++) by_rate[j] += G[n * i + j];
     }
-    return singular || !finite(2 * n * n, below);
+    return singular || !mstmm_finite(2 * n * n, below);
 }
 
 int mstmm_accelerations_about(const mstmm_linear_code *code, real t, const real *q, const real *u,
@@ -128,5 +114,5 @@ int mstmm_accelerations_about(const mstmm_linear_code *code, real t, const real 
         }
         right[3 * n] = -r_t[i];
     }
-    return divide_by_mass(n, width, M, slopes, code->work) || !finite(n * width, slopes);
+    return divide_by_mass(n, width, M, slopes, code->work) || !mstmm_finite(n * width, slopes);
 }

@@ -290,6 +290,10 @@ int mstmm_accelerations_kept(const mstmm_model *model, real *workspace, real t, 
 int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, const real *q,
                            const real *u, const real *memory, const real *udot, real *efforts,
                            mstmm_failure *failure);
+/* The mass matrix (nu x nu) of a tree without flexible bodies, driven coordinates as if free.
+ * `work` has 2 nu numbers. */
+int mstmm_mass_matrix(const mstmm_model *model, real *workspace, const real *q,
+                      const real *memory, real *matrix, real *work, mstmm_failure *failure);
 /* M^-1 times `n` columns of efforts, one behind the other (nu each), on the speeds that nobody
  * imposes; zero on the others. */
 int mstmm_solve(const mstmm_model *model, real *workspace, int64_t n, const real *q,

@@ -18,10 +18,10 @@ import numpy as np
 from mstmm.arrays import Array, threads_of
 from mstmm.errors import NumericalFailure
 
-from ..kernels.fused import FusedLibrary
-from .code import Fusing
-from .engine import Engine
-from .live import LiveInputs
+from ...kernels.fused import FusedLibrary
+from ..code import Fusing
+from ..engine import Engine
+from ..live import LiveInputs
 
 #: A thread is worth starting for about 0.2 ms of work; in states times speeds.
 _LEAST_LANES, _LEAST_LOOPED = 20000, 2000

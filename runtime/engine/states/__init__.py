@@ -1,0 +1,1 @@
+"""Accelerations, efforts and mass matrices of states that are given: one, or many."""

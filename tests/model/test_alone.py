@@ -1,0 +1,109 @@
+"""One state at a time: the same numbers as among others, and the same refusals."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mstmm
+from mstmm import NumericalFailure, SceneError
+
+ROD: dict[str, Any] = {
+    "mass": 1.2, "center_of_mass": [0.5, 0.1, 0], "inertia": [0.02, 0.08, 0.09, 0.002, 0, 0.001],
+    "ends": {"tip": [1, 0, 0]},
+}  # fmt: skip
+SCENE: dict[str, Any] = {
+    "gravity": [0.2, -9.81, 0.1],
+    "input": [{"name": "wind", "unit": "N", "value": "gust"}],
+    "signal": [{"name": "gust", "unit": "N", "times": [0, 1, 2], "values": [1, 3, -2]}],
+    "body": [ROD | {"name": name} for name in ("a", "b", "c", "d")],
+    "hinge": [
+        {"name": "one", "type": "ball", "inboard": "ground", "outboard": "a"},
+        {"name": "two", "type": "pin", "inboard": "a.tip", "outboard": "b", "axis": [0, 1, 0],
+         "law": {"inertia": 0.3, "damping": 0.1}},
+        {"name": "three", "type": "cylindrical", "inboard": "a.tip", "outboard": "c"},
+        {"name": "four", "type": "pin", "inboard": "b.tip", "outboard": "d", "drive": "0.3*t^2"},
+    ],
+    "load": [{"on": "c.tip", "force": ["wind", 0, 0]}],
+}  # fmt: skip
+
+
+@cache
+def model(engine: str) -> mstmm.Model:
+    return mstmm.compile(mstmm.Scene(**SCENE), engine=engine)
+
+
+def state(seed: int) -> tuple[Any, ...]:
+    """q, u, efforts and accelerations."""
+    rng = np.random.default_rng(seed)
+    one = model("looped")
+    q = rng.uniform(-1, 1, one.nq)
+    q[:4] /= np.linalg.norm(q[:4])
+    return (q, *(rng.uniform(-1, 1, one.nu) for _ in range(3)))
+
+
+@pytest.mark.parametrize("engine", ["looped", "fused"])
+def test_a_state_alone_has_the_numbers_it_has_among_others(engine: str) -> None:
+    one, (q, u, push, asked) = model(engine), state(1)
+    for t in (0.0, 0.5, 1.7):
+        alone = one.accelerations(q, u, t), one.accelerations(q, u, t, push)
+        looped = engine == "looped"
+        for found, efforts in zip(alone, (None, push), strict=True):
+            many = one.accelerations(q[None], u[None], t, efforts)[0]
+            assert found == pytest.approx(many, rel=0 if looped else 1e-12, abs=0)
+        many = one.inverse_dynamics(q[None], u[None], asked, t)[0]
+        assert np.array_equal(one.inverse_dynamics(q, u, asked, t), many)
+    assert np.array_equal(one.mass_matrix(q), one.mass_matrix(q[None])[0])
+
+
+def test_the_mass_matrix_gives_what_inverse_dynamics_asks() -> None:
+    one, (q, _, _, asked) = model("looped"), state(2)
+    still, driven = np.zeros(one.nu), one.layout.hinges["four"]
+    q[driven.q] = asked[driven.u] = 0.0  # where its drive has it
+    apart = one.inverse_dynamics(q, still, asked) - one.inverse_dynamics(q, still, still)
+    free = [k for k in range(one.nu) if k != driven.u]
+    assert (one.mass_matrix(q) @ asked)[free] == pytest.approx(apart[free], rel=1e-12)
+
+
+def test_states_in_other_forms_go_the_general_way() -> None:
+    one, (q, u, push, asked) = model("fused"), state(3)
+    wanted = one.accelerations(q, u, 0.0, push)
+    spread = np.zeros((len(q), 2))
+    spread[:, 0] = q
+    for other in (list(q), spread[:, 0], q.astype(np.longdouble)):
+        assert np.allclose(one.accelerations(other, list(u), 0, tuple(push)), wanted, rtol=1e-14)
+    assert np.allclose(one.mass_matrix(list(q)), one.mass_matrix(q), rtol=0, atol=0)
+    assert np.allclose(one.inverse_dynamics(list(q), u, asked), one.inverse_dynamics(q, u, asked))
+
+
+@pytest.mark.parametrize("engine", ["looped", "fused"])
+def test_what_is_wrong_is_said_as_ever(engine: str) -> None:
+    one, (q, u, _, asked) = model(engine), state(4)
+    spoilt = u.copy()
+    spoilt[2] = np.nan
+    with pytest.raises(SceneError, match=r"u\[2\] = nan: expected a finite number"):
+        one.accelerations(q, spoilt)
+    with pytest.raises(SceneError, match=r"q\[0\] = nan"):
+        one.mass_matrix(q * np.nan)
+    with pytest.raises(SceneError, match=r"udot has shape \(2,\)"):
+        one.inverse_dynamics(q, u, asked[:2])
+    huge = np.full_like(u, 1e200)
+    with pytest.raises(NumericalFailure, match="is not finite"):
+        one.accelerations(q, huge)
+
+
+def test_threads_do_not_meet() -> None:
+    one = model("fused")
+    states = [state(k) for k in range(40)]
+    alone = [one.accelerations(q, u) for q, u, *_ in states]
+
+    def again(k: int) -> bool:
+        q, u, *_ = states[k % 40]
+        return np.array_equal(one.accelerations(q, u), alone[k % 40])
+
+    with ThreadPoolExecutor(4) as pool:
+        assert all(pool.map(again, range(400)))
