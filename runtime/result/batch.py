@@ -17,11 +17,12 @@ from mstmm.extras import missing
 from ..integrate.loop import Statistics, Status
 from ..run.batch.batch import BatchResult
 from ..run.trajectory import Trajectory
-from .names import Quantity
+from .names import Quantity, columns
 from .output import dataset
 from .output.storage import save_dataset
 from .plotting.choice import candidates
-from .plotting.panels import Panel, Trace, Wanted, columns, panels
+from .plotting.panels import Panel, Trace, Wanted, panels
+from .plotting.shown import Candidate
 from .record import Record
 
 if TYPE_CHECKING:
@@ -41,8 +42,8 @@ class BatchRun(Record):
         """There is none: SceneError."""
         raise SceneError("runs of a batch have no certificate; simulate this one alone")
 
-    def candidates(self) -> list[str]:
-        """Names of what is drawn if nobody chooses."""
+    def candidates(self) -> list[Candidate]:
+        """What may be drawn if nobody chooses."""
         return candidates(self)
 
 

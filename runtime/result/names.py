@@ -32,6 +32,11 @@ class Quantity:
     note: str = ""
 
 
+def columns(quantity: Quantity) -> list[str]:
+    """One label for each column."""
+    return [f"{quantity.name}.{label}" for label in quantity.labels] or [quantity.name]
+
+
 @dataclass
 class Table:
     """Names of one owner: how to get each quantity, one name for every number, and the `whole`

@@ -14,7 +14,7 @@ from .certificate import Certificate
 from .record import Record
 
 if TYPE_CHECKING:
-    from .plotting.shown import Shown
+    from .plotting.shown import Candidate, Shown
     from .view.view import View
 
 
@@ -61,8 +61,8 @@ class Result(Record):
 
         return tuple(names(self))
 
-    def candidates(self) -> list[str]:
-        """Names of what `plot` and `table` choose from if nobody chooses."""
+    def candidates(self) -> list[Candidate]:
+        """What `plot` and `table` choose from if nobody chooses."""
         from .plotting.choice import candidates
 
         return candidates(self)

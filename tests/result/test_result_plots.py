@@ -61,6 +61,9 @@ def test_of_many_hinges_those_are_drawn_that_move_most() -> None:
     assert chosen.names == tuple(f"pin{k}.angle" for k in largest)
     seventh = np.sort(moved)[-7]
     assert chosen.more == f"34 more that move by {seventh:.2g} rad or less"
+    for candidate in run.candidates()[::9]:
+        values = run.quantity(candidate.name).values
+        assert candidate.moved == np.ptp(values) and candidate.unit == "rad"
     (panel,) = run.plot().axes
     assert panel.get_title("left") == "angle of 6 hinges (rad)" and len(panel.lines) == 7
     told = panel.get_legend().get_texts()[-1].get_text().replace("\n", " ")

@@ -18,6 +18,8 @@ from mstmm.scene.rules.messages import near
 from ...engine.shown import BODY, HINGE, WXYZ, XYZ
 from ..names import Quantity
 from ..owners.angles import EULER
+from ..plotting.choice import looked_at
+from ..plotting.shown import Candidate
 from .tabled import TABLES, write
 
 #: "shoulder.angle [rad]", "rod.qw".
@@ -78,12 +80,12 @@ class Columns:
         hint = near(name, self._columns)
         raise SceneError(f'"{name}": there is no such column in {self.path}{hint}')
 
-    def candidates(self) -> list[str]:
+    def candidates(self) -> list[Candidate]:
         """Coordinates, which have a rate beside them; without such all angles and lengths, or all
         columns."""
         found = [name for name in self._columns if f"{name}_rate" in self._columns]
         lengths = [name for name, (unit, _) in self._columns.items() if unit in ("rad", "m")]
-        return found or lengths or list(self._columns)
+        return list(looked_at(self, found or lengths or list(self._columns)))
 
     def scalars(self) -> list[Quantity]:
         """Every column."""

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.arrays import Array
-
+from ..names import columns
 from ..owners.angles import EULER
+from .shown import Candidate, Named, Shown
 
 if TYPE_CHECKING:
+    from ...pack.layout import HingeSlots
     from ..record import Record
-    from .shown import Shown
 
 #: Curves of a panel, and panels of a picture.
 LINES, PANELS = 6, 4
@@ -43,12 +43,19 @@ class Chosen:
         return f"{self.more}: name what else you want, such as {self.other}" if self.more else ""
 
 
+def looked_at(shown: Named, names: Iterable[str]) -> Iterator[Candidate]:
+    """Candidates of quantities by name."""
+    for name in names:
+        found = shown.quantity(name)
+        known = found.values[np.isfinite(found.values)]
+        yield Candidate(name, found.unit, float(np.ptp(known)) if len(known) else 0.0)
+
+
 def choose(shown: Shown, lines: int = LINES, panels: int = PANELS) -> list[Chosen]:
     """By unit, in the order of the candidates, those that move most."""
     units: dict[str, list[tuple[str, float]]] = {}
-    for name in shown.candidates():
-        found = shown.quantity(name)
-        units.setdefault(found.unit, []).append((name, _range(found.values)))
+    for name, unit, moved in shown.candidates():
+        units.setdefault(unit, []).append((name, moved))
     return [_chosen(unit, some, lines) for unit, some in islice(units.items(), panels)]
 
 
@@ -62,38 +69,34 @@ def _chosen(unit: str, some: list[tuple[str, float]], lines: int) -> Chosen:
     return Chosen(names, unit, more, first[0])
 
 
-def _range(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.ptp(known)) if len(known) else 0.0
-
-
-def candidates(result: Record) -> list[str]:
+def candidates(result: Record) -> list[Candidate]:
     """Outputs of the scene; where there are none, coordinates of hinges, Euler angles of those that
     have quaternions, and deflections of flexible bodies; where nothing moves, the last end."""
     outputs = result._quantities.outputs()
     if outputs:
         named = [result.quantity(name) for name in outputs]
-        return [text for one in named for text in _columns(one.name, one.labels)]
+        return list(looked_at(result, [text for one in named for text in columns(one)]))
     hinges = list(islice(result.model.layout.hinges.values(), _LOOKED_AT))
-    found = [
-        f"{hinge.name}.{name}"
-        for hinge in hinges
-        for name, unit in zip(hinge.q_names, hinge.q_units, strict=True)
-        if unit
-    ]
     turning = [hinge.name for hinge in hinges if hinge.quaternion is not None]
     angles = [f"{name}.{angle}" for name in turning[:_TURNING] for angle in EULER.labels]
-    return [*found, *angles, *_deflections(result)] or _last_end(result)
+    found = [*_coordinates(result, hinges), *looked_at(result, (*angles, *_deflections(result)))]
+    return found or list(looked_at(result, _last_end(result)))
+
+
+def _coordinates(result: Record, hinges: Sequence[HingeSlots]) -> Iterator[Candidate]:
+    """Those that have a unit, which quaternions have not; all at once, as there may be many."""
+    known = result.q[np.isfinite(result.q).all(axis=1)]
+    moved = np.ptp(known, axis=0) if len(known) else np.zeros(result.q.shape[1])
+    for hinge in hinges:
+        for k, (name, unit) in enumerate(zip(hinge.q_names, hinge.q_units, strict=True)):
+            if unit:
+                yield Candidate(f"{hinge.name}.{name}", unit, float(moved[hinge.q + k]))
 
 
 def _last_end(result: Record) -> list[str]:
     body = result.model.scene.skeleton.bodies[-1]
     end = ".".join([body.name, *list(body.ends)[-1:]])
     return [f"{end}.{axis}" for axis in "xyz"]
-
-
-def _columns(name: str, labels: Sequence[str]) -> list[str]:
-    return [f"{name}.{label}" for label in labels] or [name]
 
 
 def _deflections(result: Record) -> Iterator[str]:

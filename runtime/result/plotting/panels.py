@@ -11,7 +11,7 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
 from ...engine.shown import rate_unit
-from ..names import Quantity
+from ..names import Quantity, columns
 from .choice import Chosen, choose
 from .curves import curve
 from .shown import Shown
@@ -147,11 +147,6 @@ def steady(panel: Panel) -> tuple[float, float] | None:
         return None
     middle = (low + high) / 2
     return middle - least / 2, middle + least / 2
-
-
-def columns(quantity: Quantity) -> list[str]:
-    """One label for each column."""
-    return [f"{quantity.name}.{label}" for label in quantity.labels] or [quantity.name]
 
 
 def _places(quantities: Sequence[Quantity]) -> list[int]:

@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from mstmm.arrays import Array
 
 from ..names import Quantity
 
 
-class Shown(Protocol):
-    """Quantities by name over the times `t` (n,) in s."""
+class Candidate(NamedTuple):
+    """What may be drawn, its unit, and the range that it moves through."""
 
-    @property
-    def t(self) -> Array: ...
+    name: str
+    unit: str
+    moved: float
+
+
+class Named(Protocol):
+    """Quantities by name."""
 
     def quantity(self, name: str) -> Quantity:
         """SceneError with the nearest name where there is none of this one."""
         ...
 
-    def candidates(self) -> list[str]:
-        """Names of what may be drawn if nobody chose, the most telling kinds first."""
+
+class Shown(Named, Protocol):
+    """Quantities by name over the times `t` (n,) in s."""
+
+    @property
+    def t(self) -> Array: ...
+
+    def candidates(self) -> list[Candidate]:
+        """What may be drawn if nobody chose, the most telling kinds first."""
         ...
