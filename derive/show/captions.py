@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 from .layout import Name, Node, Raised, Row, Sign, Word
 from .names import is_letter, shown_name
+from .text import box
 
 _TOKEN = re.compile(
     r"(?P<blank>\s+)"
@@ -52,6 +53,11 @@ def caption(text: str) -> Iterator[str | Node]:
             formula, blank = [], ""
     if formula:
         yield Row(tuple(formula))
+
+
+def as_text(text: str) -> str:
+    """A sentence, its formulas typeset in letters."""
+    return "".join(p if isinstance(p, str) else box(p).lines[0] for p in caption(text))
 
 
 def _signed(node: Node) -> bool:

@@ -9,12 +9,14 @@ from mstmm.errors import ElementError
 from mstmm.ir import KernelIR, Port
 
 from ..language.derivation import Derivation, Equation, Quantity
+from .captions import as_text
 from .entries import Declared, Named, Parts
 from .formulas import stated
 from .ir import listing
 from .layout import Name, Node
 from .measure import Columns
 from .names import own_name, shown_name
+from .text import box
 
 STAGES = ("equations", "matrix", "ir", "c")
 
@@ -241,4 +243,10 @@ class Written:
         array = str(getattr(e.left, "name", ""))
         rows = self.names.labels(array, shape[0]) if shape[1] == 1 else ()
         right = e.right.xreplace(self.named.entries)
-        return Formula(e.name, tuple(stated(e.left, right, rows, self.measure)), e.source, remark)
+        lines = tuple(stated(e.left, right, rows, self.measure))
+        return Formula("" if _says(e.name, lines) else e.name, lines, e.source, remark)
+
+
+def _says(caption: str, lines: tuple[Node, ...]) -> bool:
+    """Whether a caption says no more than its formula does."""
+    return len(lines) == 1 and as_text(caption).split() == box(lines[0]).lines[0].split()

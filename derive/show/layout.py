@@ -102,7 +102,7 @@ COORDINATE_ARRAYS = frozenset(
     (
         *("q", "qdot", "u", "udot", "p", "g", "s", "tau", "tau_n", "alpha", "effort"),
         *("eta", "etad", "etadd", "eta_I", "eta_O", "eta_p", "eta_N", "eta_pI", "eta_pO"),
-        *("S_c", "S_r", "e"),
+        *("S_c", "S_r", "e", "J"),
     )
 )
 

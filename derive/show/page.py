@@ -14,7 +14,7 @@ from html import escape
 from mstmm.errors import ElementError
 
 from .breaking import PaperLine, paper_lines
-from .captions import caption
+from .captions import as_text, caption
 from .document import (
     STAGES,
     Code,
@@ -72,12 +72,12 @@ def _text_item(item: Item) -> list[str]:
     if isinstance(item, Heading):
         if item.level == 3:
             return ["", item.text]
-        text = _in_text(item.text)
+        text = as_text(item.text)
         return ["", text, ("=" if item.level == 1 else "-") * min(columns(text), WIDTH)]
     if isinstance(item, Paragraph):
         label = {"sources": "source: ", "note": "note: "}.get(item.kind, "")
         before = [""] if item.kind == "note" else []
-        text = item.text if item.kind == "sources" else _in_text(item.text)
+        text = item.text if item.kind == "sources" else as_text(item.text)
         return [*before, *_folded(label + text)]
     if isinstance(item, Quantities):
         return _text_table(item.rows)
@@ -87,18 +87,12 @@ def _text_item(item: Item) -> list[str]:
 
 
 def _text_formula(item: Formula) -> list[str]:
-    head = " · ".join(filter(None, (_in_text(item.name), item.source, _in_text(item.remark))))
-    lines = ["", *_folded("  " + head)]
+    head = " · ".join(filter(None, (as_text(item.name), item.source, as_text(item.remark))))
+    lines = ["", *(_folded("  " + head) if head else [])]
     tall = any(len(box(line).lines) > 1 for line in item.lines)
     for line in item.lines:
         lines += wrapped(line) + ([""] if tall else [])
     return lines
-
-
-def _in_text(text: str) -> str:
-    """A sentence, its formulas typeset."""
-    parts = (p if isinstance(p, str) else box(p).lines[0] for p in caption(text))
-    return "".join(parts)
 
 
 def _folded(text: str, width: int = WIDTH) -> list[str]:
@@ -116,7 +110,7 @@ def _text_table(rows: tuple[QuantityRow, ...]) -> list[str]:
     cells = [
         (
             "  " * r.inner + box(r.symbol).lines[0], r.port, r.shape, shown_unit(r.unit),
-            _in_text(r.meaning),
+            as_text(r.meaning),
         )
         for r in rows
     ]  # fmt: skip
@@ -218,9 +212,8 @@ def _latex_formula(item: Formula) -> str:
     head = _in_latex(item.name) + (f" {escaped(item.source)}" if item.source else "")
     tail = f" --- {_in_latex(item.remark)}" if item.remark else ""
     rows = " \\\\\n".join(_aligned(part) for line in item.lines for part in paper_lines(line))
-    return (
-        f"{{\\raggedright\\noindent {head}{tail}\\par}}\n\\begin{{align*}}\n{rows}\n\\end{{align*}}"
-    )
+    said = f"{{\\raggedright\\noindent {head}{tail}\\par}}\n" if head + tail else ""
+    return f"{said}\\begin{{align*}}\n{rows}\n\\end{{align*}}"
 
 
 def _aligned(part: PaperLine) -> str:
@@ -257,6 +250,7 @@ def _html_item(item: Item) -> str:
     remark = f" — {_in_html(item.remark)}" if item.remark else ""
     source = f'<span class="source">{escape(item.source)}</span>' if item.source else ""
     caption = f"<figcaption><span>{_in_html(item.name)}{remark}</span>{source}</figcaption>"
+    caption = caption if item.name or remark or source else ""
     return f"<figure>{caption}\n{lines}</figure>"
 
 

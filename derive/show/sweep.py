@@ -34,7 +34,9 @@ from ..schedule.steps import (
 from ..schedule.sweeps import SWEEPS
 from ..schedule.words import CONSTANTS, SLOTS, TRAITS
 from .document import Code, Heading, Item, Paragraph
-from .page import FORMATS
+from .measure import Columns
+from .page import FORMATS, printed
+from .story import story
 from .text import WIDTH
 
 #: What the page explains before it lists anything.
@@ -61,11 +63,14 @@ def sweep_page(at: str, format: str, specs: Callable[[], Specs]) -> str:
     if at == "c":
         text = "\n".join(sweep_files(specs()).values())
         return FORMATS[format]("The sweep", [Heading("The sweep as C", 1), Code(text)])
-    return FORMATS[format]("The sweep", list(_items(_Steps(specs()))))
+    steps = _Steps(specs())
+    return printed("The sweep", lambda measure: list(_items(steps, measure)), format)
 
 
-def _items(steps: _Steps) -> Iterator[Item]:
+def _items(steps: _Steps, measure: Columns) -> Iterator[Item]:
     yield Heading("The sweep", 1)
+    yield from story(measure)
+    yield Heading("The schedule", 2)
     yield Paragraph(_SAID)
     for sweep in SWEEPS:
         yield Heading(f"sweep {_spaced(sweep.name)}", 2)

@@ -61,13 +61,18 @@ def show(
             "--keep", metavar="NAME", help="A number of the scene that stays a symbol; repeat it."
         ),
     ] = None,
+    beside: Annotated[
+        bool, typer.Option("--beside", help="Its classical matrix beside its motion subspace.")
+    ] = False,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Show an element's equations, matrix, intermediate form or C, with units and sources."""
     from .output import emit_json, note, put
 
     target = None if output is None else output_file(output, ())
-    if element.endswith(".toml"):
+    if beside:
+        pages = {element: _beside(element, format)}
+    elif element.endswith(".toml"):
         pages = {element: _scene(element, at, format, keep or [])}
     elif keep:
         raise ElementError("--keep names numbers of a scene: mstmm show SCENE.toml --keep NAME")
@@ -93,6 +98,13 @@ def _schedule(at: str, format: str) -> str:
     from . import stored
 
     return sweep_page(at, format, stored.specs)
+
+
+def _beside(element: str, format: str) -> str:
+    from mstmm.derive.show.beside import beside
+    from mstmm.derive.show.page import printed
+
+    return printed(*beside(element), format)
 
 
 def _scene(file: str, at: str, format: str, keep: list[str]) -> str:

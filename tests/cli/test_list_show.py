@@ -114,6 +114,26 @@ def test_the_schedule_of_the_sweep(mstmm: Command) -> None:
     assert max(map(len, done.out.splitlines())) <= 102
 
 
+def test_the_sweep_is_told_before_its_schedule(mstmm: Command) -> None:
+    text = mstmm("show", "sweep").out
+    told = [text.index(said) for said in (
+        "⎡ w + w_Q", "bias = ⎡ M ω̃² r_IC ⎤", "S_Q = S − U G", "B_I = B − A r̃",
+        "δ = H u̇ + δ_Q", "The schedule", "generic{free}.condense(", "generic{free}.recover(",
+    )]  # fmt: skip
+    assert told == sorted(told)
+
+
+def test_a_hinge_in_both_forms(mstmm: Command) -> None:
+    text = mstmm("show", "ball", "--beside").out
+    both, matrix, subspace = (text.index(said) for said in (
+        "classical and by motion subspace", "Classical transfer matrix", "Motion subspace",
+    ))  # fmt: skip
+    assert both < matrix < text.index("U_h = ") < subspace < text.index("H = ")
+    assert r"\begin{align*}" in mstmm("show", "pin", "--beside", "--format", "latex").out
+    done = mstmm("show", "screw", "--beside")
+    assert done.code == 2 and "these have: ball, pin" in done.err
+
+
 def test_the_schedule_in_other_formats(mstmm: Command) -> None:
     page = mstmm("show", "sweep", "--format", "html").out
     ElementTree.fromstring(page.partition("\n")[2] if page.startswith("<!") else page)

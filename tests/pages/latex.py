@@ -13,8 +13,10 @@ from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from mstmm.cli import stored
 from mstmm.derive.show.page import show_view
 from mstmm.derive.show.subjects import names, view
+from mstmm.derive.show.sweep import sweep_page
 
 #: What an author's document needs.
 _HEAD = "\\documentclass{article}\n\\usepackage{amsmath}\n\\begin{document}\n"
@@ -49,6 +51,7 @@ def _page(name: str) -> tuple[str, str]:
 def main() -> None:
     with ProcessPoolExecutor() as workers:
         pages = list(workers.map(_page, names()))
+    pages.append(("sweep", sweep_page("equations", "latex", stored.specs)))
     found = problems(pages)
     print(f"{len(pages)} pages of equations as LaTeX: {len(found)} problems", *found, sep="\n")
     sys.exit(bool(found))
