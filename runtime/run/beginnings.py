@@ -19,7 +19,7 @@ class Beginnings:
 
     def __init__(self) -> None:
         self._made: tuple[SceneSystem, Run] | None = None
-        self._energy = 0.0
+        self._energy: float | None = None
 
     def begin(
         self, engine: Engine, compiled: SceneCode | None, settings: Settings, q: Array, u: Array
@@ -27,14 +27,18 @@ class Beginnings:
         """The system and the integrator at the start of a run from (nq,), (nu,)."""
         if compiled is not None or self._made is None:
             system = SceneSystem(engine, compiled)
-            run = make_run(system, settings, q, u)
+            run = make_run(system, settings, q, u, energy=self._energy_at)
             self._made = self._made if compiled is not None else (system, run)
             return system, run
         system, run = self._made
         tableau = suited(system, settings)
         system.memory[:] = engine.start_memory()
         start = system.begin(settings.t_start, q, u)
-        if system.with_power and not self._energy:
-            self._energy = energy_at(system, settings.t_start, start)
-        run.begin(tableau, settings, start, tolerances(system, settings, start, self._energy))
+        run.begin(tableau, settings, start, tolerances(system, settings, start, self._energy_at))
         return system, run
+
+    def _energy_at(self, system: SceneSystem, t: float, start: Array) -> float:
+        """That of the start, J, looked at once."""
+        if self._energy is None:
+            self._energy = energy_at(system, t, start)
+        return self._energy

@@ -32,14 +32,19 @@ LARGEST = 2**30
 #: Quaternions that are settled at once.
 _QUATERNIONS = 2**18
 
+#: The energy (J) of a system at a time (s) in a state.
+Energy = Callable[[SceneSystem, float, Array], float]
+
 #: The work is a by-product of a run: it may err by this many times rtol of the energy.
 _WORK_TOLERANCE = 10.0
 
 
 def make_run(
-    system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike, capacity: int | None = None
-) -> Run:
-    """The integrator at the start of the run, with room for so many samples at a time."""
+    system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike,
+    capacity: int | None = None, energy: Energy | None = None,
+) -> Run:  # fmt: skip
+    """The integrator at the start of the run, with room for so many samples at a time; `energy` is
+    who knows that of the start."""
     tableau = suited(system, settings)
     start = system.begin(settings.t_start, q, u)
     if _is_on_positions(tableau):
@@ -47,7 +52,7 @@ def make_run(
     known = system.engine.packed.time_map(settings.t_start, settings.t_end)
     return Run(
         system.engine.ffi, system.engine.lib, system.system, tableau, settings, start,
-        atol=tolerances(system, settings, start), breaks=known.breaks,
+        atol=tolerances(system, settings, start, energy), breaks=known.breaks,
         bounds=(known.starts, known.longest), capacity=capacity,
     )  # fmt: skip
 
@@ -69,12 +74,12 @@ def _is_on_positions(tableau: Tableau) -> bool:
 
 
 def tolerances(
-    system: SceneSystem, settings: Settings, start: Array, energy: float | None = None
+    system: SceneSystem, settings: Settings, start: Array, energy: Energy | None = None
 ) -> Array:
     """Absolute tolerance per component; that of the work follows the energy of the start (J)."""
     found = np.full(len(start), settings.atol)
     if system.with_power:
-        known = energy_at(system, settings.t_start, start) if energy is None else energy
+        known = (energy or energy_at)(system, settings.t_start, start)
         found[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * (known or 1.0)
     return found
 
