@@ -71,6 +71,15 @@ _WAYS_OUT = {
 }
 
 
+def marked(text: str, position: int) -> str:
+    """A place of an expression: its number, and the piece around it with an arrow."""
+    before, after = text[max(0, position - 30) : position], text[position:]
+    before = ("..." if position > 30 else "") + before
+    after = after[:30] + ("..." if len(after) > 30 else "")
+    shown = f"{before} -->{after}".encode("unicode_escape").decode("ascii")
+    return f"character {position + 1}: {shown.strip()}"
+
+
 @dataclass(frozen=True)
 class Name:
     """A name in an expression: `rod1.tip.x` has parts ("rod1", "tip", "x"), `q[1]` the index 1.
@@ -171,11 +180,7 @@ class Parser:
 
     def error(self, message: str, position: int) -> ExpressionError:
         """The error with its position marked by an arrow in a piece of the text."""
-        before, after = self.text[max(0, position - 30) : position], self.text[position:]
-        before = ("..." if position > 30 else "") + before
-        after = after[:30] + ("..." if len(after) > 30 else "")
-        shown = f"{before} -->{after}".encode("unicode_escape").decode("ascii")
-        return ExpressionError(f"{message} (character {position + 1}: {shown.strip()})")
+        return ExpressionError(f"{message} ({marked(self.text, position)})")
 
     # --- the loop over tokens ---------------------------------------------------------------
 

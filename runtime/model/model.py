@@ -472,6 +472,7 @@ class Model(Compiled):
                 Several runs find the tolerance; `Result.error_estimate` says what was reached.
             error_of: names of quantities whose error is meant, instead of all coordinates: of one
                 in its unit, of several in parts of how far each goes.
+            t_start: time of the start in s, which drives, loads and signals see.
             max_step, max_steps: longest step in s and largest number of steps; 0 for no limit.
             radius: spectral radius, 0 to 1, that genalpha and dttmm leave to infinitely fast motion
                 (0.8); below 1 with genalpha-index3.

@@ -70,7 +70,10 @@ class Record(FlexibleResults, ABC):
     def message(self) -> str:
         """Why the run ended, as a sentence; and which of its samples cannot be used."""
         text, unusable = self.trajectory.message, self._unusable
-        return f"{text}, but {unusable}" if unusable and self.trajectory.success else text
+        if not unusable or not self.trajectory.success:
+            return text
+        text = f"{text}, but {unusable}"
+        return text if self._step is None else self._step.blamed(text)
 
     @cached_property
     def _unusable(self) -> str:

@@ -184,6 +184,10 @@ BAD: list[tuple[Data, str]] = [
     (one(law={"effort": ["1", "2"]}), "law.effort: expected 1 entry"),
     (one(law={"effort": "t < 1"}), "found a comparison; write where(t < 1, 1, 0)"),
     (one(law={"effort": "torque"}), "law.effort[0]: 'torque' is unknown"),
+    (
+        one(law={"effort": "1 + " * 40 + "torque + 2" + " + 1" * 40}),
+        "one of t, q, u, pi (character 161: ...+ 1 + 1 + 1 + 1 + 1 + 1 + 1 +  -->torque + 2",
+    ),
     (one(law={"effort": "angle"}), "one of t, q, u, pi"),
     (one(law={"effort": "q[1]"}), 'the last entry of hinge "shoulder" is [0]'),
     (one(law={"effort": "elbow.q"}), "there is no hinge 'elbow'; there is only shoulder"),
