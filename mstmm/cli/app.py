@@ -17,8 +17,8 @@ from .generate import generate
 from .import_robot import import_robot
 from .listing import list_elements
 from .pictures.plot import plot
+from .pictures.report import report
 from .pictures.view import view
-from .pictures.write_report import report
 from .show import show
 from .simulate import simulate
 from .studies.advise import advise

@@ -81,7 +81,7 @@ def _list(folder: Path, json: bool, verify: bool) -> None:
 
 def _sum_up(folder: Path, entries: list[Listed], size: int, limit: int, cut_off: int) -> None:
     from . import output
-    from .report import count
+    from .summary import count
 
     whole = sum(1 for entry in entries if not entry.problem)
     output.say(
@@ -96,7 +96,7 @@ def _clean(folder: Path, unused: float, json: bool) -> None:
     from mstmm.runtime.libraries.upkeep import clean
 
     from . import output
-    from .report import count
+    from .summary import count
 
     removed, size = clean(folder, unused * _DAY)
     if json:

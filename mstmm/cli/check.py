@@ -124,10 +124,10 @@ _MANY = {"elastic": "elastic bodies"}
 def _scene_text(
     path: str, scene: Scene, sizes: dict[str, int], warnings: list[str], choices: list[str]
 ) -> str:
-    from . import report
+    from . import summary
 
     said = ", ".join(
-        report.count(number, _ONE[name], _MANY.get(name, name))
+        summary.count(number, _ONE[name], _MANY.get(name, name))
         for name, number in sizes.items()
         if number
     )

@@ -48,16 +48,16 @@ def scene_text() -> str:
 
 def demo(json: Json = False) -> None:
     """Run an example; leave a result, pictures, one that moves, and a table in this folder."""
-    from . import output, report
+    from . import output, summary
 
     scene, result_file, table_file, picture, moving = _targets()
     kept = _write_scene(scene)
     result, seconds = _simulate(scene_text())
     verdict = result.certificate.verdict()
     text = "\n".join([
-        ABOUT, "", *report.verdict_lines(verdict, 80),
-        f"{report.sizes(result)}", report.effort(result, seconds), "",
-        result.table(*TABLE, rows=11), "", *report.certificate_lines(result, 80),
+        ABOUT, "", *summary.verdict_lines(verdict, 80),
+        f"{summary.sizes(result)}", summary.effort(result, seconds), "",
+        result.table(*TABLE, rows=11), "", *summary.certificate_lines(result, 80),
     ])  # fmt: skip
     result.save(result_file)
     table_file.write_text(text + "\n", encoding="utf-8")
@@ -72,7 +72,7 @@ def demo(json: Json = False) -> None:
     } | ({} if picture is None else {picture: "a picture of it"})
     made |= {} if moving is None else {moving: "the chain as it moves, for any browser"}
     if json:
-        data = report.to_json(result, seconds, verdict)
+        data = summary.to_json(result, seconds, verdict)
         output.emit_json({**data, "files": [str(path) for path in made]})
         return
     output.say(text)

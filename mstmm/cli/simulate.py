@@ -465,11 +465,11 @@ def interrupted(result: Result) -> bool:
 def _report(
     plan: Plan, result: Result, seconds: float, json: bool, refused: RiskRefused | None
 ) -> None:
-    from . import output, report
+    from . import output, summary
 
     made = [str(path) for path in (plan.output, plan.plot) if path is not None]
     if json:
-        data = report.to_json(result, seconds, _verdict(plan, result))
+        data = summary.to_json(result, seconds, _verdict(plan, result))
         data |= {"scene": plan.scene, "files": made}
         if refused is not None:
             data["error"] = {
@@ -495,22 +495,22 @@ def _verdict(plan: Plan, result: Result) -> Verdict:
 
 
 def _say(plan: Plan, result: Result, seconds: float, made: list[str]) -> None:
-    from . import output, report
+    from . import output, summary
 
     console = output.console()
     verdict, told = _verdict(plan, result), result.trajectory.told
-    for line in report.verdict_lines(verdict, console.width, told):
+    for line in summary.verdict_lines(verdict, console.width, told):
         output.say(line)
-    output.say(f"{plan.scene}: {report.sizes(result)}, {result.model.engine} engine")
-    output.say(report.effort(result, seconds))
-    for line in report.method_lines(result, console.width):
+    output.say(f"{plan.scene}: {summary.sizes(result)}, {result.model.engine} engine")
+    output.say(summary.effort(result, seconds))
+    for line in summary.method_lines(result, console.width):
         output.say(line)
     output.say(result.message)
     if len(result.t):
         output.say()
-        output.say(report.fitting_table(result, plan.quantities, _ROWS, console.width))
+        output.say(summary.fitting_table(result, plan.quantities, _ROWS, console.width))
     output.say()
-    for line in report.certificate_lines(result, console.width):
+    for line in summary.certificate_lines(result, console.width):
         output.say(line)
     output.say()
-    output.say(f"wrote {' and '.join(made)} ({report.count(len(result.t), 'sample')})")
+    output.say(f"wrote {' and '.join(made)} ({summary.count(len(result.t), 'sample')})")
