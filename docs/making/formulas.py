@@ -6,11 +6,16 @@ import contextlib
 import re
 import unicodedata
 from typing import Any
+from xml.etree import ElementTree
 
 from docutils import nodes
 from latex2mathml.converter import convert
 from sphinx.util.logging import getLogger
 
+#: The converter knows the outer environment alone.
+_ALIGNED = re.compile(r"\\(begin|end)\{aligned\}")
+#: Elements that a browser draws wrong with any other number of parts.
+_PARTS = {"msub": 2, "msup": 2, "munder": 2, "mover": 2, "mfrac": 2, "msubsup": 3, "munderover": 3}
 _SCRIPT = re.compile(r'<mi mathvariant="script">([A-Z])</mi>')
 
 
@@ -27,13 +32,30 @@ def _display(translator: Any, node: nodes.math_block) -> None:
 def _mathml(node: nodes.Element, display: str) -> str:
     """The formula of a node; one that cannot be read is a warning at its place."""
     try:
-        formula = convert(node.astext(), display=display)
+        return mathml(node.astext(), display)
     except Exception as problem:  # the converter's errors have no common class
         getLogger(__name__).warning("%s: %r", node.astext(), problem, location=node)
         return ""
-    if "\\" in formula:  # what the converter does not know it leaves as it is
-        getLogger(__name__).warning("not understood: %s", node.astext(), location=node)
-    return _SCRIPT.sub(_script, formula)
+
+
+def mathml(latex: str, display: str = "inline") -> str:
+    """A formula as MathML, "inline" or as a "block".
+
+    Raises ValueError for what the converter leaves as it is, or makes of the wrong number of parts,
+    and what the converter raises.
+    """
+    found = convert(_ALIGNED.sub(r"\\\1{align*}", latex), display=display)
+    if "\\" in found:
+        raise ValueError("a command of it is not understood")
+    try:
+        root = ElementTree.fromstring(found)
+    except ElementTree.ParseError:
+        raise ValueError("an environment of it is not understood") from None
+    for element in root.iter():
+        name = element.tag.rpartition("}")[2]
+        if len(element) != _PARTS.get(name, len(element)):
+            raise ValueError(f"{name} of {len(element)} parts; put braces around what carries it")
+    return _SCRIPT.sub(_script, found)
 
 
 def _script(letter: re.Match[str]) -> str:
