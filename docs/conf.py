@@ -14,7 +14,7 @@ project = "mstmm"
 author = "mstmm contributors"
 copyright = "2026, mstmm contributors"
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "sphinx.ext.autodoc",
     "making.formulas",
     "making.drawings",
@@ -29,6 +29,10 @@ html_math_renderer = "mathml"
 html_copy_source = False
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
+nb_execution_mode = "force"  # notebooks are kept without what they give
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
+nb_merge_streams = True
 autodoc_default_options = {"members": True, "inherited-members": True}
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"

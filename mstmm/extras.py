@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+from io import BytesIO
+from typing import Any
+
 from .errors import EnvironmentFailure
 
 
@@ -11,3 +15,26 @@ def missing(name: str, what: str, error: ImportError) -> EnvironmentFailure:
         f"{what} needs the package {error.name or 'of an extra'}, which is not installed; "
         f"install it with: pip install 'mstmm[{name}]'"
     )
+
+
+def figures(what: str = "a picture") -> Any:
+    """The class `matplotlib.figure.Figure`, which from then on a notebook shows; the one in which
+    this runs need not have asked for pictures.  EnvironmentFailure without the extra `plot`."""
+    try:
+        from matplotlib import figure
+    except ImportError as error:
+        raise missing("plot", what, error) from None
+    Figure = figure.Figure
+    ipython = sys.modules.get("IPython")
+    shell = None if ipython is None else ipython.get_ipython()
+    if shell is not None and hasattr(shell, "kernel"):
+        formatter = shell.display_formatter.formatters["image/png"]
+        if Figure not in formatter.type_printers:
+            formatter.for_type(Figure, _png)
+    return Figure
+
+
+def _png(figure: Any) -> bytes:
+    written = BytesIO()
+    figure.savefig(written, format="png", bbox_inches="tight")
+    return written.getvalue()

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import SceneError
-from ..extras import missing
+from ..extras import figures
 from ..runtime.host.files import replacing
 from .page import number, tried_to
 
@@ -46,11 +46,9 @@ _LETTERS = 80
 
 def draw(case: Found, path: Path | None) -> Any:
     """See `Case.plot`."""
-    try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise missing("plot", "a picture", error) from None
+    Figure = figures()
+    import matplotlib as mpl
+
     style: Any = _STYLE
     with mpl.rc_context(style):
         figure = Figure(figsize=(6.4, 3.7), layout="constrained")

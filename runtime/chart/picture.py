@@ -9,7 +9,7 @@ from textwrap import wrap
 from typing import Any
 
 from mstmm.errors import SceneError
-from mstmm.extras import missing
+from mstmm.extras import figures
 from mstmm.printable import printable
 
 from ..host.files import replacing
@@ -39,11 +39,9 @@ def plot(chart: ChartRecord, path: Path | None) -> Any:
 
     Raises EnvironmentFailure without matplotlib, SceneError for an unknown ending.
     """
-    try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise missing("plot", "a picture", error) from None
+    Figure = figures()
+    import matplotlib as mpl
+
     made = drawing(chart)
     height = max(_HEIGHT, _ROW * len(made.legend) + 0.9)
     style: Any = _STYLE

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import sys
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -10,6 +15,7 @@ from view import scenes
 
 import mstmm
 from mstmm.errors import SceneError
+from mstmm.extras import figures
 
 
 def cells(shown: str) -> list[str]:
@@ -63,3 +69,32 @@ def test_compile_takes_the_path_of_a_scene(tmp_path: Path) -> None:
         mstmm.compile(str(tmp_path / "leg.toml"))
     with pytest.raises(SceneError, match="expected a Scene, or the path of a scene file"):
         mstmm.compile(3)  # type: ignore[arg-type]
+
+
+NOTEBOOKS = sorted((Path(__file__).parents[2] / "docs" / "notebooks").glob("*.ipynb"))
+
+
+def test_notebooks_of_the_pages_are_kept_without_what_they_gave() -> None:
+    """They are executed where the pages are built."""
+    listed = (NOTEBOOKS[0].parent / "index.md").read_text()
+    for path in NOTEBOOKS:
+        cells = json.loads(path.read_text())["cells"]
+        assert f"({path.name})" in listed
+        assert not [cell for cell in cells if cell.get("outputs") or cell.get("execution_count")]
+        for cell in cells:
+            if cell["cell_type"] == "code":
+                compile("".join(cell["source"]), path.name, "exec")
+
+
+def test_figures_show_themselves_where_a_notebook_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stand-in for IPython, which keeps what it is told of kinds of objects."""
+    printers: dict[type, Callable[[Any], bytes]] = {}
+    png = SimpleNamespace(type_printers=printers, for_type=printers.__setitem__)
+    shell = SimpleNamespace(
+        kernel=object(), display_formatter=SimpleNamespace(formatters={"image/png": png})
+    )
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
+    figures()
+    monkeypatch.undo()
+    figure = scenes.run().plot("energy")
+    assert printers[type(figure)](figure)[:4] == b"\x89PNG"

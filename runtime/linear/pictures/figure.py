@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from mstmm.errors import SceneError
-from mstmm.extras import missing
+from mstmm.extras import figures
 
 from ...host.files import path_of, replacing
 
@@ -17,11 +17,7 @@ _FORMATS = (".png", ".svg", ".pdf")
 
 def figure(height: float = 4.5, width: float = 7.5) -> Any:
     """An empty figure.  EnvironmentFailure without the extra."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise missing("plot", "a picture", error) from None
-    return Figure(figsize=(width, height), layout="constrained")
+    return figures()(figsize=(width, height), layout="constrained")
 
 
 def write(made: Any, path: str | Path | None) -> None:

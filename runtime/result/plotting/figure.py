@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mstmm.errors import SceneError
-from mstmm.extras import missing
+from mstmm.extras import figures
 from mstmm.printable import printable
 
 from ...host.files import replacing
@@ -98,11 +98,9 @@ def _composed(
     pictures: list[Picture], shapes: tuple[str, ...], made: Sequence[Panel], title: str | None,
     ax: Any,
 ) -> Drawn:  # fmt: skip
-    try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise missing("plot", "a picture", error) from None
+    Figure = figures()
+    import matplotlib as mpl
+
     pictures += [
         Picture(partial(_draw, one), _HEIGHT + (_EQUAL if one.alike else 0), one.kind == "time")
         for one in made

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 from base64 import b64encode
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager
 from html import escape
 from importlib.resources import files
-from io import StringIO
 from typing import Any
 
 import numpy as np
@@ -70,7 +69,7 @@ def _server() -> Iterator[Any]:
     except ImportError as error:
         raise missing("view", "a page to look at", error) from None
     try:
-        with redirect_stdout(StringIO()):
+        with _quiet():
             server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     except OSError as error:
         raise EnvironmentFailure(
@@ -80,8 +79,21 @@ def _server() -> Iterator[Any]:
     try:
         yield server
     finally:
-        with redirect_stdout(StringIO()):
+        with _quiet():
             server.stop()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """What viser says of its server is nobody's concern: not on a terminal, not in a notebook."""
+    import rich
+
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        yield
+    finally:
+        console.quiet = before
 
 
 class _Moving:
