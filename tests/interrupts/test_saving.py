@@ -18,7 +18,7 @@ from mstmm import errors
 from mstmm.runtime.host import interruptible
 from mstmm.runtime.host.files import replacing
 from mstmm.runtime.model import results
-from mstmm.runtime.result.output import storage
+from mstmm.runtime.result.output import tabled
 from mstmm.runtime.run import execution
 
 RUN = ("simulate", "pendulum.toml", "--t-end", "1", "-o", "a.csv", "--no-certify")
@@ -47,7 +47,7 @@ def test_a_result_that_cannot_be_saved(
         raise error
 
     with monkeypatch.context() as patch:
-        patch.setattr(storage, "_csv", fail)
+        patch.setitem(tabled.TABLES, ".csv", fail)
         done = mstmm(*RUN, *options)
     assert done.code == code and said in done.err and KEPT in done.err
     assert {path.name for path in folder.iterdir()} == {"pendulum.toml", "a.csv.checkpoint"}
