@@ -25,6 +25,7 @@ from mstmm.scene.tables.constants import evaluated
 
 TABLES = (
     "input", "body", "beam", "elastic", "hinge", "chain", "load", "event", "spring", "bushing",
+    "constraint",
 )  # fmt: skip
 _INDEX = re.compile(r"(.*)\[(\d+)\]")
 

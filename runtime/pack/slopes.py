@@ -94,8 +94,8 @@ def seeded(scene: Scene, known: Known, names: Sequence[str], seed: Seed) -> tupl
 
 def refuse_folded(scene: Scene, names: Sequence[str], lacking: str) -> None:
     """Named constants, and numbers that go into the shapes of flexible bodies, by quadrature and
-    eigenvalues, and names that the scene does not have: SceneError, which says what they are
-    `lacking` and what to do instead."""
+    eigenvalues, or into the axes of constraints, and names that the scene does not have:
+    SceneError, which says what they are `lacking` and what to do instead."""
     for name in folded(scene, parameters.resolved(scene, names)):
         if name.startswith("constants."):
             raise SceneError(
@@ -103,19 +103,21 @@ def refuse_folded(scene: Scene, names: Sequence[str], lacking: str) -> None:
                 f"reach the kernels, and have no {lacking} (with_parameters)"
             )
         raise SceneError(
-            f'parameter "{name}": numbers of flexible bodies, and of loads along them, have no '
-            f"{lacking} (with_parameters)"
+            f'parameter "{name}": numbers of flexible bodies, and of loads along them, and those '
+            f"that turn a constraint or begin it have no {lacking} (with_parameters)"
         )
 
 
 def folded(scene: Scene, names: Iterable[str]) -> list[str]:
     """Those of full names that `refuse_folded` refuses."""
     flexible = {body.name for body in (*scene.beam, *scene.elastic)}
-    along = ("force_per_length", "span")
+    closing = {one.name for one in scene.constraint}
+    along, chosen = ("force_per_length", "span"), ("normal", "axis", "curve", "start")
     parted = ((name, *name.partition(".")[::2]) for name in names)
     return [
         name for name, owner, rest in parted
         if owner in flexible or owner == "constants" or rest.startswith(along)
+        or (owner in closing and rest.startswith(chosen))
     ]  # fmt: skip
 
 

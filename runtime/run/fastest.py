@@ -21,7 +21,6 @@ from mstmm.scene import Scene
 from ..engine.engine import Engine
 from ..engine.motions import motions
 from ..engine.tangent import Tangent
-from ..pack.loops.refusal import refuse_bending
 from ..pack.qr import refuse_steps
 
 #: Power iterations; the first one is in the choice of their start.
@@ -68,7 +67,6 @@ def fastest_at_start(engine: Engine, t: float, q: Array, u: Array) -> float:
     Raises SceneError for scenes that implicit steps cannot follow, NumericalFailure where the state
     cannot be evaluated.
     """
-    refuse_bending(engine.packed, "an implicit step")
     refuse_steps(engine.packed)
     memory, y = engine.start_memory(), np.concatenate([q, u])
     if len(y) > _FEW:

@@ -16,7 +16,7 @@ from ..integrate.loop import Run, Samples, Statistics, Status
 from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO, Tableau, check_steps, get
 from ..integrate.steppers.implicit import Alpha
-from ..pack.loops.refusal import refuse_beyond_hinges, refuse_method
+from ..pack.loops.refusal import refuse_method, refuse_of_speeds
 from .endings import message_of
 from .method_choice import Choice
 from .notes import endless, unresolved
@@ -63,7 +63,7 @@ def suited(system: SceneSystem, settings: Settings) -> Tableau:
     if tableau.implicit:
         refuse_method(system.engine.packed, settings.method, settings.tangent)
         if _is_on_positions(tableau):
-            refuse_beyond_hinges(system.engine.packed, f'method "{settings.method}"')
+            refuse_of_speeds(system.engine.packed, settings.method)
         system.offer_tangent()
     check_steps(tableau, settings.step)
     return tableau

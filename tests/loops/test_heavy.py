@@ -67,7 +67,10 @@ def exact(q: Array, u: Array, masses: list[float]) -> Array:
     return np.diff([float(found[k]) for k in range(n)], prepend=0.0)
 
 
-@pytest.mark.parametrize(("power", "refines", "accuracy"), [(0, 0, 1e-13), (6, 1, 1e-14)])
+@pytest.mark.parametrize(
+    ("power", "refines", "accuracy"),
+    [(0, 0, 1e-13), (6, 1, 1e-14), (12, 2, 1e-12), (14, 4, 1e-8)],
+)
 def test_a_heavy_rod_between_light_ones(power: int, refines: int, accuracy: float) -> None:
     masses = [1.0, 1.0, 1.0, 10.0**power, 1.0, 1.0]
     model = mstmm.compile(mstmm.Scene(**chain(masses)))
@@ -78,6 +81,17 @@ def test_a_heavy_rod_between_light_ones(power: int, refines: int, accuracy: floa
     found = model.accelerations(q, u)[: len(masses)]
     error = np.abs(found - wanted).max() / np.abs(wanted).max()
     assert error < accuracy, error
+
+
+@pytest.mark.parametrize(
+    ("heavy", "message"),
+    [((5,), r"refining them does not help: "), ((2, 4), r'"end" closes drowns in ')],
+)
+def test_masses_that_leave_no_digits(heavy: tuple[int, ...], message: str) -> None:
+    """Beside true values the accelerations were wrong by 0.4 of their size, and nothing said so."""
+    masses = [1e15 if k in heavy else 1.0 for k in range(6)]
+    with pytest.raises(mstmm.SceneError, match=message + r".*kg\); bring their masses nearer"):
+        mstmm.compile(mstmm.Scene(**chain(masses)))
 
 
 @pytest.mark.parametrize("body", [1, 2])

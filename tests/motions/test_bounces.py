@@ -165,3 +165,46 @@ def test_blows_do_work_and_balances_are_kept(wall: str) -> None:
     assert run.certificate.energy.relative < 1e-9
     if wall == "0":  # 1 - 0.8^2 of what it fell with
         assert run.work[-1] == pytest.approx(-0.36 * 0.2 * 9.81 * 2.0, rel=1e-9)
+
+
+def bladed(when: str) -> mstmm.Model:
+    """A hub that swings down with a blade, and a knob on a pin at the tip of that."""
+    hub = {"name": "hub", "mass": 2.0, "inertia": [0.1, 0.1, 0.1], "ends": {"rim": [0.2, 0, 0]}}
+    knob = rod("knob", 0.2, 0.3)
+    hinges = [
+        {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "hub",
+         "initial": {"q": 0.3, "u": -1.0}},
+        {"name": "weld", "type": "fixed", "inboard": "hub.rim", "outboard": "blade"},
+        {"name": "ring", "type": "pin", "inboard": "blade.tip", "outboard": "knob",
+         "initial": {"q": 0.5, "u": 0.7}},
+    ]  # fmt: skip
+    blade = {"name": "blade", "length": 1.0, "mass_per_length": 1.2, "bending_stiffness": 20.0,
+             "modes": 2}  # fmt: skip
+    event = {"name": "floor", "when": when, "do": "bounce", "restitution": 0.6}
+    return model({"gravity": [0, -G, 0], "body": [hub, knob], "hinge": hinges, "beam": [blade],
+                  "event": [event]})  # fmt: skip
+
+
+@pytest.mark.parametrize(("end", "height"), [("blade.tip", -0.5), ("knob.tip", -0.6)])
+def test_a_blade_strikes_the_floor(end: str, height: float) -> None:
+    """All shapes are struck with it: the mass matrix, and slopes of the height by differences."""
+    one = bladed(f"{end}.y < {height}")
+    run = one.simulate(1.0, rtol=1e-9, certify=True)
+    assert run.success and run.certificate.energy.relative < 1e-8
+    hit = int(np.flatnonzero(run.trajectory.event > 0)[0])
+    q, before, behind = run.q[hit], run.u[hit - 1], run.u[hit]
+
+    def heights(side: float) -> list[float]:
+        moved = [q + side * 1e-5 * row for row in np.eye(one.nq)]
+        states = [one.simulate(1e-9, initial=(x, 0 * before), output_times=[0.0]) for x in moved]
+        return [float(state.position(end)[0, 1]) for state in states]
+
+    row = (np.array(heights(-1.0)) - heights(1.0)) / 2e-5
+    answer = np.linalg.solve(one.mass_matrix(q), row)
+    wanted = before - 1.6 * (row @ before) / (row @ answer) * answer
+    assert np.abs(behind - wanted).max() < 1e-7 * np.abs(wanted).max()
+
+
+def test_a_shape_alone_is_no_place() -> None:
+    with pytest.raises(mstmm.SceneError, match="strikes places"):
+        bladed("blade.q[0] > 0.01").simulate(0.1)

@@ -73,14 +73,18 @@ int mstmm_refine(mstmm_state *state, const real *q, const real *u)
 {
     const mstmm_model *model = state->model;
     real *answer = state->workspace + model->answer;
-    memcpy(answer, state->udot, (size_t)model->nu * sizeof(real));
+    int code = 0;
     state->q = q;
     state->u = u;
     state->given = answer;
     state->residual = state->refined = 1;
-    if (state->balance) state->balance->power = state->balance->potential = 0;
-    mstmm_ground(state);
-    return mstmm_run_accelerations(state);
+    for (int k = 0; k < model->refines && !code; k++) {
+        memcpy(answer, state->udot, (size_t)model->nu * sizeof(real));
+        if (state->balance) state->balance->power = state->balance->potential = 0;
+        mstmm_ground(state);
+        code = mstmm_run_accelerations(state);
+    }
+    return code;
 }
 
 int mstmm_placing_accelerations(const mstmm_model *model, real *workspace, real closing, real t,

@@ -253,7 +253,7 @@ typedef struct {
     int64_t loops;        /* first number of closed loops in the workspace */
     int64_t loops_summed; /* so many of them are sums */
     int64_t answer;       /* and of nu numbers: an answer that is refined */
-    int refines;          /* digits are lost behind heavy bodies: accelerations are refined once */
+    int refines;          /* digits are lost behind heavy bodies: how often to refine accelerations */
     int n_couplings;
     const mstmm_coupling *couplings;
     const mstmm_tape *coupling_tape; /* t, q, u -> their numbers */

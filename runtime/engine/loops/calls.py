@@ -104,9 +104,10 @@ class LoopCalls(LoopNumbers):
             raise engine.failed(failure, t, q, u)
         return q, u
 
-    def judge_by(self, states: Sequence[Array]) -> None:
+    def judge_by(self, states: Sequence[Array]) -> set[int]:
         """Take the largest pivots at these closed states (nq,) for the usual ones, where they are
-        far below the mobilities: honest rows, behind which heavy bodies hang."""
+        far below the mobilities: honest rows, behind which heavy bodies hang.  Rows whose pivots
+        are rounding at all of them."""
         floors = [self.records.floor(row) for row in range(self.count)]
         for row in range(self.count):
             self.records.judge(row, _NOISE * float(self.mobility[row]))
@@ -118,3 +119,4 @@ class LoopCalls(LoopNumbers):
             heavy = 0.0 < pivot < _ANSWERED * mobility and not self.records.yields(row)
             floor = max(ROUNDING * pivot, _LEAST * mobility) if heavy else floors[row]
             self.records.judge(row, min(floor, floors[row]))
+        return {row for row, pivot in enumerate(usual.tolist()) if not pivot}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.errors import SceneError
+from mstmm.errors import NumericalFailure, SceneError
 
 from ...pack.loops.variants import LOCKED, keeping, length_of, without
 from ...pack.pack import packed_system
@@ -17,7 +17,7 @@ from ..engine import Engine
 from .assembly import Assembly
 from .calls import LoopCalls
 from .rank import REPEATED, rank_at
-from .refinement import loses_digits
+from .refinement import refinements, unlike_masses
 from .stress import outboard_axes
 
 #: Directions of a hinge that closes a loop, as its rows are called.
@@ -110,7 +110,9 @@ class Closed:
         self.loops, repeating = self._judged(near, free_speeds)
         self._refuse_structure()
         self.start = self.assembled(near, u, holds, self.fast)
-        self.engine.packed.model.refines = int(loses_digits(self.engine, *self.start))
+        self.engine.packed.model.refines = refinements(
+            self.engine, *self.start, self.loops.mobility
+        )
         self._refuse_locked(calls, repeating, LOCKED * length)
 
     def assembled(
@@ -160,7 +162,9 @@ class Closed:
             self.engine = Engine(packed_system(left, packed))
             calls = LoopCalls(self.engine, q)
             records = calls.records
-        calls.judge_by(rank.states)
+        silent, here = calls.judge_by(rank.states), {names[row] for row in rank.here}
+        drowned = [name for row, name in enumerate(self._names(calls)) if row in silent]
+        self._refuse_drowned([name for name in drowned if name not in here])
         told = Loops(
             tuple(cut.hinge for cut in packed.expanded.cuts if cut.constraint is None),
             tuple(names), rows,
@@ -177,6 +181,16 @@ class Closed:
             f"scene: no freedom is left, and {_ending(name for name, _ in self.loops.rows)}: a "
             "structure; take a hinge with more coordinates, or a [[spring]] in place of one of them"
         )
+
+    def _refuse_drowned(self, rows: Sequence[tuple[str, str]]) -> None:
+        """NumericalFailure for rows that geometry tells from others, but no sweep with these
+        masses."""
+        if rows:
+            name, direction = rows[0]
+            raise NumericalFailure(
+                f'direction {direction} of what "{name}" closes drowns in rounding: '
+                f"{unlike_masses(self.engine)}"
+            )
 
     @property
     def _is_led(self) -> bool:

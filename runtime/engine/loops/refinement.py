@@ -1,7 +1,7 @@
-"""Whether heavy bodies behind light ones cost the accelerations of closed loops digits.
+"""How often heavy bodies behind light ones make accelerations of closed loops be refined.
 
-Then every answer is refined once: what inverse dynamics of it leaves over is answered too, and
-added.  What that changes at the start is what is lost.
+What inverse dynamics of an answer leaves over is answered too, and added: again and again, as long
+as that changes anything.  What the last time changes is what is wrong before it.
 """
 
 from __future__ import annotations
@@ -13,27 +13,66 @@ from mstmm.errors import NumericalFailure
 
 from ..engine import Engine
 
-#: Change of the accelerations, in parts of the largest, from which on four digits are lost.
-_LOST = 1e-12
+#: Change of the accelerations, in parts of the largest, that is rounding, and from which on
+#: they are not to be believed.
+_ROUNDING, _WRONG = 1e-12, 1e-6
+#: Part of what weight, speeds or efforts make of them, below which they are balanced.
+_BALANCED = 1e-3
+#: Refinements at most.
+_MOST = 4
 
 
-def loses_digits(engine: Engine, q: Array, u: Array) -> bool:
-    """Whether a refinement changes accelerations at (q, u), or those of drawn efforts, by more than
-    rounding."""
+def refinements(engine: Engine, q: Array, u: Array, mobility: int) -> int:
+    """As many as accelerations at (q, u), and those of drawn efforts, take until they stay as they
+    are.
+
+    Raises NumericalFailure where they do not.
+    """
     model = engine.packed.model
     if engine.packed.flexible:
-        return False  # what modes leave over is not answered
+        return 0  # what modes leave over is not answered
     efforts = np.random.default_rng(0).uniform(-1.0, 1.0, (2, engine.nu))
     efforts[0] = 0.0
     memory = engine.start_memory()
     states = np.tile(q, (2, 1)), np.tile(u, (2, 1)), np.tile(memory, (2, 1))
+
+    def answers(times: int) -> Array:
+        model.refines = times
+        return engine.accelerations(0.0, *states, efforts)[1]
+
+    weight = float(np.linalg.norm(engine.packed.described.gravity))
+    usual = weight + float(np.abs(u).max(initial=0.0)) ** 2
+    usual = usual if mobility > 0 else max(usual, 1.0)  # what only drives move may stand still
     try:
-        plain = engine.accelerations(0.0, *states, efforts)[1]
-        model.refines = 1
-        refined = engine.accelerations(0.0, *states, efforts)[1]
+        before = answers(0)
+        for times in range(1, _MOST + 1):
+            found = answers(times)
+            sizes = np.abs(found).max(axis=1)
+            least = _BALANCED * max(usual, float(sizes.max()), np.finfo(float).tiny)
+            changed = np.abs(found - before).max(axis=1) / np.maximum(sizes, least)
+            if not (changed > _ROUNDING).any():
+                return times - 1
+            before = found
     except NumericalFailure:
-        return False
+        return 0
     finally:
         model.refines = 0
-    size = np.abs(refined).max(axis=1)
-    return bool((np.abs(plain - refined).max(axis=1) > _LOST * size).any())
+    wrong = float(changed.max())
+    if wrong > _WRONG:
+        raise NumericalFailure(
+            f"accelerations of the closed loops are wrong by {wrong:.1g} of their size, and "
+            f"refining them does not help: {unlike_masses(engine)}"
+        )
+    return _MOST
+
+
+def unlike_masses(engine: Engine) -> str:
+    """The heaviest body and the lightest that has a mass, and what to do."""
+    masses = {body.name: body.mass for body in engine.packed.described.body if body.mass > 0}
+    if not masses:
+        return "bring the masses of bodies nearer together"
+    heavy, light = (choose(masses, key=masses.__getitem__) for choose in (max, min))
+    return (
+        f'body "{heavy}" ({masses[heavy]:.3g} kg) hangs behind light ones such as "{light}" '
+        f"({masses[light]:.3g} kg); bring their masses nearer together"
+    )

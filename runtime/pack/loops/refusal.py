@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 from mstmm.errors import SceneError
 from mstmm.scene.checks.topology import build
+from mstmm.scene.tables.closures import ROLLING
 
-from ...integrate.steppers import EXPLICIT_METHODS
+from ...integrate.steppers import EXPLICIT_METHODS, ON_POSITIONS
 from .unknown import named_loop
 
 if TYPE_CHECKING:
@@ -36,6 +37,20 @@ def refuse_bending(packed: Packed, what: str) -> None:
         refuse(packed, f"{what} with flexible bodies", INSTEAD)
 
 
+def refuse_of_speeds(packed: Packed, method: str) -> None:
+    """SceneError for rows of speeds and for flexible bodies in loops, whose ends a method on
+    positions cannot close yet."""
+    refuse_bending(packed, f'method "{method}"')
+    scene = packed.described
+    names = [f'coupling "{one.name}"' for one in scene.coupling if one.speeds is not None]
+    names += [f'constraint "{one.name}"' for one in scene.constraint if one.type == ROLLING]
+    if names:
+        raise SceneError(
+            f'scene: {names[0]} asks for speeds, which method "{method}" on positions does not; '
+            f"take {method.removesuffix(ON_POSITIONS)}"
+        )
+
+
 def refuse_beyond_hinges(packed: Packed, what: str) -> None:
     """SceneError where more than hinges of rigid bodies closes loops, which `what` cannot follow
     yet."""
@@ -57,8 +72,6 @@ _ALIEN = ("dttmm", "exprb32")
 def refuse_method(packed: Packed, method: str, tangent: str) -> None:
     """SceneError where loops are closed, for an implicit method that cannot follow them, and for
     the tangent of laws alone."""
-    if packed.flexible:
-        refuse(packed, f'method "{method}" with flexible bodies', INSTEAD)
     if method in _ALIEN:
         refuse(packed, f'method "{method}"', "genalpha and rodas4p2 do")
     if tangent == "laws":

@@ -24,14 +24,8 @@ def may_close(scene: Scene) -> bool:
 
 
 def refuse_beside_bending(scene: Scene, one_way: Collection[str]) -> None:
-    """SceneError for what flexible bodies cannot be beside in a scene with loops: constraints and
-    couplings, bodies that bend without acting back, and static shapes at the start."""
-    for table in ("constraint", "coupling"):
-        if getattr(scene, table):
-            raise SceneError(
-                f'scene: {table} "{getattr(scene, table)[0].name}" is not compiled in scenes with '
-                "flexible bodies yet; close the loop by a hinge or a [[bushing]]"
-            )
+    """SceneError for what flexible bodies cannot be in a scene with loops: bodies that bend without
+    acting back, and such as begin in static shapes."""
     for body in (*scene.beam, *scene.elastic):
         if body.initial.static and may_close(scene):
             raise SceneError(

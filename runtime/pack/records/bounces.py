@@ -49,11 +49,6 @@ def _bounce(
     scene: Scene, layout: Layout, probes: dict[tuple[str, str], int], number: int, event: Event
 ) -> Bounce:
     assert event.restitution is not None
-    if scene.beam or scene.elastic:
-        raise SceneError(
-            f'event "{event.name}": do = "bounce" is for scenes of rigid bodies so far; make the '
-            "flexible ones rigid, or let a stop with stiffness take the blow (law.limits)"
-        )
     graph = Graph()
     value = condition_value(event.when, graph, resolver(graph, layout, probes=probes))
     time, places, slopes = graph.element("t", 0), list[tuple[int, int]](), list[Node]()
@@ -77,12 +72,14 @@ def _place(layout: Layout, event: Event, leaf: Element) -> tuple[int, int]:
     if leaf.port == "points" and index % _NUMBERS < _PLACE:
         return -1 - _PLACE * (index // _NUMBERS) - index % _NUMBERS, 0
     if leaf.port == "q":
+        bent = {one.q for one in layout.modal.values()}
         for slots in layout.owners:
-            if slots.q <= index < slots.q + slots.nq and slots.straight:
+            if slots.q <= index < slots.q + slots.nq and slots.straight and slots.q not in bent:
                 return index, slots.u + index - slots.q
     raise SceneError(
-        f'event "{event.name}": do = "bounce" strikes places, coordinates whose rates are speeds '
-        f"among them, found {event.when.text!r}; write a condition of places such as ball.y <= 0.1"
+        f'event "{event.name}": do = "bounce" strikes places, coordinates of hinges whose rates '
+        f"are speeds among them, found {event.when.text!r}; write a condition of places such as "
+        "ball.y <= 0.1"
     )
 
 

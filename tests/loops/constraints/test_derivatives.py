@@ -58,6 +58,30 @@ def test_by_numbers_of_the_scene() -> None:
         assert worst(found[name], (sides[0] - sides[1]) / (2 * STEP)) < 1e-7
 
 
+def test_by_numbers_of_constraints() -> None:
+    """The radius of the disc, which begins at rest as no speed goes with all radii."""
+    scene, (q, u) = on_a_road(), compiled(on_a_road()).initial_state()
+    del scene["hinge"][0]["initial"]["u"]
+    model = compiled(scene)
+    found = model.derivatives(q, u, parameters=["road.radius"]).parameters["road.radius"]
+    sides = [model.with_parameters({"road.radius": RADIUS + s}).accelerations(q, u)
+             for s in (STEP, -STEP)]  # fmt: skip
+    assert np.abs(found).max() > 1.0
+    assert worst(found, (sides[0] - sides[1]) / (2 * STEP)) < 1e-7
+    with pytest.raises(mstmm.SceneError, match=r'"road.normal\[0\]": .* begin it have no exact'):
+        model.derivatives(q, u, parameters=["road.normal[0]"])
+
+
+def test_lengths_are_numbers_of_the_scene() -> None:
+    """Rods of 0.31 m from arms of 0.3 m to the sleeve below."""
+    longer = {f"constraint{k}.length": 0.31 for k in (1, 2)}
+    arms = compiled(SCENES["distances"]).with_parameters(longer)
+    q, places = arms.initial_state()[0], arms.layout.hinges
+    arm = 0.3 * np.exp(1j * q[places["hip0"].q])
+    below = arm.imag + math.sqrt(0.31**2 - arm.real**2)
+    assert q[places["slide"].q] == pytest.approx(-below, abs=1e-9)
+
+
 def gimballed() -> mstmm.Model:
     """The disc on hinges whose coordinates do not turn as it rolls: x, y, z, yaw, lean, spin."""
     moment = MASS * RADIUS**2 / 4

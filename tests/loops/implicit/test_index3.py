@@ -13,7 +13,8 @@ from mstmm.errors import SceneError
 from mstmm.runtime.engine.loops.calls import LoopCalls
 from mstmm.runtime.integrate.steppers.genalpha import constants
 
-from ..linkages import four_bar
+from ..constraints.scenes import cycloid, governor, on_a_plane, on_a_road
+from ..linkages import four_bar, rod
 from .test_implicit import scene_of_laws
 
 Array = np.ndarray[Any, Any]
@@ -193,15 +194,6 @@ def test_refused(asked: dict[str, Any], words: str, swung: mstmm.Model) -> None:
         swung.simulate(0.1, step=1e-2, **asked)
 
 
-def test_constraints_are_refused() -> None:
-    scene = four_bar()
-    scene["coupling"] = [{"name": "gear", "expression": "foot.q - end.q", "equals": "0"}]
-    scene["hinge"] = [one for one in scene["hinge"] if one["name"] != "tip"]
-    model = mstmm.compile(mstmm.Scene(**scene))
-    with pytest.raises(SceneError, match='coupling "gear" closes a loop, and method "genalpha-'):
-        model.simulate(0.1, "genalpha-index3", step=1e-2)
-
-
 def test_a_tree_has_nothing_to_ask() -> None:
     scene = four_bar()
     scene["hinge"] = scene["hinge"][:2]
@@ -209,3 +201,41 @@ def test_a_tree_has_nothing_to_ask() -> None:
     model = mstmm.compile(mstmm.Scene(**scene))
     runs = [model.simulate(0.2, method, step=1e-2) for method in ("genalpha", "genalpha-index3")]
     assert np.array_equal(runs[0].q, runs[1].q)
+
+
+BESIDE_HINGES: dict[str, dict[str, Any]] = {
+    "distances": governor("constraint"), "plane": on_a_plane(), "wire": cycloid(0.4),
+    "mimic": four_bar(speed=3.0) | {
+        "coupling": [{"expression": "dial.q - foot.q - 0.3*foot.q^2"}],
+        "body": [*four_bar()["body"], rod("dial", 0.3)],
+        "hinge": [*four_bar(speed=3.0)["hinge"],
+                  {"name": "dial", "type": "pin", "inboard": "ground", "outboard": "dial"}],
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BESIDE_HINGES)
+def test_constraints_and_couplings_of_coordinates(name: str) -> None:
+    model = mstmm.compile(mstmm.Scene(**BESIDE_HINGES[name]), engine="looped")
+    wanted = model.simulate(0.2, rtol=1e-11, output_times=[0.2]).q[-1]
+    runs = [model.simulate(0.2, "genalpha-index3", step=step) for step in (2e-3, 1e-3)]
+    for run in runs:
+        closure = run.certificate.closure
+        assert run.success and closure is not None and closure.gap < 1e-13
+    errors = [float(np.abs(run.q[-1] - wanted).max()) for run in runs]
+    print(errors)
+    assert errors[0] < 1e-3 and np.log2(errors[0] / errors[1]) > 1.85
+
+
+@pytest.mark.parametrize(
+    ("scene", "row"),
+    [
+        (on_a_road(), 'constraint "road" asks for speeds'),
+        (four_bar() | {"coupling": [{"name": "led", "speeds": "foot.u", "equals": 1.0}]},
+         'coupling "led" asks for speeds'),
+    ],
+)  # fmt: skip
+def test_rows_of_speeds_have_no_positions(scene: dict[str, Any], row: str) -> None:
+    model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
+    with pytest.raises(mstmm.SceneError, match=f"{row}.*; take genalpha"):
+        model.simulate(0.1, "genalpha-index3", step=1e-3)

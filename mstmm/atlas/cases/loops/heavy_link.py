@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from mstmm.errors import NumericalFailure, SceneError
+
 from ...definition import Definition, Method
 from ...measures import rounding
 from ...scale import LOG
@@ -11,7 +13,10 @@ RODS = 5
 
 
 def _error(ratio: float, refined: bool) -> float:
-    row = model(held_row([1.0, 1.0, 1.0, ratio, 1.0]))
+    try:
+        row = model(held_row([1.0, 1.0, 1.0, ratio, 1.0]))
+    except SceneError as refused:  # no digits are left
+        raise NumericalFailure(str(refused)) from None
     row.packed.model.refines = int(refined)
     return rounding(row, [row.initial_state()])
 
