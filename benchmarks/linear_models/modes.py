@@ -32,7 +32,7 @@ COUNT, LENGTH, TARGET = 20, 0.1, 0.1
 OWN, FULL, SPARSE = "mstmm", "eigsh, hinges (full M)", "eigsh, every body (sparse)"
 SIZES, ROUNDS = (1000, 3000, 10_000), 4
 #: Up to so many coordinates full matrices are asked; time goes with the cube.
-MOST_FULL = 3000
+MOST_FULL = 10_000
 GIVES = [1e6, 2e6, 3e6, 1e4, 2e4, 3e4]  # along x, y, z in N/m, about x, y, z in N m/rad
 PIN, HELD = 1e4, 1e9
 
