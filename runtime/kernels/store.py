@@ -34,7 +34,7 @@ from ..libraries.build import Built, Order, fetched, found, remove
 from ..libraries.build_extension import COMPILE_ARGS
 from ..libraries.entry import ABOUT, Damaged
 from ..libraries.folder import objection
-from ..libraries.toolchain import TIMEOUT
+from ..libraries.toolchain import time_limit
 from . import prebuilt
 from .prebuilt import Element
 
@@ -93,7 +93,7 @@ def keep(spec: ElementSpec, files: dict[str, str]) -> tuple[Path, str]:
         ) from error
     opened.cache_clear()
     try:
-        fetched(_library_place(spec), _order(spec), TIMEOUT)
+        fetched(_library_place(spec), _order(spec), time_limit())
         _remove_old(place, _library_place(spec))
         return place, f"compiled{replaced}"
     except EnvironmentFailure as error:
@@ -213,7 +213,7 @@ def _compiled(stored: ElementSpec) -> Element | None:
         return None if built is None else _from_library(stored, built.path)
     except (Damaged, EnvironmentFailure):
         remove(place)
-    return _from_library(stored, fetched(place, order, TIMEOUT).path)
+    return _from_library(stored, fetched(place, order, time_limit()).path)
 
 
 def _from_library(stored: ElementSpec, library: Path) -> Element:

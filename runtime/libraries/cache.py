@@ -28,9 +28,6 @@ from .folder import VARIABLE, private_folder
 
 __all__ = ["Built", "Recipe", "find", "library", "opened"]
 
-#: Seconds that a build may take; $MSTMM_COMPILE_TIMEOUT overrides.
-TIMEOUT_VARIABLE = "MSTMM_COMPILE_TIMEOUT"
-
 T = TypeVar("T")
 
 
@@ -77,7 +74,7 @@ def library(recipe: Recipe, *, timeout: float | None = None) -> Built:
     killed; a cache folder that cannot be written, is not ours, or is full.
     """
     place, order = _placed(recipe)
-    built = fetched(place, order, _default_timeout() if timeout is None else timeout)
+    built = fetched(place, order, toolchain.time_limit() if timeout is None else timeout)
     if built.how == "compiled":
         from .upkeep import tidy
 
@@ -126,19 +123,3 @@ def _placed(recipe: Recipe) -> tuple[Path, Order]:
         recipe.optional,
     )  # fmt: skip
     return private_folder() / f"{recipe.name}-{key[:32]}", order
-
-
-def _default_timeout() -> float:
-    text = os.environ.get(TIMEOUT_VARIABLE)
-    if not text:
-        return toolchain.TIMEOUT
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0 < value < 1e6:
-        raise EnvironmentFailure(
-            f"{TIMEOUT_VARIABLE}={text!r}: expected the longest time of a compilation in s, "
-            "such as 300"
-        )
-    return value

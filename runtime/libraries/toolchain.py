@@ -19,8 +19,9 @@ from mstmm.errors import EnvironmentFailure
 if TYPE_CHECKING:
     from ..host.process import Ended
 
-#: Seconds after which a compiler is taken for hanging.
-TIMEOUT = 300.0
+#: Seconds of wall time after which a compiler is taken for hanging, and the variable that says
+#: otherwise.
+TIMEOUT, TIMEOUT_VARIABLE = 300.0, "MSTMM_COMPILE_TIMEOUT"
 
 #: What a full disk, a used-up quota and a limit on files are called.
 _NO_ROOM = (
@@ -84,6 +85,23 @@ def _libc() -> str:
         return os.confstr("CS_GNU_LIBC_VERSION") or "unknown"
     except (AttributeError, OSError, ValueError):
         return "unknown"
+
+
+def time_limit() -> float:
+    """Seconds of wall time that a compiler may take, the variable's or 300."""
+    text = os.environ.get(TIMEOUT_VARIABLE)
+    if not text:
+        return TIMEOUT
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value < 1e6:
+        raise EnvironmentFailure(
+            f"{TIMEOUT_VARIABLE}={text!r}: expected the longest time of a compilation in s, "
+            "such as 300"
+        )
+    return value
 
 
 def version(found: Compiler, folder: Path) -> str:
@@ -158,8 +176,8 @@ def _compiled(
         return run([*command, "-o", str(target)], folder, timeout, TMPDIR=str(folder))
     except Hanging:
         raise EnvironmentFailure(
-            f"the C compiler {found.command[0]} did not finish within {timeout:g} s and was "
-            "stopped; see mstmm doctor"
+            f"the C compiler {found.command[0]} did not finish within {timeout:g} s of wall time "
+            f"and was stopped; set {TIMEOUT_VARIABLE} to more seconds, or see mstmm doctor"
         ) from None
     except OSError as error:
         raise EnvironmentFailure(
