@@ -11,7 +11,6 @@ from mstmm.arrays import Array
 from mstmm.risk import Risk
 
 from ..run.notes import foreseen
-from ..run.stability import StepCheck, check_step
 from . import branches, fast, heavy, locked, shapes, spun
 
 if TYPE_CHECKING:
@@ -51,11 +50,10 @@ class Later:
 
 @dataclass(frozen=True)
 class Start:
-    """What is known of a run of a model at its start: the fixed step against the fastest motion,
-    and risks; whether its user wants to be told of those."""
+    """What is known of a run of a model at its start: risks, but for that of its fixed step, which
+    the result knows; whether its user wants to be told of them."""
 
     model: Compiled
-    step: StepCheck | None
     risks: Iterable[Risk]
     told: bool = True
 
@@ -70,15 +68,8 @@ def look(model: Compiled, settings: Settings, q: Array, u: Array) -> Start:
 
     Raises SceneError for settings that no run can have.
     """
-    step = check_step(model.looped, settings, q, u)
-    own = () if step is None or step.risk is None else (step.risk,)
     if model not in _concerned:
         _concerned[model] = tuple(guard for concerns, guard in _GUARDS if concerns(model))
-    guards, known = _concerned[model], (*own, *foreseen(model.packed, settings))
-    if not guards:
-        return Start(model, step, known)
-    return Start(
-        model,
-        step,
-        Later(lambda: (*known, *(x for guard in guards for x in guard(model, settings, q, u)))),
-    )
+    guards, known = _concerned[model], foreseen(model.packed, settings)
+    found = Later(lambda: (*known, *(x for guard in guards for x in guard(model, settings, q, u))))
+    return Start(model, found)

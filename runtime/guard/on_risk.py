@@ -10,6 +10,7 @@ from mstmm.arrays import Array
 from mstmm.errors import RiskRefused, SceneError
 from mstmm.risk import ON_RISK, Risk
 
+from ..run.stability import check_step
 from .before import Start, look
 
 if TYPE_CHECKING:
@@ -28,7 +29,9 @@ def started(model: Compiled, settings: Settings, q: Array, u: Array, on_risk: st
         raise SceneError(f"on_risk = {on_risk!r}: expected one of {', '.join(ON_RISK)}")
     seen = look(model, settings, q, u)
     if on_risk == "refuse":
-        _refuse((*model.scene.risks, *seen.risks), "before the run")
+        step = check_step(model.looped, settings, q, u)
+        own = () if step is None or step.risk is None else (step.risk,)
+        _refuse((*model.scene.risks, *own, *seen.risks), "before the run")
     return seen if on_risk != "ignore" else replace(seen, told=False)
 
 

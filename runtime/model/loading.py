@@ -19,7 +19,6 @@ from ..kernels.identity import kernels_hash
 from ..result.output import provenance
 from ..result.output.columns import READERS, Columns
 from ..result.result import Result
-from ..run.stability import check_step
 from ..run.trajectory import Trajectory
 from .model import Model
 from .results import result_of
@@ -126,7 +125,4 @@ def _rebuilt(data: Any, path: Path) -> Result:
     if data.attrs["kernels_sha256"] != kernels_hash(model.known):
         note = "saved with other kernels: quantities beyond q and u come from the present ones"
         run = replace(run, notes=(*run.notes, note))
-    step = None
-    if run.start is not None or len(run.t):
-        step = check_step(model.looped, run.settings, *run.first[1:])
-    return result_of(model, run, provenance.error(data), step)
+    return result_of(model, run, provenance.error(data))

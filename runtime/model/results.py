@@ -15,24 +15,18 @@ from ..result.result import Result
 from ..run.checkpoint import Checkpoint
 from ..run.error_estimate import ErrorEstimate
 from ..run.execution import Watch, first_run, second_run
-from ..run.stability import StepCheck
 from ..run.trajectory import Trajectory
 
 
-def result_of(
-    model: Compiled,
-    run: Trajectory,
-    error: ErrorEstimate | None = None,
-    step: StepCheck | None = None,
-) -> Result:
+def result_of(model: Compiled, run: Trajectory, error: ErrorEstimate | None = None) -> Result:
     """The result of a run: with elastic responses where the model has one-way bodies."""
     expanded = model.packed.expanded
     rigid = None if expanded is None else expanded.rigidified
     if rigid is None or not rigid.one_way:
-        return Result(model, run, error, step)
+        return Result(model, run, error)
     from ..result.one_way.result import OneWayResult
 
-    return OneWayResult(model, run, error, step)
+    return OneWayResult(model, run, error)
 
 
 def simulate(
@@ -52,12 +46,12 @@ def simulate(
     watch = Watch(progress, settings, runs=2 if certify else 1)
     if checkpoint is not None:
         watch.checkpoint = Checkpoint(Path(checkpoint), model, settings, q, u)
-    run = first_run(model, settings, q, u, watch, resume, seen.step)
+    run = first_run(model, settings, q, u, watch, resume)
     run = seen.given(run, q, u)
     error = second_run(model, run, q, u, watch) if certify and run.success else None
     if watch.notes:
         run = replace(run, notes=(*run.notes, *watch.notes))
-    result = result_of(model, run, error, seen.step)
+    result = result_of(model, run, error)
     result.checkpoint = watch.checkpoint
     return result
 
@@ -68,6 +62,6 @@ def certified(result: Result, progress: Callable[[float, float], None] | None) -
     _, q, u = run.first
     error = second_run(result.model, run, q, u, watch)
     noted = replace(run, notes=(*run.notes, *watch.notes))
-    made = result_of(result.model, noted, error, result.certificate.step)
+    made = result_of(result.model, noted, error)
     made.checkpoint = result.checkpoint
     return made

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..run.error_estimate import ErrorEstimate
-from ..run.stability import StepCheck, check_later
+from ..run.stability import check_later
 from . import gives
 from .balances import energy, momentum
 from .certificate import Certificate
@@ -18,8 +18,8 @@ from .record import Record
 from .risks import of_outputs
 
 
-def certificate(result: Record, error: ErrorEstimate | None, step: StepCheck | None) -> Certificate:
-    """The certificate of a result; `error` and `step` are what only the run itself could tell."""
+def certificate(result: Record, error: ErrorEstimate | None) -> Certificate:
+    """The certificate of a result; `error` is what only a second run could tell."""
     run, statistics = result.trajectory, result.statistics
     return Certificate(
         energy=energy(result),
@@ -27,7 +27,7 @@ def certificate(result: Record, error: ErrorEstimate | None, step: StepCheck | N
         quaternion_residual=run.norm_residual,
         pivot=pivot_loss(result.model, run),
         singular=singular_distance(result.model, run),
-        step=step,
+        step=result._step,
         later=check_later(result.model.looped, run),
         stability_limited=(
             statistics is not None and statistics.stability_limited and not run.methods

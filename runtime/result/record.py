@@ -19,7 +19,7 @@ from ..integrate.settings import Settings
 from ..pack.layout import HingeSlots
 from ..run.checkpoint import Checkpoint
 from ..run.error_estimate import ErrorEstimate
-from ..run.stability import StepCheck
+from ..run.stability import StepCheck, check_step
 from ..run.stretches import Stretch
 from ..run.trajectory import Trajectory
 from .certificate import Certificate
@@ -39,14 +39,9 @@ class Record(FlexibleResults, ABC):
     """
 
     def __init__(
-        self,
-        model: Compiled,
-        run: Trajectory,
-        error: ErrorEstimate | None = None,
-        step: StepCheck | None = None,
+        self, model: Compiled, run: Trajectory, error: ErrorEstimate | None = None
     ) -> None:
-        self.model, self.trajectory = model, run
-        self._error, self._step = error, step
+        self.model, self.trajectory, self._error = model, run, error
         self.checkpoint: Checkpoint | None = None
         self.t, self.q, self.u, self.event = run.t, run.q, run.u, run.event
         self.status = run.status
@@ -57,7 +52,7 @@ class Record(FlexibleResults, ABC):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled are the model and the run; what follows from them is computed again."""
-        return type(self), (self.model, self.trajectory, self._error, self._step)
+        return type(self), (self.model, self.trajectory, self._error)
 
     @property
     def success(self) -> bool:
@@ -74,6 +69,14 @@ class Record(FlexibleResults, ABC):
             return text
         text = f"{text}, but {unusable}"
         return text if self._step is None else self._step.blamed(text)
+
+    @cached_property
+    def _step(self) -> StepCheck | None:
+        """The fixed step at the beginning; looked at here, so that a run costs nothing for it."""
+        run = self.trajectory
+        if run.start is None and not len(run.t):
+            return None
+        return check_step(self.model.looped, run.settings, *run.first[1:])
 
     @cached_property
     def _unusable(self) -> str:

@@ -52,7 +52,7 @@ class Result(Record):
         """What vouches for the numbers: balances, conditioning, estimated error.  Printable."""
         from .certify import certificate
 
-        return certificate(self, self._error, self._step)
+        return certificate(self, self._error)
 
     def pictures(self) -> tuple[str, ...]:
         """Every further name that `plot` takes, for panels of flexible bodies: "shape" (all of

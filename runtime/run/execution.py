@@ -22,11 +22,11 @@ from .checkpoint import Checkpoint, State
 from .error_estimate import ErrorEstimate, alike, compare, tighter
 from .method_choice import Choice
 from .simulate import advance, choice_of, said, trajectory
+from .stability import check_step
 from .trajectory import Trajectory
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
-    from .stability import StepCheck
     from .system import SceneSystem
 
 Progress = Callable[[float, float], None]
@@ -92,10 +92,10 @@ def _joined(earlier: Samples | None, samples: Samples) -> Samples:
 
 def first_run(
     model: Compiled, settings: Settings, q: Array, u: Array, watch: Watch, resume: bool = False,
-    step: StepCheck | None = None, beginnings: Beginnings | None = None,
+    beginnings: Beginnings | None = None,
 ) -> Trajectory:  # fmt: skip
-    """The run from (q, u), or from the checkpoint.  Its failures are put down to the fixed step
-    where `step` has found that too long.  `beginnings` are those of further runs from there."""
+    """The run from (q, u), or from the checkpoint.  Its failures are put down to a fixed
+    step that is too long.  `beginnings` are those of further runs from there."""
     if settings.method in classical.METHODS or settings.method in second_opinion.METHODS:
         if watch.checkpoint is not None:
             raise SceneError(f'method "{settings.method}" keeps no checkpoints; use dop853')
@@ -130,8 +130,9 @@ def first_run(
         found = replace(found, before=watch.before)
     if watch.choice is not None:
         found = replace(found, methods=tuple(watch.choice.stretches))
-    if step is not None and status is not None and not found.success:
-        found = replace(found, message=step.blamed(found.message))
+    if status is not None and not found.success:
+        step = check_step(engine, settings, q, u)
+        found = found if step is None else replace(found, message=step.blamed(found.message))
     return found
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from support.rod_scenes import ROD, chain
 
 import mstmm
 from mstmm.runtime.integrate.settings import Settings
+from mstmm.runtime.result import record
 from mstmm.runtime.run.stability import check_step
 
 #: RK4 is stable for h w below 2 sqrt 2 on the imaginary axis, for h |lambda| below 2.785 on the
@@ -119,3 +122,18 @@ def test_a_failure_of_a_step_that_is_too_long_is_put_down_to_the_step(hinge: str
     assert "last good state at t =" in result.message
     assert "split the body" not in result.message
     assert "shapes" not in result.message
+
+
+def test_a_run_costs_no_look_at_its_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is looked at when somebody asks for what speaks against the numbers, once."""
+    calls = []
+
+    def counted(*given: Any) -> Any:
+        calls.append(given)
+        return check_step(*given)
+
+    monkeypatch.setattr(record, "check_step", counted)
+    run = rod(4e4, 0.0).simulate(0.2, method="rk4", step=0.05)
+    assert run.success and not calls
+    assert any("too long for the fastest motion" in text for text in run.warnings)
+    assert run.certificate.step is not None and not run.trusted and len(calls) == 1

@@ -27,7 +27,6 @@ from .response import Cost, OneWay, Response, respond, rigidity
 
 if TYPE_CHECKING:
     from ...run.error_estimate import ErrorEstimate
-    from ...run.stability import StepCheck
     from ...run.trajectory import Trajectory
 
 
@@ -71,20 +70,16 @@ class OneWayResult(Result):
     """
 
     def __init__(
-        self,
-        model: Compiled,
-        run: Trajectory,
-        error: ErrorEstimate | None = None,
-        step: StepCheck | None = None,
+        self, model: Compiled, run: Trajectory, error: ErrorEstimate | None = None
     ) -> None:
-        super().__init__(model, run, error, step)
+        super().__init__(model, run, error)
         self._observed = _Superposed(self, self._observed)
         self._quantities = Quantities(self._observed, self)
 
     @cached_property
     def rigid(self) -> Result:
         """The rigid run alone."""
-        return Result(self.model, self.trajectory, self._error, self._step)
+        return Result(self.model, self.trajectory, self._error)
 
     @cached_property
     def _one_way(self) -> OneWay:
