@@ -47,10 +47,13 @@ class Tree:
 
 
 def rotation(vector: Any) -> np.ndarray:
-    """Rotation matrix of a rotation vector; quarter turns without rounding."""
+    """Rotation matrix of a rotation vector or of w, x, y, z; quarter turns without rounding."""
     if not any(vector):
         return np.eye(3)
-    matrix = Rotation.from_rotvec(vector).as_matrix()
+    if len(vector) == 4:
+        matrix = Rotation.from_quat(np.roll(vector, -1)).as_matrix()
+    else:
+        matrix = Rotation.from_rotvec(vector).as_matrix()
     whole = np.round(matrix)
     return whole if np.abs(matrix - whole).max() < 1e-12 else matrix
 
@@ -76,7 +79,9 @@ def links_of(scene: dict[str, Any]) -> Tree:
     links: list[Link] = []
     for hinge in scene["hinge"]:
         carrier, _, end = hinge["inboard"].partition(".")
-        place, axes = end_of(bodies[carrier], end) if end else (np.zeros(3), np.eye(3))
+        place, axes = end_of(bodies[carrier], end) if end else (
+            np.array(hinge.get("position", [0.0, 0.0, 0.0]), float), np.eye(3)
+        )  # fmt: skip
         body = bodies[hinge["outboard"]]
         number[body["name"]] = len(links)
         links.append(

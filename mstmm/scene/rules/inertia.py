@@ -51,6 +51,16 @@ def _scaled(inertia: Matrix) -> tuple[Vector, float]:
     return principal_moments((_row(scaled[0]), _row(scaled[1]), _row(scaled[2]))), largest
 
 
+def _is_definite(m: Matrix) -> bool:
+    """True where the pivots of a symmetric tensor say that its eigenvalues are positive, which is
+    much sooner known than these."""
+    (a, b, c), (_, d, e), (_, _, f) = m
+    if not a > 0 or not d - b * b / a > 0:
+        return False
+    pivot = d - b * b / a
+    return f - c * c / a - (e - b * c / a) ** 2 / pivot > 0
+
+
 def _row(x: list[float]) -> Vector:
     return (x[0], x[1], x[2])
 
@@ -79,6 +89,8 @@ def negative_moment(inertia: Matrix) -> str | None:
                 f"expected moments of inertia of 0 kg m^2 or more, found {label} = {entry:.6g}; "
                 "remove the sign"
             )
+    if _is_definite(inertia):
+        return None
     moments, scale = _scaled(inertia)
     if moments[0] >= -_ROUNDING * moments[2]:
         return None
@@ -92,8 +104,12 @@ def triangle_excess(inertia: Matrix) -> str | None:
     """What breaks the triangle inequality of the principal moments, None where nothing does; of
     negative moments that they are negative.
 
-    Every mass distribution has J1 + J2 >= J3.
+    Every mass distribution has J1 + J2 >= J3: trace(J)/2 - J has no negative eigenvalue.
     """
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
+    half = (xx + yy + zz) / 2
+    if _is_definite(((half - xx, -xy, -xz), (-xy, half - yy, -yz), (-xz, -yz, half - zz))):
+        return None
     moments, scale = _scaled(inertia)
     if moments[0] + moments[1] >= moments[2] * (1 - _TRIANGLE_ROUNDING):
         return None

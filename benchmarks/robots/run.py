@@ -1,0 +1,169 @@
+"""Robots in URDF: accelerations in C, a hundred steps, and from the file to the first answer.
+
+    python benchmarks/robots/run.py [--quick] [--plot]
+
+Needs pin, mujoco and example-robot-data.  CPU time in alternating rounds of one process, the least
+of the rounds; code of the scenes is compiled before.
+
+- accelerations: functions in C, every input waiting on the last output, as in an integrator;
+  Pinocchio in the better of its two conventions.  The fingers of the panda are held there.
+- 100 RK4 steps of 1 ms from Python: one `simulate` that gives the end, a session ticked a hundred
+  times, and a hundred times mj_step, all from the same state to the same end (`apart`: of joints).
+- file to first: the text of the robot to accelerations at its start, beside
+  pin.buildModelFromUrdf, createData and aba; modules are imported and the scene's code is compiled.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(HERE))
+
+from common import links, measure, mstmm_engines, pinocchio_peer  # noqa: E402
+from robots import ROBOTS, Case, state_of  # noqa: E402
+
+import mstmm  # noqa: E402
+
+STEP, STEPS = 1e-3, 100
+#: Fingers of the panda, for the peer's builder in C++ knows no sliding joint.
+HELD = {"panda": ("panda_finger_joint1", "panda_finger_joint2")}
+#: What is asked -> who is beside, the largest ratio allowed.
+BESIDE = {
+    "accelerations in C": ("Pinocchio in C++", 1.0),
+    "simulate, 100 steps": ("100 mj_step", 0.5),
+    "session, 100 ticks": ("100 mj_step", 0.5),
+    "file to first": ("pin.buildModelFromUrdf, aba", 1.0),
+}
+
+Work = dict[str, Callable[[], float]]
+
+
+def native(name: str) -> tuple[Work, float]:
+    """Accelerations in C: ns a call over 32 states."""
+    case = Case(name, HELD.get(name, ()))
+    tree = links.links_of(_whole(case.imported.tables))
+    q, u = links.states(tree, 32)
+    model = case.model("fused")
+    subjects = {"accelerations in C": mstmm_engines.fused(model, q, u)}
+    for manner, subject in pinocchio_peer.subjects(tree, q, u).items():
+        subjects[f"Pinocchio in C++ {manner}"] = subject
+    wanted = model.accelerations(q, u)
+    apart = max(measure.disagreement(x.accelerations(), wanted) for x in subjects.values())
+    return {one: partial(_seconds, x) for one, x in subjects.items()}, apart
+
+
+def _seconds(subject: Any) -> float:
+    return float(subject.time(chained=True, rounds=200)) * 1e-9
+
+
+def _whole(tables: Any) -> dict[str, Any]:
+    """The tables of a scene with what is 0 by default."""
+    bare = {"center_of_mass": (0, 0, 0), "inertia": (0, 0, 0)}
+    return {**tables, "body": [{**bare, **body} for body in tables["body"]]}
+
+
+def runs(name: str) -> tuple[Work, float]:
+    """A hundred steps by everybody, and how far joints lie apart in the end."""
+    case = Case(name)
+    model, peer = case.model("fused"), case.mujoco(STEP)
+    q, u = case.start()
+    end = STEP * STEPS
+    simulate = partial(model.simulate, end, "rk4", STEP, output_times=[end], initial=(q, u))
+    data = mujoco.MjData(peer)
+    start = state_of(case, peer, q, u)
+
+    def ticks() -> Any:
+        session = model.session(q, u, method="rk4", step=STEP)
+        for _ in range(STEPS):
+            session.advance(STEP)
+        return session
+
+    def steps() -> Any:
+        data.time, data.qpos[:], data.qvel[:] = 0.0, start.qpos, start.qvel
+        for _ in range(STEPS):
+            mujoco.mj_step(peer, data)
+        return data
+
+    ours, ticked, theirs = simulate().q[-1], ticks().q, steps().qpos
+    joints = [(slots.q, peer.jnt_qposadr[joint]) for slots, joint in case.joints(peer)]
+    apart = max(abs(x[a] - theirs[b]) for x in (ours, ticked) for a, b in joints)
+    calls = {"simulate, 100 steps": simulate, "session, 100 ticks": ticks, "100 mj_step": steps}
+    return {one: partial(measure.once, call) for one, call in calls.items()}, float(apart)
+
+
+def first(name: str) -> tuple[Work, float]:
+    """From the file to accelerations."""
+    case = Case(name)
+    mstmm.compile(mstmm.import_robot(case.path, case.base).scene, engine="fused")
+
+    def ours() -> Any:
+        model = mstmm.compile(mstmm.import_robot(case.path, case.base).scene)
+        return model.accelerations(*model.initial_state())
+
+    def theirs() -> Any:
+        peer = case.pinocchio()
+        still = np.zeros(peer.nv)
+        return pin.aba(peer, peer.createData(), pin.neutral(peer), still, still)
+
+    calls = {"file to first": ours, "pin.buildModelFromUrdf, aba": theirs}
+    return {one: partial(measure.once, call) for one, call in calls.items()}, float("nan")
+
+
+def measured(quick: bool) -> list[dict[str, Any]]:
+    """Seconds a call of everybody on every robot."""
+    found = []
+    for name in ROBOTS:
+        for part in (native, runs, first):
+            work, apart = part(name)
+            for one, samples in measure.rounds(work, 3 if quick else 40).items():
+                found.append({"robot": name, "call": one, "s": samples, "apart": apart})
+                print(name, one, f"{1e6 * min(samples):.4g} us", flush=True)
+    return found
+
+
+def table(results: list[dict[str, Any]]) -> str:
+    """Markdown: a row for what is asked of a robot, least and median of the rounds."""
+    lines = [
+        "| robot | what | us | beside | us | ratio | of medians | asked | apart |",
+        "|---" * 9 + "|",
+    ]
+    for r in results:
+        if r["call"] not in BESIDE:
+            continue
+        beside, asked = BESIDE[r["call"]]
+        peers = [p for p in results if p["robot"] == r["robot"] and p["call"].startswith(beside)]
+        best = min(peers, key=lambda p: min(p["s"]))
+        least, middle = (f(r["s"]) / f(best["s"]) for f in (min, statistics.median))
+        apart = "" if np.isnan(r["apart"]) else f"{r['apart']:.1e}"
+        lines.append(
+            f"| {r['robot']} | {r['call']} | {1e6 * min(r['s']):.4g} | {best['call']} | "
+            f"{1e6 * min(best['s']):.4g} | {least:.3g} | {middle:.3g} | {asked:g} | {apart} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Measure, print the table."""
+    options = measure.options(str(__doc__).splitlines()[0], HERE).parse_args()
+    if not options.plot:
+        measure.save(options.json, measured(options.quick))
+    record = json.loads(options.json.read_text())
+    text = table(record["results"])
+    print(text)
+    options.json.with_suffix(".md").write_text(f"{text}\n\nLoad {record['machine']['load']:.1f}.\n")
+
+
+if __name__ == "__main__":
+    main()
