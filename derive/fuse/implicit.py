@@ -17,7 +17,7 @@ from mstmm.ir.unrolled import lu_from_the_last, solve_by_rows, solve_from_the_la
 from ..schedule.motion import FORWARD, PRESCRIBED
 from ..schedule.steps import Run, Sweep
 from ..schedule.sweeps import INVERSE_DYNAMICS
-from .passes.balance import balance
+from .passes.balance import Balanced
 from .replay import Replay
 from .scene import Fused, inputs_of
 from .state import FusionState, Kernels
@@ -53,7 +53,7 @@ def fuse_implicit(structure: Structure, kernels: Kernels) -> Fused:
     if with_slopes:
         found += _Residual(structure, kernels).by_slopes()
     found += [_solution(structure.nu), *_Moving(structure, kernels).kernels()]
-    return Fused({kernel.name: balance(kernel) for kernel in found}, ((0, -1, _FAILED),))
+    return Fused(Balanced(*found), ((0, -1, _FAILED),))
 
 
 def _inputs(structure: Structure) -> list[Port]:

@@ -7,7 +7,7 @@ emitted.  No SymPy.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from mstmm.ir import KernelIR, Port
@@ -15,17 +15,25 @@ from mstmm.ir.structure import Structure
 
 from ..schedule.sweeps import ACCELERATIONS, FACTORISATION, SOLUTION
 from .closing import gaps, slips
-from .passes.balance import balance
+from .passes.balance import Balanced, balance
 from .replay import Replay
 from .state import FusionState, Kernels
+
+#: Power and potential that add at most this part to the operations of accelerations are had with
+#: them: one text for both takes half the time to compile.
+_CHEAP = 0.03
 
 
 @dataclass(frozen=True)
 class Fused:
-    """Kernels of one scene.  Guard code 1 + k stands for failures[k] = (reason, element, code)."""
+    """Kernels of one scene.  Guard code 1 + k stands for failures[k] = (reason, element, code).
 
-    kernels: dict[str, KernelIR]
+    Where `power_is_cheap`, "accelerations" need no code of their own beside "accelerations_power".
+    """
+
+    kernels: Mapping[str, KernelIR]
     failures: tuple[tuple[int, int, int], ...]
+    power_is_cheap: bool = False
 
 
 def inputs_of(structure: Structure) -> list[Port]:
@@ -55,6 +63,7 @@ def fuse(structure: Structure, kernels: Kernels, numbers: Sequence[float] | None
     }  # fmt: skip
     power: dict[str, object] = {port.name: replay.get(f"sums.{port.name}", 1) for port in sums}
     found = [state.graph.kernel("accelerations", inputs_of(s), outputs, values, as_made=True)]
+    cheap = False
     flexible = any(body.modal is not None for body in s.bodies)
     if s.laws or s.driven or s.loads or s.forces or s.couplings or flexible:
         found.append(
@@ -63,9 +72,11 @@ def fuse(structure: Structure, kernels: Kernels, numbers: Sequence[float] | None
                 as_made=True,
             )
         )  # fmt: skip
+        alone, both = (kernel.flops() for kernel in found)
+        cheap = both <= (1 + _CHEAP) * alone
     for close in (gaps, slips) if s.closes else ():
         found.append(close(FusionState(s, kernels, numbers, state.failures), inputs_of(s)))
-    return Fused({kernel.name: balance(kernel) for kernel in found}, tuple(state.failures))
+    return Fused(Balanced(*found), tuple(state.failures), cheap)
 
 
 def fuse_solution(structure: Structure, kernels: Kernels) -> KernelIR:

@@ -8,7 +8,7 @@ together again, terms that are ready early first.  Values change by rounding alo
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from mstmm.ir import OPERATIONS, Assign, Guard, KernelIR, Operand, Statement, Store, Temporary
 
@@ -22,6 +22,25 @@ _Term = tuple[float, int, bool, Operand, bool]
 def balance(kernel: KernelIR) -> KernelIR:
     """The same kernel with regrouped sums.  Straight-line kernels only."""
     return _Balance(kernel).run()
+
+
+class Balanced(Mapping[str, KernelIR]):
+    """Kernels with regrouped sums, each made when it is asked for."""
+
+    def __init__(self, *made: KernelIR) -> None:
+        self._made = {kernel.name: kernel for kernel in made}
+        self._balanced: dict[str, KernelIR] = {}
+
+    def __getitem__(self, name: str) -> KernelIR:
+        if name not in self._balanced:
+            self._balanced[name] = balance(self._made[name])
+        return self._balanced[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._made)
+
+    def __len__(self) -> int:
+        return len(self._made)
 
 
 class _Balance:
