@@ -41,14 +41,20 @@ class Choices:
 class Imported:
     """A scene, what became of the file's names, and notes.
 
-    `names` has for each link the body or end that it is ("ground" for what is part of it), and for
-    each joint that moves its hinge.
+    `links` has for each link the body or end that it is ("ground" for what is part of it), and
+    `joints` for each joint that moves its hinge.
     """
 
     scene: Scene
-    names: Mapping[str, str]
+    links: Mapping[str, str]
+    joints: Mapping[str, str]
     notes: tuple[Note, ...]
     tables: Mapping[str, Any]
+
+    @property
+    def names(self) -> Mapping[str, str]:
+        """Links and joints alike; of a link and a joint of one name, the joint."""
+        return {**self.links, **self.joints}
 
     def to_toml(self) -> str:
         """The scene as TOML, without what is as it is by default."""
@@ -64,7 +70,8 @@ def converted(robot: Robot, choices: Choices, folder: Path | None = None) -> Imp
     if not writer.bodies():
         raise SceneError(f'{robot.where}: nothing in it moves or has mass; try base = "free"')
     data = writer.tables(folder)
-    return Imported(Scene.from_data(data, robot.where), writer.names, tuple(writer.notes), data)
+    scene, notes = Scene.from_data(data, robot.where), tuple(writer.notes)
+    return Imported(scene, writer.links, writer.joints, notes, data)
 
 
 class _Writer:
@@ -85,14 +92,14 @@ class _Writer:
         self._names = Names()
         self._bodies = {name: self._names.take(name, "link") for name in self.bodies()}
         hinges = Names()
-        self._hinges = {
+        self.joints = {
             joint.name: hinges.take(joint.name, "joint") for joint in robot.joints
             if self.place[joint.child][0] == joint.child
         }  # fmt: skip
         self._roots = {name: hinges.take(f"{name}_base", "link")
                        for name in tree.roots if name in self._bodies}  # fmt: skip
         self._ends: defaultdict[str, dict[str, Any]] = defaultdict(dict)
-        self.names = {link.name: self._frame(link) for link in robot.links} | self._hinges
+        self.links = {link.name: self._frame(link) for link in robot.links}
 
     def bodies(self) -> list[str]:
         """Links that are bodies, in the order of the file."""
@@ -170,7 +177,7 @@ class _Writer:
 
     def _joints(self) -> Iterator[dict[str, Any]]:
         start = self._starts()
-        for name, hinge in self._hinges.items():
+        for name, hinge in self.joints.items():
             joint = self.tree.joints[name]
             still = joint.name in self.held
             owner, frame = self.place[joint.parent]
@@ -209,7 +216,7 @@ class _Writer:
 
     def _couplings(self) -> Iterator[dict[str, Any]]:
         for mimic, joint in self._mimics():
-            own, other = self._hinges[mimic.of], self._hinges.get(mimic.other)
+            own, other = self.joints[mimic.of], self.joints.get(mimic.other)
             moves = other is not None and mimic.other not in self.held
             row = f"{own}.q - {mimic.multiplier!r}*{other}.q" if moves else f"{own}.q"
             row = row.replace("- -", "+ ")
@@ -221,7 +228,7 @@ class _Writer:
         """Those of joints that move."""
         for mimic in self.mimics:
             joint = self.tree.joints[mimic.of]
-            if mimic.of in self._hinges and mimic.of not in self.held:
+            if mimic.of in self.joints and mimic.of not in self.held:
                 yield mimic, joint
 
     def _starts(self) -> dict[str, float]:
