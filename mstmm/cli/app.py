@@ -20,7 +20,7 @@ from .pictures.plot import plot
 from .pictures.report import report
 from .pictures.view import view
 from .show import show
-from .simulate import simulate
+from .simulating.command import simulate
 from .studies.advise import advise
 from .studies.chart import chart
 from .studies.linear import frf, linearize, modes

@@ -46,7 +46,7 @@ def check(
     from .output import complain, emit_json, say
 
     if hinge:
-        from .simulate import use_files
+        from .models import use_files
 
         use_files(hinge)
     reports: list[Report] = []
@@ -94,7 +94,7 @@ def _scene(path: str) -> Report:
     """Validate, compile, and evaluate the accelerations once."""
     import mstmm
 
-    from .simulate import compiled
+    from .models import compiled
 
     scene = mstmm.load_scene(path)
     model = compiled(path, scene)

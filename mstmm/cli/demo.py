@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .extras import install, missing, result_ending
+from .models import load_method
 from .options import Json, output_file
 from .progress import bar
-from .simulate import load_method
 
 if TYPE_CHECKING:
     from mstmm.runtime.result.result import Result

@@ -30,6 +30,8 @@ def test_a_result(mstmm: Command, folder: Path) -> None:
     assert done.code == 0, done.err
     assert "run.html: a page for any browser" in done.out
     assert "<title>run</title>" in (folder / "run.html").read_text()[:4000]
+    told = json.loads(mstmm("view", "run.nc", "-o", "a.html", "--json").out)
+    assert told["files"] == ["a.html"] and told["t_end"] == 0.5 and told["samples"] > 5
     done = mstmm("view", "run.nc", "--frames", "frames", "--speed", "1")
     assert done.code == 0, done.err
     assert len(list((folder / "frames").iterdir())) == 16
@@ -58,6 +60,9 @@ def test_a_report(mstmm: Command, folder: Path) -> None:
     assert done.code == 0, done.err
     assert "read.html: a page" in done.out
     assert (folder / "read.html").stat().st_size > 100_000
+    told = json.loads(mstmm("report", "run.nc", "-o", "read.html", "--json").out)
+    assert told["files"] == ["read.html"]
+    assert (told["t_start"], told["t_end"]) == (0.0, 0.5)
     assert mstmm("report", "pendulum.toml").code == 2
 
 

@@ -24,4 +24,4 @@ def test_senders_of_signals_pass_where_they_are_ignored() -> None:
         cwd=TESTS.parent, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "6 passed" in done.stdout
+    assert "skipped" not in done.stdout, done.stdout

@@ -29,7 +29,10 @@ STEPS = {"open", "os.rename", "os.remove", "os.truncate", "os.chmod", "fcntl.flo
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 #: Where lines are counted.
-ROOMS = ("cli/simulate.py", "checkpoint.py", "execution.py", "files.py", "lock.py", "storage.py")
+ROOMS = (
+    "simulating/command.py", "simulating/running.py", "checkpoint.py", "execution.py", "files.py",
+    "lock.py", "storage.py",
+)  # fmt: skip
 
 
 class Countdown:

@@ -10,7 +10,8 @@ import typer
 from mstmm.errors import MstmmError
 
 from ..extras import need_for
-from ..options import output_file
+from ..options import Json, output_file
+from .view import made
 
 
 def report(
@@ -29,6 +30,7 @@ def report(
         list[str] | None,
         typer.Option("--trail", metavar="END", help="An end whose way is drawn; may be repeated."),
     ] = None,
+    json: Json = False,
 ) -> None:  # fmt: skip
     """Write one page that tells a run: can it be trusted, how it moves, curves, equations."""
     from .. import output as terminal
@@ -46,4 +48,7 @@ def report(
     mstmm.report(
         run, target, title=source.stem, quantities=quantity or (), trails=tuple(trail or ())
     )
+    if json:
+        terminal.emit_json(made([target], run))
+        return
     terminal.say(f"{target}: a page for any browser, without a network")

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mstmm.errors import MstmmError
 
 from ..extras import need_for
-from ..options import Elements, output_file, output_folder, positive
+from ..models import compiled, load_method, use_files
+from ..options import Elements, Json, output_file, output_folder, positive
 from ..progress import bar
-from ..simulate import compiled, load_method, use_files
 
 if TYPE_CHECKING:
     from mstmm.runtime.result.result import Result
@@ -56,6 +57,7 @@ def view(
         int, typer.Option("--moments", metavar="N", min=1, help="Moments of a strip.")
     ] = 6,
     hinge: Elements = None,
+    json: Json = False,
 ) -> None:  # fmt: skip
     """Look at a scene, or at a run of it, in three dimensions."""
     from .. import output as terminal
@@ -71,7 +73,10 @@ def view(
     seen = result.view(title=title_of(Path(what)), trails=tuple(trail or ()), speed=speed)
     for target in targets:
         seen.save(target, moments)
-        terminal.say(f"{target}: {_about(target, result)}")
+        if not json:
+            terminal.say(f"{target}: {_about(target, result)}")
+    if json:
+        terminal.emit_json(made(targets, result))
 
 
 def _result(what: str, t_end: float | None) -> Result:
@@ -89,6 +94,14 @@ def _result(what: str, t_end: float | None) -> Result:
     load_method("auto")
     with bar() as progress:
         return model.simulate(t_end, method="auto", rtol=1e-7, atol=1e-10, progress=progress)
+
+
+def made(targets: Sequence[Path], result: Result) -> dict[str, Any]:
+    """What was written of which part of a run, as JSON."""
+    return {
+        "files": [str(target) for target in targets],
+        "t_start": float(result.t[0]), "t_end": float(result.t[-1]), "samples": len(result.t),
+    }  # fmt: skip
 
 
 def _about(target: Path, result: Result) -> str:

@@ -10,9 +10,9 @@ import typer
 from mstmm.defaults import ADVICE_SAMPLES, CHART_BUDGET, CHART_ERROR, CHART_ROUNDS
 from mstmm.errors import SceneError
 
+from ..models import compiled, use_files
 from ..options import Budget, Elements, Json, Rounds, at_least, finite, output_file, positive
 from ..progress import bar
-from ..simulate import compiled, use_files
 from .chart import follow
 
 if TYPE_CHECKING:

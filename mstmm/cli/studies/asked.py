@@ -13,9 +13,9 @@ import typer
 from mstmm.errors import MstmmError
 
 from ..extras import need_for
+from ..models import compiled, use_files
 from ..options import output_file
 from ..pictures.view import ENDINGS, title_of
-from ..simulate import compiled, use_files
 
 if TYPE_CHECKING:
     from mstmm.runtime.linear.linear import Linear

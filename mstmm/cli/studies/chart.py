@@ -11,9 +11,9 @@ import typer
 from mstmm.defaults import CHART_BUDGET, CHART_ERROR, CHART_ROUNDS, CHART_SAMPLES
 
 from ..extras import install, missing
+from ..models import compiled, use_files
 from ..options import Budget, Elements, Json, Rounds, at_least, output_folder, positive
 from ..progress import Bar, bar
-from ..simulate import compiled, use_files
 
 if TYPE_CHECKING:
     from mstmm.runtime.chart.chart import Chart

@@ -186,7 +186,7 @@ def get(name: str, radius: float | None = None) -> Tableau:
         known = ", ".join((AUTO, *names()))
         raise SceneError(
             f'method "{name}" is not known; there are: {known}, and '
-            "SciPy's as scipy-RK45, -DOP853, -Radau, -BDF, -LSODA, SUNDIALS' as sundials-BDF, "
-            "-Adams; and dttmm-classical, dttmm-classical-product"
+            "SciPy's as scipy-DOP853, -RK45, -RK23, -Radau, -BDF, -LSODA, SUNDIALS' as "
+            "sundials-BDF, -Adams; and dttmm-classical, dttmm-classical-product"
         )
     return _registered[name]

@@ -99,7 +99,7 @@ def stiff(system: System) -> System:
 
 
 def length_of(system: System) -> float:
-    """Mean square distance between hinges, m; 1 where all of them meet in one point."""
+    """Root mean square distance between hinges, m; 1 where all of them meet in one point."""
     squares = [sum(x * x for x in body.connection[9:12]) for body in system.distinct]
     squares += [sum(x * x for x in one.end) for one in system.closures]
     found = [square for square in squares if square > 0]

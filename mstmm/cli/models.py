@@ -1,0 +1,73 @@
+"""The model of a scene file, with the elements and the method that it needs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mstmm.errors import NumericalFailure, SceneError
+
+from .options import python_file
+from .progress import waiting
+
+if TYPE_CHECKING:
+    from mstmm.runtime.model.model import Model
+    from mstmm.scene import Scene
+
+#: How the names of methods begin that SciPy and SUNDIALS bring.
+OF_OTHERS = ("scipy-", "sundials-")
+
+
+def use_files(paths: list[str]) -> None:
+    """Generate the elements of Python files, so that scenes can name them.  Executes the files."""
+    if paths:
+        import mstmm
+
+        for path in paths:
+            mstmm.generate_file(python_file(path))
+
+
+def compiled(
+    path: str,
+    scene: Scene,
+    sweep: str = "riccati",
+    engine: str = "auto",
+    flexibility: str | None = None,
+) -> Model:
+    """The model of a scene file.
+
+    SceneError, with the file named, also where the accelerations of the start cannot be computed:
+    then the scene is at fault.
+    """
+    import numpy as np
+
+    import mstmm
+
+    try:
+        with waiting("preparing the scene"):
+            model = mstmm.compile(scene, engine=engine, sweep=sweep, flexibility=flexibility)
+            udot = model.accelerations(*model.initial_state())
+    except (SceneError, NumericalFailure) as error:
+        lines = str(error).splitlines()
+        named = (f"{path}: " + line.removeprefix("scene: ") for line in lines)
+        raise SceneError("\n".join(named)) from None
+    if not np.isfinite(udot).all():
+        raise SceneError(f"{path}: the accelerations at the start are not finite")
+    return model
+
+
+def load_method(name: str) -> None:
+    """Read a method's coefficients, so that the time of a run is the run's.
+
+    SceneError for a method that does not exist, EnvironmentFailure for one whose package is not
+    installed.
+    """
+    from mstmm.runtime.run import classical, sundials
+
+    if name in classical.METHODS:
+        return
+    if name in sundials.METHODS:
+        sundials.refuse_without(name)
+    elif not name.startswith(OF_OTHERS):
+        from mstmm.runtime.integrate.steppers import AUTO, AUTO_EXPLICIT, get
+
+        get(AUTO_EXPLICIT if name == AUTO else name)
