@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -37,6 +37,7 @@ def compile_scene(
     accuracy: float = 1e-8,
     bake: bool = False,
     flexibility: str | None = None,
+    simplify: bool | Collection[str] = True,
 ) -> Model:
     """Model of a scene, ready to compute.
 
@@ -58,6 +59,9 @@ def compile_scene(
         flexibility: level of model of all flexible bodies: "coupled", "one-way" (they are rigid in
             the run, then respond elastically to its motion and loads) or "rigid"; None takes each
             body's own `model`.
+        simplify: what may be packed otherwise than the scene says it, without changing what it
+            does: True (all of it), False, or some of "welds" (rigid bodies on fixed hinges as one).
+            `model.simplifications` tells what was done.
 
     Raises SceneError for hinges that do not form a tree, types that nobody defines, and masses that
     leave a motion of the start undetermined, and outputs of what results do not have;
@@ -67,7 +71,7 @@ def compile_scene(
         scene = load_scene(scene)
     if not isinstance(scene, Scene):
         raise SceneError(f"{scene!r:.60}: expected a Scene, or the path of a scene file")
-    model = compile_level(scene, engine, sweep, accuracy, bake, flexibility)
+    model = compile_level(scene, engine, sweep, accuracy, bake, flexibility, simplify)
     if flexibility is None:
         model.refuse_unknown_outputs()
     return model
@@ -80,6 +84,7 @@ def compile_level(
     accuracy: float = 1e-8,
     bake: bool = False,
     flexibility: str | None = None,
+    simplify: bool | Collection[str] = True,
 ) -> Model:
     """The same of a scene at a lower level of model, which may lack what an output is of: its
     results do not have that output."""
@@ -92,8 +97,10 @@ def compile_level(
     from ..runtime.kernels import store
     from ..runtime.model.model import Model
     from ..runtime.pack.flexible.rigidified import with_level
+    from ..runtime.pack.merge.simplification import asked_for
     from .fusion import MOST_ASKED, MOST_BODIES, Fuser
 
+    words = asked_for(simplify)
     scene = with_level(scene, flexibility)
 
     elements, definitions = store.known(store.needed(scene))
@@ -109,7 +116,8 @@ def compile_level(
     refused = "asked for" if engine == "looped" else ""
     most = MOST_ASKED if engine == "fused" else MOST_BODIES
 
-    model = Model(scene, elements, Fuser(definitions, refused, bake, most), product, sweep == "qr")
+    fuser = Fuser(definitions, refused, bake, most)
+    model = Model(scene, elements, fuser, product, sweep == "qr", words)
     model.refuse_undetermined_start()
     if engine == "fused":
         model.fusion.build()

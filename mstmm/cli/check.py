@@ -105,6 +105,7 @@ def _scene(path: str) -> Report:
         "events": len(scene.event),
     }  # fmt: skip
     notes = [f"{name}: {note}" for name, body in model.flexible.items() for note in body.notes]
+    notes += map(str, model.simplifications)
     warnings = [*scene.warnings, *(w for body in model.flexible.values() for w in body.warnings)]
     report = {"ok": True, "kind": "scene", **sizes, "warnings": warnings, "choices": notes}
     lines = [_scene_text(path, scene, sizes, warnings, notes), *_loop_lines(model.loops)]

@@ -32,6 +32,7 @@ def compiled(
     sweep: str = "riccati",
     engine: str = "auto",
     flexibility: str | None = None,
+    simplify: bool = True,
 ) -> Model:
     """The model of a scene file.
 
@@ -44,7 +45,9 @@ def compiled(
 
     try:
         with waiting("preparing the scene"):
-            model = mstmm.compile(scene, engine=engine, sweep=sweep, flexibility=flexibility)
+            model = mstmm.compile(
+                scene, engine=engine, sweep=sweep, flexibility=flexibility, simplify=simplify
+            )
             udot = model.accelerations(*model.initial_state())
     except (SceneError, NumericalFailure) as error:
         lines = str(error).splitlines()

@@ -33,6 +33,17 @@ def sizes(result: Result) -> str:
     return ", ".join(parts)
 
 
+def simplified(result: Result) -> str:
+    """What is packed otherwise than the scene says it, in numbers; empty where nothing is."""
+    from mstmm.runtime.pack.merge.simplification import COUNTED
+
+    kinds = [one.kind for one in result.model.simplifications]
+    return "; ".join(
+        f"{count(kinds.count(kind), one, many)} {what}"
+        for kind, (one, many, what) in COUNTED.items() if kind in kinds
+    )  # fmt: skip
+
+
 def count(n: int, one: str, many: str = "") -> str:
     """3 bodies, 1 body."""
     return f"{n} {one if n == 1 else many or one + 's'}"
@@ -103,6 +114,7 @@ def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
         "outputs": {name: values[last].tolist() for name, values in outputs.items()},
         "method": result.settings.method,
         "methods": [asdict(stretch) for stretch in result.methods],
+        "simplifications": [asdict(one) for one in result.model.simplifications],
         "engine": result.model.engine,
         "engine_choice": result.model.engine_choice,
         "seconds": seconds,

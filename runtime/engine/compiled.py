@@ -15,7 +15,8 @@ from ..pack import parameters as named_parameters
 from ..pack import product
 from ..pack.elements import Known
 from ..pack.layout import Layout
-from ..pack.pack import pack
+from ..pack.merge.simplification import Simplification
+from ..pack.pack import pack, unsimplified
 from ..pack.packed import Packed, resize
 from .code import Fusing, NotFused
 from .engine import Engine
@@ -25,6 +26,10 @@ from .loops.freedom import Freedom
 from .renewed import with_values
 from .sizes import speed_sizes
 from .slopes import Slopes
+
+#: What a scene is compiled with: fused code, accuracy of the plain product, whether the sweep is
+#: that of least squares, and what may be simplified.
+Asked = tuple[Callable[[Packed, Known], Fusing] | None, float | None, bool, tuple[str, ...]]
 
 
 class Compiled:
@@ -45,10 +50,15 @@ class Compiled:
         fusing: Callable[[Packed, Known], Fusing] | None = None,
         product_accuracy: float | None = None,
         least_squares: bool = False,
+        simplify: tuple[str, ...] = (),
     ) -> None:
         self.scene = scene
         self._fusing, self._product_accuracy = fusing, product_accuracy
-        self.looped = Engine(pack(scene, known, product_accuracy, least_squares=least_squares))
+        self._simplify = simplify if product_accuracy is None else ()
+        self.looped = Engine(
+            pack(scene, known, product_accuracy, least_squares=least_squares,
+                 simplify=self._simplify)
+        )  # fmt: skip
         self.known = self.packed.elements.known
         self.closed: Closed | None = None
         if self.packed.system.closes:
@@ -64,8 +74,26 @@ class Compiled:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled are the scene and what was asked; compiled code is looked for again."""
-        asked = (self._fusing, self._product_accuracy, self.packed.qr)
-        return _again, (type(self), self.scene, asked, self.fusion.library is not None)
+        return _again, (type(self), self.scene, self._asked, self.fusion.library is not None)
+
+    @property
+    def _asked(self) -> Asked:
+        return self._fusing, self._product_accuracy, self.packed.qr, self._simplify
+
+    @cached_property
+    def apart(self) -> Engine:
+        """The looped engine on the scene as it is described, nothing of it simplified: for what is
+        asked of a body or a hinge that is part of another one."""
+        packed = unsimplified(self.packed)
+        if packed is self.packed:
+            return self.looped
+        engine = Engine(packed)
+        return engine if self.closed is None else Closed(engine, len(self.free_speeds)).engine
+
+    @property
+    def simplifications(self) -> tuple[Simplification, ...]:
+        """What is packed otherwise than the scene says it, without changing what it does."""
+        return self.packed.simplified
 
     @property
     def packed(self) -> Packed:
@@ -188,9 +216,7 @@ class Compiled:
 
     def _with(self, scene: Scene) -> Self:
         """What was asked of this scene, of the same one with other numbers."""
-        changed = type(self)(
-            scene, self.known, self._fusing, self._product_accuracy, self.packed.qr
-        )
+        changed = type(self)(scene, self.known, *self._asked)
         changed.fusion.follow(self.fusion)
         return changed
 
@@ -198,7 +224,7 @@ class Compiled:
 def _again(
     kind: type[Compiled],
     scene: Scene,
-    asked: tuple[Callable[[Packed, Known], Fusing] | None, float | None, bool],
+    asked: Asked,
     fused: bool,
 ) -> Compiled:
     """What was pickled; with the fused code that it had where that is in the cache here."""

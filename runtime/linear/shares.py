@@ -33,7 +33,7 @@ def along(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[An
 
 def kinetic(linear: Equations, shapes: NDArray[Any]) -> dict[str, Array]:
     """Body -> (k,): its part of each shape's kinetic energy."""
-    engine, parts = linear.model.looped, [np.real(shapes)]
+    engine, parts = linear.model.apart, [np.real(shapes)]
     if np.iscomplexobj(shapes):
         parts.append(np.imag(shapes))
     energies = np.zeros((shapes.shape[1], engine.packed.topology.count))

@@ -15,8 +15,9 @@ from __future__ import annotations
 import math
 
 from mstmm.ir.facts import builtin_hinges
+from mstmm.numbers.pose import Pose
 from mstmm.numbers.rotations import Matrix, Vector, apply, dot, from_rpy, norm, product
-from mstmm.scene import Body, Hinge
+from mstmm.scene import Hinge
 from mstmm.scene.tables.hinge_frames import hinge_frames
 
 from .placement import Placement
@@ -47,16 +48,16 @@ def snapped(value: float, size: float = 1.0) -> float:
     return value
 
 
-def aligned(own: Placement, body: Body, hinge: Hinge, child: tuple[Hinge, str] | None) -> Placement:
+def aligned(own: Placement, hinge: Hinge, child: tuple[Hinge, Pose] | None) -> Placement:
     """The frame `own` of a body behind `hinge`, turned and moved to suit the hinge of its child.
 
-    `child` is the first hinge that hangs on the body and the body's end it hangs on.
+    `child` is the first hinge that hangs on the body and the end it hangs on, in the body's axes.
     """
     if child is None or not is_axial(hinge) or not is_axial(child[0]):
         return own
     inner, _ = hinge_frames(child[0])
-    user = product(product(body.end_rotation(child[1]), child[0].rotation), inner)
-    turned, position = own.axes(user), own.point(body.end_position(child[1]))
+    user = product(product(child[1].rotation, child[0].rotation), inner)
+    turned, position = own.axes(user), own.point(child[1].position)
     axis = (turned[0][2], turned[1][2], turned[2][2])
     found = _normal(axis, position)
     if found is None:

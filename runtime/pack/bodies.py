@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from mstmm.numbers.pose import Pose
 from mstmm.numbers.rotations import Matrix
 from mstmm.scene import Body, Hinge
 from mstmm.scene.checks.topology import Run, Topology
@@ -19,6 +20,8 @@ from .alignment import connection_of
 from .elements import Elements, declared_numbers, kernel_type
 from .flexible.expansion import Expanded
 from .layout import HingeSlots, Layout
+from .merge.carried import Carried
+from .merge.welds import end_of
 from .placement import GROUND, Placement, rigid_parameters
 from .system import Arrays, BodyNumbers, BodyRun, ModalNumbers, Numbers, SectionNumbers
 
@@ -41,10 +44,11 @@ class Bodies:
         elements: Elements,
         releases: Mapping[str, int],
         align: bool,
+        carried: Carried,
     ) -> None:
         self.expanded, self.scene, self.topology = expanded, expanded.scene, topology
         self.layout, self.elements = layout, elements
-        self.releases, self.align = releases, align
+        self.releases, self.align, self.carried = releases, align, carried
         #: First body of a run -> placements of one period.
         self._placements: dict[int, list[Placement]] = {}
         #: First body of a chain -> placement of its last member.
@@ -52,6 +56,9 @@ class Bodies:
 
     def placement(self, body: int) -> Placement:
         """Internal frame of the body of this number."""
+        whole = self.carried.by.get(body)
+        if whole is not None:
+            return self.carried.placed(body, self._placements[whole][0])
         if body < len(self.scene.body):
             return self._placements[body][0]
         chain, k = self.scene.bodies.member(body)
@@ -84,7 +91,7 @@ class Bodies:
         own = placement.place(body, run.outboard_end, outboard)
         flexible = self.expanded.is_node(body.name)
         child = self._child(run, k) if self.align and not flexible else None
-        place = alignment.aligned(own, body, hinge, child)
+        place = alignment.aligned(own, hinge, child)
         self._placements.setdefault(run.body, []).append(place)
         modal, section = self._flexible(body.name, place) if flexible else (None, None)
         link: Numbers = ()
@@ -93,7 +100,7 @@ class Bodies:
             axial = self.align and not flexible and alignment.is_axial(hinge)
             link, connection = self._connection(run, k, inboard, place, axial)
         hinge_p = _hinge_parameters(hinge)
-        body_p, body_frame = self._body_parameters(body, place)
+        body_p, body_frame = self._body_parameters(run.body + k, place)
         rotor, imposed = _rotor_and_imposed(hinge, slots)
         return BodyNumbers(
             ("hinge", kernel_type(hinge, self.releases)), ("body", body.type), slots.nq, slots.nu,
@@ -140,12 +147,17 @@ class Bodies:
             return (), (*turned[0], *turned[1], *turned[2], *point)
         return link, connection_of(link)
 
-    def _child(self, run: Run, k: int) -> tuple[Hinge, str] | None:
-        """First hinge on a body, and the body's end that it hangs on."""
+    def _child(self, run: Run, k: int) -> tuple[Hinge, Pose] | None:
+        """First hinge on a body, and where the end that it hangs on lies in the body's axes."""
         if k + 1 < run.count:
-            return self.scene.hinges[run.hinge + k + 1], run.ends[k % len(run.ends)]
+            body, end = self.scene.bodies[run.body + k], run.ends[k % len(run.ends)]
+            return self.scene.hinges[run.hinge + k + 1], end_of(body, end)
         found = self._first_children.get(run.place + k)
-        return None if found is None else (self.scene.hinges[found.hinge], found.inboard_end)
+        if found is None:
+            return None
+        held = end_of(self.scene.bodies[found.on], found.inboard_end)
+        pose = self.carried.poses.get(found.on)
+        return self.scene.hinges[found.hinge], held if pose is None else pose.then(held)
 
     def _period(self, run: Run) -> int:
         if run.body < len(self.scene.body):
@@ -166,14 +178,19 @@ class Bodies:
             return self.scene.bodies[run.body + k - 1], before
         if run.parent < 0:
             return None, GROUND
-        number = self.topology.at(run.parent)[0]
-        return self.scene.bodies[number], self.placement(number)
+        return self.scene.bodies[run.on], self.placement(run.on)
 
-    def _body_parameters(self, body: Body, place: Placement) -> tuple[Numbers, Numbers]:
+    def _body_parameters(self, number: int, place: Placement) -> tuple[Numbers, Numbers]:
         """Numbers of the body's kernels, and behind them the internal frame in the body's own:
-        rotation (9) and origin (3); a rigid body's numbers are in the internal frame."""
+        rotation (9) and origin (3); a rigid body's numbers are in the internal frame, with those of
+        the bodies that it carries."""
+        body = self.scene.bodies[number]
         if body.type == RIGID:
-            return rigid_parameters(body, place), ()
+            numbers = rigid_parameters(body, place)
+            for part in self.carried.parts.get(number, ()):
+                own = rigid_parameters(self.scene.body[part], self.carried.placed(part, place))
+                numbers = tuple(a + b for a, b in zip(numbers, own, strict=True))
+            return numbers, ()
         element = self.elements.get("body", body.type, body.name)
         numbers = declared_numbers(element.declared, body.parameters, f'body "{body.name}"')
         turn = place.rotation

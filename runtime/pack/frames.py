@@ -13,6 +13,7 @@ from ..flexible.modal_body import ModalBody
 from .elements import Elements
 from .flexible.expansion import Expanded
 from .layout import Layout
+from .merge.simplification import Simplification
 from .placement import Placement
 
 
@@ -32,6 +33,7 @@ class Frames:
     positions: Mapping[str, int]
     hinge_position: Mapping[str, int]
     expanded: Expanded
+    simplified: tuple[Simplification, ...]  #: what is packed otherwise than it is described
 
     @property
     def described(self) -> Scene:

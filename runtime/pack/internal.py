@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from mstmm.expression.expression import Expression
@@ -29,6 +29,8 @@ from .loops.couplings import couplings_of
 from .loops.curves import elements_of
 from .loops.opened import opened
 from .loops.unknown import refuse_beside_bending
+from .merge.carried import Carried, carried_in, contracted
+from .merge.simplification import WELDS
 from .slots import layout_of
 from .system import Held, LoadNumbers, Numbers, System
 from .values import MOVING, Values, drive_kernel
@@ -63,26 +65,30 @@ def system_of(
     align: bool = True,
     flexible: Mapping[str, ModalBody] | None = None,
     moving: Mapping[int, Any] | None = None,
+    simplify: Collection[str] = (),
 ) -> tuple[System, Frames]:
     """The numbers of a scene, and where everything lies; `known` are elements beyond the prebuilt.
 
     Without `align` internal frames are those of the bodies' own hinges, whatever hangs on them:
     smooth functions of the scene's numbers.  `flexible` are the numbers of all modal bodies
     where they are known already, `moving` those that expressions take from the port "moving".
+    `simplify` are words of `merge.simplification`.
 
     Raises SceneError for hinges that do not form a tree or types that nobody defines.
     """
     expanded = expansion_of(scene, flexible)
     elements = Elements({**(known or {}), **elements_of(scene.constraint)})
     nodes, tree = expanded.scene, build(expanded.scene)
+    carried = carried_in(expanded, tree) if WELDS in simplify else Carried()
+    tree = contracted(tree, carried)
     releases = {name: i for i, name in enumerate(releasable(scene))}
     layout = layout_of(expanded, releases, elements)
-    bodies = Bodies(expanded, tree, layout, elements, releases, align)
+    bodies = Bodies(expanded, tree, layout, elements, releases, align, carried)
     runs = tuple(map(bodies.run, tree.runs))
     frames = Frames(
         nodes, tree, layout, elements, releases, Lookup(nodes.bodies, bodies.placement),
         Lookup(nodes.bodies, tree.place_of_body), Lookup(nodes.hinges, tree.place_of_hinge),
-        expanded,
+        expanded, tuple(carried.told(nodes)),
     )  # fmt: skip
     ports = [Port(MOVING, (1 + max(moving),))] if moving else []
     driven, values = list(_driven(nodes, tree)), Values(layout, ports)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields
+from collections.abc import Collection, Mapping
+from dataclasses import fields, replace
 
 from mstmm.scene import Scene
 
@@ -26,13 +26,14 @@ def pack(
     least_squares: bool = False,
     align: bool = True,
     flexible: Mapping[str, ModalBody] | None = None,
+    simplify: Collection[str] = (),
 ) -> Packed:
     """Engine arrays of a scene; as `system_of`.
 
     With `product_accuracy` accelerations come from the plain product of classical matrices, which
     may deviate from the Riccati sweep by that much; with `least_squares` from the QR sweep.
     """
-    system, frames = system_of(scene, known, align=align, flexible=flexible)
+    system, frames = system_of(scene, known, align=align, flexible=flexible, simplify=simplify)
     packed = packed_system(system, frames)
     if product_accuracy is not None and not system.closes:  # closed loops go first
         product.attach(packed, product_accuracy)
@@ -40,6 +41,26 @@ def pack(
         qr.attach(packed)
     resize(packed, packed.written.slots)
     return packed
+
+
+def unsimplified(packed: Packed) -> Packed:
+    """The same with everything as it is described, under the same inputs; states and memory are
+    the same."""
+    if not packed.simplified:
+        return packed
+    system, frames = system_of(packed.described, packed.elements.known, flexible=packed.modal)
+    now = packed.system
+    both = zip(system.couplings, now.couplings, strict=True)
+    same = replace(
+        system, inputs=now.inputs, held=now.held, by_time=now.by_time, n_memory=now.n_memory,
+        couplings=tuple(replace(one, kept=known.kept) for one, known in both),
+    )  # fmt: skip
+    found = packed_system(same, frames)
+    found.held = packed.held
+    if packed.qr:
+        qr.attach(found)
+        resize(found, found.written.slots)
+    return found
 
 
 def packed_system(system: System, frames: Frames) -> Packed:

@@ -241,6 +241,8 @@ def _smallest(model: Compiled, run: Trajectory, number: int, measures: Array) ->
 def _measure(model: Compiled, number: int) -> Any:
     """The kernel `singularity` of a hinge's type, None if it has none."""
     packed = model.packed
+    if not packed.layout.slots(number).nq:
+        return None
     body = packed.system.body(packed.topology.place_of_hinge(number))
     function = packed.elements[body.hinge].functions.get("singularity")
     if function is None:

@@ -7,6 +7,7 @@ into memory, each body and each kind of quantity is a batch of its own.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,7 +40,7 @@ class Observed:
     """
 
     def __init__(self, model: Compiled, run: Trajectory) -> None:
-        self.engine, self.run = model.looped, run
+        self.engine, self.run, self._model = model.looped, run, model
         self.failures: tuple[str, ...] = ()
         self.references = References(model.scene.skeleton)
         self._points: dict[str, Array] = {}
@@ -78,6 +79,21 @@ class Observed:
     def columns(self, name: str, which: Any) -> Array:
         """Some columns `which` of loads, efforts or udot; of large ones no more is kept."""
         return np.concatenate([part[(slice(None), *which)] for part in self._pieces(name)])
+
+    def loads(self, hinge: str, first: int) -> Array:
+        """(n, 3) force (first 0) or moment (3) of a hinge."""
+        seen, place = self, self.engine.packed.hinge_position.get(hinge)
+        if place is None:  # of a hinge that welds bodies packed as one
+            seen = self.apart
+            place = seen.engine.packed.hinge_position[hinge]
+        return seen.columns("loads", (place, slice(first, first + 3)))
+
+    @cached_property
+    def apart(self) -> Observed:
+        """The same by the engine in which every body is by itself."""
+        found = Observed(self._model, self.run)
+        found.engine = self._model.apart
+        return found
 
     def largest_loads(self) -> tuple[float, float]:
         """The largest component of force (N) and of moment (N*m) of any hinge."""

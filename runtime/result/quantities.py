@@ -107,9 +107,7 @@ class Quantities:
                 "that holds it"
             )
         self.slots(hinge)
-        place = self.observed.engine.packed.hinge_position[hinge]
-        first = 0 if kind == "force" else 3
-        return self.observed.columns("loads", (place, slice(first, first + 3)))
+        return self.observed.loads(hinge, 0 if kind == "force" else 3)
 
     def effort(self, hinge: str) -> Array:
         """(n, nu): what laws and drives put in along the speeds."""

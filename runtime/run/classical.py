@@ -90,7 +90,7 @@ class _Kept:
 
 class _Run:
     def __init__(self, model: Compiled, settings: Settings, tell: Callable[[float], None]) -> None:
-        self.engine, self.settings, self.tell = model.looped, settings, tell
+        self.engine, self.settings, self.tell = model.apart, settings, tell
         self.system = SceneSystem(self.engine)
         self.nq, self.nu = self.engine.nq, self.engine.nu
         self.kept, self.steps = _Kept(), 0

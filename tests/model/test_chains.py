@@ -71,7 +71,7 @@ def branched() -> Data:
 
 
 def compiled(data: Data) -> Model:
-    return mstmm.compile(Scene(**data), engine="looped")
+    return mstmm.compile(Scene(**data), engine="looped", simplify=False)
 
 
 def reordered(model: Model, plain: Model) -> tuple[list[int], list[int]]:

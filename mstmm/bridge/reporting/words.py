@@ -62,15 +62,16 @@ def made(result: Result) -> str:
 
 
 def _models(result: Result) -> str:
-    """Levels of model of flexible bodies, and what they leave out."""
+    """Levels of model of flexible bodies and what they leave out; what is packed otherwise."""
     rows = [
         (name, body.n, body.frame, "; ".join(body.notes) or "nothing")
         for name, body in result.model.flexible.items()
     ]
-    if not rows:
-        return ""
     head = ("flexible body", "shapes", "floating frame", "worth knowing")
-    return "<h3>What is simplified</h3>" + table(rows, head)
+    found = table(rows, head) if rows else ""
+    if packed := [str(one) for one in result.model.simplifications]:
+        found += folded("What is packed otherwise than the scene says it", bullets(packed))
+    return f"<h3>What is simplified</h3>{found}" if found else ""
 
 
 def mechanism(result: Result) -> str:

@@ -160,6 +160,11 @@ def simulate(
                      "numbers: warn; refuse, before the run where it is seen there, else with "
                      "exit code 4 once the result is saved; ignore, which tells nothing."),
     ] = "warn",
+    simplify: Annotated[
+        bool,
+        typer.Option("--simplify/--no-simplify", help="Pack bodies on fixed hinges as one with "
+                     "what holds them, which changes no result."),
+    ] = True,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Simulate a scene and save the result; Ctrl-C keeps what was computed."""
@@ -169,7 +174,7 @@ def simulate(
         None if plot is None else output_file(plot, PICTURES, "--plot"),
         tuple(quantity or ()), certify, resume, sweep, engine, flexibility, accuracy,
         max_step or 0.0, radius, scheme, iterations, tangent, error, tuple(of or ()),
-        on_risk, tuple(inputs or ()),
+        on_risk, tuple(inputs or ()), simplify,
     )  # fmt: skip
     refuse_endless(plan)
     refuse_beside_error(plan)
@@ -210,7 +215,7 @@ def _model(plan: Plan) -> Model:
     scene, level = mstmm.load_scene(plan.scene), plan.flexibility
     if plan.inputs:
         scene = with_inputs(scene, plan.inputs)
-    model = compiled(plan.scene, scene, plan.sweep, plan.engine, level)
+    model = compiled(plan.scene, scene, plan.sweep, plan.engine, level, plan.simplify)
     if plan.quantities:
         start = model.simulate(t_end=0.0, method="dop853")
         pictures = start.pictures()

@@ -47,6 +47,7 @@ class Plan:
     of: tuple[str, ...] = ()
     on_risk: str = "warn"
     inputs: tuple[str, ...] = ()
+    simplify: bool = True
 
     @property
     def resumable(self) -> bool:

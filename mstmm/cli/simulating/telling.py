@@ -63,6 +63,8 @@ def _say(plan: Plan, result: Result, seconds: float, made: list[str]) -> None:
         output.say(line)
     output.say(f"{plan.scene}: {summary.sizes(result)}, {result.model.engine} engine")
     output.say(summary.effort(result, seconds))
+    if packed := summary.simplified(result):
+        output.say(f"  {packed}")
     for line in summary.method_lines(result, console.width):
         output.say(line)
     output.say(result.message)

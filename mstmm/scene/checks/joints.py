@@ -68,15 +68,15 @@ class Joints:
     def _edges(self) -> Iterator[Edge]:
         scene = self.scene
         for edge, hinge in enumerate(scene.hinge):
-            yield Edge(self._body(edge), self.outboard[edge], rows_of(hinge), hinge.cut)
+            yield Edge(self.body(edge), self.outboard[edge], rows_of(hinge), hinge.cut)
         for number, chain in enumerate(scene.chain):
             first = scene.bodies.starts[number]
             for k in range(chain.count):
-                inboard = first + k - 1 if k else self._body(len(scene.hinge) + number)
+                inboard = first + k - 1 if k else self.body(len(scene.hinge) + number)
                 yield Edge(inboard, first + k, 0, cut=False)
 
-    def _body(self, edge: int) -> int:
-        """Number of the body on which an edge hangs."""
+    def body(self, edge: int) -> int:
+        """Number of the body on which an edge hangs, -1 for the ground."""
         node, member = self.holder(edge)
         bodies = len(self.scene.body)
         return node if node < bodies else self.scene.bodies.starts[node - bodies] + member

@@ -7,8 +7,8 @@ close loops, each body hangs on one of those that hold it, and the others are cu
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -46,8 +46,9 @@ class Link:
 class Run:
     """`count` bodies in a row, each the child of the one before: a body of its own, or a chain.
 
-    `body`, `hinge` and `place` are those of the first, the others follow it.  `parent` is the place
-    of the body on whose `inboard_end` the first hangs; the others hang on `ends`, repeated.
+    `body`, `hinge` and `place` are those of the first, the others follow it.  The first hangs on
+    the `inboard_end` of the scene's body `on` (-1: the ground), at the place `parent`; the others
+    hang on `ends`, repeated.
     """
 
     body: int
@@ -55,6 +56,7 @@ class Run:
     count: int
     place: int
     parent: int
+    on: int
     inboard_end: str
     outboard_end: str
     ends: tuple[str, ...] = ()
@@ -69,11 +71,13 @@ class Topology:
 
     `plan` says how loops, constraints and couplings close, None where there is nothing to close:
     bodies and hinges by their numbers in the scene; its rows are those of the cut hinges, of the
-    constraints and of the couplings, in this order.
+    constraints and of the couplings, in this order.  `carried` are bodies that are part of another
+    one: each has the place of that, and its hinge has none.
     """
 
     runs: tuple[Run, ...]
     plan: Plan | None = None
+    carried: Mapping[int, int] = field(default_factory=dict)
 
     @property
     def cut(self) -> tuple[int, ...]:
@@ -105,7 +109,7 @@ class Topology:
 
     @cached_property
     def order(self) -> tuple[int, ...]:
-        """Scene indices of the bodies, parents first."""
+        """Scene indices of the bodies, parents first; without those that others carry."""
         return tuple(run.body + k for run in self.runs for k in range(run.count))
 
     @cached_property
@@ -120,10 +124,7 @@ class Topology:
     @cached_property
     def position(self) -> tuple[int, ...]:
         """Place in `links` of every body of the scene."""
-        position = [0] * self.count
-        for place, body in enumerate(self.order):
-            position[body] = place
-        return tuple(position)
+        return tuple(map(self.place_of_body, range(self.count + len(self.carried))))
 
     @cached_property
     def _by_body(self) -> tuple[list[int], list[Run]]:
@@ -141,14 +142,20 @@ class Topology:
 
     def place_of_body(self, body: int) -> int:
         """Place of the scene's body."""
+        body = self.carried.get(body, body)
         firsts, runs = self._by_body
         run = runs[bisect_right(firsts, body) - 1]
         return run.place + body - run.body
 
     def place_of_hinge(self, hinge: int) -> int:
-        """Place of the body whose inboard hinge is the scene's hinge, which must not be cut."""
+        """Place of the body whose inboard hinge is the scene's hinge, which must not be cut.
+
+        KeyError for that of a body that another one carries.
+        """
         firsts, runs = self._by_hinge
         run = runs[bisect_right(firsts, hinge) - 1]
+        if not 0 <= hinge - run.hinge < run.count:
+            raise KeyError(hinge)
         return run.place + hinge - run.hinge
 
     def at(self, place: int) -> tuple[int, int]:
@@ -241,11 +248,11 @@ def _runs(joints: Joints, held: Sequence[int]) -> tuple[Run, ...]:
 
 def _run(joints: Joints, node: int, edge: int, place: int, parent: int) -> Run:
     scene = joints.scene
-    inboard_end = split(joints.inboard[edge])[1]
+    inboard_end, on = split(joints.inboard[edge])[1], joints.body(edge)
     bodies, hinges = len(scene.body), len(scene.hinge)
     if node < bodies:
         outboard_end = scene.hinge[edge].outboard_end
-        return Run(node, edge, 1, place, parent, inboard_end, outboard_end)
+        return Run(node, edge, 1, place, parent, on, inboard_end, outboard_end)
     chain = scene.chain[node - bodies]
     body, hinge = scene.bodies.starts[node - bodies], scene.hinges.starts[edge - hinges]
-    return Run(body, hinge, chain.count, place, parent, inboard_end, "", chain.held_ends)
+    return Run(body, hinge, chain.count, place, parent, on, inboard_end, "", chain.held_ends)

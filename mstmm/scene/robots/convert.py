@@ -9,15 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import SceneError
+from ...numbers.pose import IN_PLACE, Pose
 from ...numbers.rotations import IDENTITY, to_quaternion
 from ..files.write import as_toml
 from ..rules.inertia import triangle_excess
 from ..rules.messages import near
 from ..rules.values import GROUND
 from ..scene import Scene
-from .masses import welded
+from .masses import joined
 from .names import Names
-from .robot import FIXED, IN_PLACE, NOTHING, Joint, Link, Mimic, Note, Pose, Robot
+from .robot import FIXED, NOTHING, Joint, Link, Mimic, Note, Robot
 from .tree import Tree
 
 BASES = (FIXED, "free")
@@ -158,7 +159,7 @@ class _Writer:
         return f"{body}.{taken}"
 
     def _body(self, name: str, parts: list[tuple[Link, Pose]]) -> dict[str, Any]:
-        mass, center, m = welded(parts)
+        mass, center, m = joined(parts)
         table: dict[str, Any] = {"name": self._bodies[name], "mass": mass}
         if any(center):
             table["center_of_mass"] = center

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ...numbers.pose import IN_PLACE, ZERO, Pose
 from ...numbers.rotations import Matrix, Vector, product, transpose
-from .robot import IN_PLACE, NOTHING, ZERO, Link, Pose
+from .robot import NOTHING, Link
 
 
-def welded(parts: Sequence[tuple[Link, Pose]]) -> tuple[float, Vector, Matrix]:
+def joined(parts: Sequence[tuple[Link, Pose]]) -> tuple[float, Vector, Matrix]:
     """Mass (kg), mass centre (m) and inertia about it (kg m^2) of links, each with its frame in
     the axes of the body, in these axes."""
     if len(parts) == 1 and parts[0][1] == IN_PLACE:

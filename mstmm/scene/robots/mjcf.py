@@ -12,6 +12,7 @@ from typing import Any
 
 from ...errors import SceneError
 from ...extras import missing
+from ...numbers.pose import IN_PLACE, ZERO, Pose
 from ...numbers.rotations import (
     Matrix,
     Vector,
@@ -22,15 +23,12 @@ from ...numbers.rotations import (
 )
 from .robot import (
     FIXED,
-    IN_PLACE,
     NOTHING,
-    ZERO,
     Joint,
     Link,
     Look,
     Mimic,
     Note,
-    Pose,
     Robot,
     color,
 )

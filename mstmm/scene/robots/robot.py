@@ -4,30 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
-from ...numbers.rotations import IDENTITY, Matrix, Vector, apply, product
+from ...numbers.pose import IN_PLACE, ZERO, Pose
+from ...numbers.rotations import Matrix, Vector
 
 FIXED = "fixed"
-ZERO: Vector = (0.0, 0.0, 0.0)
 NOTHING: Matrix = (ZERO, ZERO, ZERO)
-
-
-class Pose(NamedTuple):
-    """A frame in another one: its origin (m) and its axes."""
-
-    position: Vector = ZERO
-    rotation: Matrix = IDENTITY
-
-    def then(self, inner: Pose) -> Pose:
-        """A frame given in this one, in the one that this one is given in."""
-        x, y, z = apply(self.rotation, inner.position)
-        a, b, c = self.position
-        return Pose((a + x, b + y, c + z), product(self.rotation, inner.rotation))
-
-
-#: The frame itself.
-IN_PLACE = Pose()
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,12 @@ from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
 from ...errors import SceneError
+from ...numbers.pose import IN_PLACE, Pose
 from ...numbers.rotations import Matrix, Vector, from_rpy, perpendicular, product, transpose
 from ..rules.inertia import negative_moment
 from ..rules.messages import near
 from .markup import Element, parsed
-from .robot import FIXED, IN_PLACE, Joint, Link, Look, Mimic, Note, Pose, Robot, color
+from .robot import FIXED, Joint, Link, Look, Mimic, Note, Robot, color
 
 
 class _Kind(NamedTuple):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from mstmm.arrays import Array
 from mstmm.expression.expression import Expression, number, parse
+from mstmm.numbers.rotations import Matrix
 from mstmm.scene import Load, Scene, split
 
 from ...chart.models import with_tables
@@ -15,7 +15,7 @@ from .references import OWN_AXES
 Entries = tuple[Expression, ...]
 
 
-def with_axes_of(scene: Scene, gone: str, axes: str, turned: Array) -> Scene:
+def with_axes_of(scene: Scene, gone: str, axes: str, turned: Matrix) -> Scene:
     """The scene whose loads along the axes of a body that goes are along other `axes`, in which
     those lie by the rotation `turned` (3, 3)."""
     return with_tables(
@@ -30,10 +30,10 @@ def _axes_of(load: Load) -> str:
     return split(load.on)[0] if load.axes == OWN_AXES else load.axes
 
 
-def _turned(load: Load, axes: str, turned: Array) -> Load:
+def _turned(load: Load, axes: str, turned: Matrix) -> Load:
     update: dict[str, Any] = {"axes": axes}
     for key in ("force", "moment"):
-        update[key] = tuple(_sum(row, getattr(load, key)) for row in turned.tolist())
+        update[key] = tuple(_sum(row, getattr(load, key)) for row in turned)
     return load.model_copy(update=update)
 
 

@@ -12,21 +12,20 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
+from mstmm.numbers.pose import ZERO, Pose
 from mstmm.numbers.rotations import Matrix, Vector, from_orientation
 from mstmm.scene import Body, Chain, Hinge, Load, Scene, Spring, split
 from mstmm.scene.rules.values import GROUND
 
 from ...chart.models import with_tables
 from ...pack.flexible.rigidified import rigidified
-from ...pack.merge.welds import Pose, end_of, together, welded
+from ...pack.merge.spoken import Spoken, spoken_of
+from ...pack.merge.welds import end_at, end_of, orientation_of, together, welded
 from ..choice import RIGID
 from ..renaming import composed, renamed
 from .axes import with_axes_of
 from .chains import Written, short, written_out
 from .references import INERTIAL, with_names
-from .spoken import Spoken, spoken_of
 
 
 @dataclass(frozen=True)
@@ -172,7 +171,7 @@ def _without(found: Merged, weld: Hinge, gone: str, bodies: Mapping[str, Body]) 
     scene = with_tables(
         found.scene, hinge=tuple(one for one in found.scene.hinge if one.name != weld.name)
     )
-    scene = with_axes_of(scene, gone, INERTIAL if whole is None else whole.name, pose.turned)
+    scene = with_axes_of(scene, gone, INERTIAL if whole is None else whole.name, pose.rotation)
     if whole is None:
         return _grounded(found, scene, gone, places)
     return _joined(found, scene, whole, part, places)
@@ -185,7 +184,7 @@ def _joined(
     ends, names = dict(whole.ends), {}
     for old, pose in places.items():
         own = _free_name(ends, old.replace(".", "_"))
-        ends[own], names[old] = pose.end, f"{whole.name}.{own}"
+        ends[own], names[old] = end_at(pose), f"{whole.name}.{own}"
     body = together(whole, part, places[part.name]).model_copy(update={"ends": ends})
     made = with_names(scene, names)
     others = tuple(one for one in scene.body if one.name != part.name)
@@ -257,7 +256,7 @@ def _hung(element: Any, rotation: Matrix, places: Mapping[str, Pose]) -> Any:
     return element.model_copy(
         update={
             "inboard": GROUND, "position": held.position,
-            "orientation": held.then(Pose(np.array(rotation), np.zeros(3))).orientation,
+            "orientation": orientation_of(held.then(Pose(ZERO, rotation))),
         }
     )  # fmt: skip
 

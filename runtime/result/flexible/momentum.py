@@ -76,7 +76,7 @@ class Momenta:
     def _inertia(self, name: str) -> tuple[float, Array, Array]:
         """Mass, mass centre in the user's axes and inertia about it in them, from the kernel that
         the engine takes them from."""
-        packed = self.observed.engine.packed
+        packed = self.observed.apart.engine.packed
         place, axes, offset = packed.end(name)
         body, ffi, numbers = packed.system.body(place), packed.ffi, np.zeros(21)
         function = packed.elements[body.body].functions["inertia"]

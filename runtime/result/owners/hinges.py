@@ -30,9 +30,8 @@ def add_hinge(table: Table, acting: Acting, hinge: HingeSlots) -> None:
         return observed.columns("efforts", (hinge.u_slice,))
 
     group.add("effort", effort_names(hinge.u_names), units, efforts)
-    place = observed.engine.packed.hinge_position[hinge.name]
     for first, (kind, about) in zip((0, 3), HINGE.items(), strict=True):
-        get = partial(observed.columns, "loads", (place, slice(first, first + 3)))
+        get = partial(observed.loads, hinge.name, first)
         table.vector(f"{hinge.name}.{kind}", owner, about, get, base=hinge.name)
     if hinge.quaternion is not None:
         first = hinge.q + hinge.quaternion
