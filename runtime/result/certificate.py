@@ -9,7 +9,7 @@ from mstmm.markup import table
 from mstmm.risk import Risk, sentences
 
 from ..integrate.reached import ReachedError
-from ..run.error_estimate import ANGLE, PART, ErrorEstimate
+from ..run.error_estimate import ANGLE, PART, ErrorEstimate, limit
 from ..run.stability import StepCheck
 from .closure import Closure
 from .conditioning import LARGEST, PivotLoss, SingularDistance
@@ -194,9 +194,10 @@ def _inaccurate(c: Certificate, accuracy: float) -> list[str]:
     found = []
     for unit, values in c.error.q.items():
         worst = float(values.max(initial=0.0))
-        limit = accuracy if unit == "rad" else accuracy * c.error.moved.get(unit, 0.0)
-        if worst > limit > 0:
-            part = "" if unit == "rad" else f" of {c.error.moved[unit]:.2g} {unit} of motion"
+        if worst > limit(c.error.moved, unit, accuracy, accuracy):
+            part = (
+                "" if unit == "rad" else f" of {c.error.moved.get(unit, 0.0):.2g} {unit} of motion"
+            )
             found.append(f"the error of q may be {worst:.1e} {unit or '1'}{part}{_until(c.error)}")
     return found
 

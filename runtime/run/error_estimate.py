@@ -13,7 +13,7 @@ so loose that it bounds nothing is no measure of the second one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -51,7 +51,7 @@ _TIGHTEST = 1e-14
 #: The second run's tolerance is at most this, its absolute one this part of the motion's size.
 _LOOSEST = 1e-4
 
-#: Motions below this are rounding: no absolute tolerance follows them.
+#: Motions and errors below this are rounding: no tolerance follows them.
 _DUST = 1e-12
 
 #: Steps of the second run, at least, where the step is fixed.
@@ -212,6 +212,12 @@ def rotation_between(a: Array, b: Array) -> Array:
     return np.asarray(4.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)))
 
 
+def limit(moved: Mapping[str, float], unit: str, angle: float, part: float) -> float:
+    """The error of coordinates of a unit that is bearable: an angle, or a part of how far they
+    went; of what hardly moves, rounding."""
+    return angle if unit == "rad" else max(part * moved.get(unit, 0.0), _DUST)
+
+
 def excursions(layout: Layout, q: Array, but: str = "") -> dict[str, float]:
     """Unit, other than `but` -> largest excursion from the first sample of any coordinate of it."""
     found: dict[str, float] = {}
@@ -223,11 +229,11 @@ def excursions(layout: Layout, q: Array, but: str = "") -> dict[str, float]:
 
 def _horizon(t: Array, q: dict[str, Array], moved: dict[str, float], start: float) -> float | None:
     """The last sample before the runs differ by more than ANGLE or PART; without one the start."""
-    limits = {unit: ANGLE if unit == "rad" else PART * moved.get(unit, 0.0) for unit in q}
+    limits = {unit: limit(moved, unit, ANGLE, PART) for unit in q}
     parted = [
         int(np.argmax(error > SAFETY * limits[unit]))
         for unit, error in q.items()
-        if limits[unit] > 0 and (error > SAFETY * limits[unit]).any()
+        if (error > SAFETY * limits[unit]).any()
     ]
     if not parted:
         return None

@@ -192,3 +192,27 @@ def test_estimates_of_random_scenes(method: str, rng: np.random.Generator) -> No
 def test_without_certify_there_is_no_second_run() -> None:
     scene = motor("sin(t)")
     assert mstmm.compile(scene).simulate(1.0).certificate.error is None
+
+
+def test_what_moves_by_rounding_alone_is_no_motion_to_lose() -> None:
+    """The fingers of a hand that turns: a coupling holds them against each other."""
+    arm = rod("hand", 0.7) | {"ends": {"palm": [0.6, 0, 0]}}
+    finger = {"mass": 0.015, "center_of_mass": [0.01, 0, 0.02],
+              "inertia": [2.375e-6, 2.375e-6, 7.5e-7]}  # fmt: skip
+    slide = {"type": "prismatic", "inboard": "hand.palm"}
+    scene = mstmm.Scene(
+        gravity=(0, -9.81, 0),
+        body=[arm, finger | {"name": "left"}, finger | {"name": "right"}],
+        hinge=[
+            {"name": "wrist", "type": "pin", "inboard": "ground", "outboard": "hand",
+             "axis": [0.1, 0.2, 0.97]},
+            slide | {"name": "l", "outboard": "left", "axis": [0, 1, 0]},
+            slide | {"name": "r", "outboard": "right", "axis": [0, -1, 0]},
+        ],
+        coupling=[{"expression": "r.q - l.q"}],
+    )  # fmt: skip
+    result = mstmm.compile(scene, engine="looped").simulate(0.5, certify=True)
+    moved = np.abs(result.q[:, 1:]).max()
+    assert 0 < moved < 1e-12
+    assert result.certificate.error is not None and result.certificate.error.horizon is None
+    assert result.certificate.verdict().trusted
