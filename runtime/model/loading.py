@@ -16,6 +16,7 @@ from mstmm.scene import Scene
 from ..host.files import refuse_special, seal_is_broken
 from ..kernels import store
 from ..kernels.identity import kernels_hash
+from ..result import meshes
 from ..result.output import provenance
 from ..result.output.columns import READERS, Columns
 from ..result.result import Result
@@ -125,4 +126,6 @@ def _rebuilt(data: Any, path: Path) -> Result:
     if data.attrs["kernels_sha256"] != kernels_hash(model.known):
         note = "saved with other kernels: quantities beyond q and u come from the present ones"
         run = replace(run, notes=(*run.notes, note))
-    return result_of(model, run, provenance.error(data))
+    result = result_of(model, run, provenance.error(data))
+    result.meshes = meshes.kept(data)
+    return result

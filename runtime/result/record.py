@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
@@ -24,6 +25,7 @@ from ..run.stretches import Stretch
 from ..run.trajectory import Trajectory
 from .certificate import Certificate
 from .flexible.quantities import FlexibleResults
+from .meshes import contents
 from .names import Quantity
 from .observed import Observed
 from .quantities import Quantities
@@ -42,6 +44,7 @@ class Record(FlexibleResults, ABC):
         self, model: Compiled, run: Trajectory, error: ErrorEstimate | None = None
     ) -> None:
         self.model, self.trajectory, self._error = model, run, error
+        self.meshes: Mapping[str, bytes] = {}
         self.checkpoint: Checkpoint | None = None
         self.t, self.q, self.u, self.event = run.t, run.q, run.u, run.event
         self.status = run.status
@@ -51,8 +54,12 @@ class Record(FlexibleResults, ABC):
         self._quantities = Quantities(self._observed, self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled are the model and the run; what follows from them is computed again."""
-        return type(self), (self.model, self.trajectory, self._error)
+        """Pickled are the model, the run and meshes; what follows from them is computed again."""
+        return (
+            type(self),
+            (self.model, self.trajectory, self._error),
+            {"meshes": contents(self.model.scene, self.meshes)},
+        )
 
     @property
     def success(self) -> bool:

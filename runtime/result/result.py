@@ -35,6 +35,7 @@ class Result(Record):
         status: why it ended; None if it was interrupted.
         statistics: counts of the integrator; None for runs of other integrators.
         settings: how the run was made.
+        meshes: contents of the mesh files of shapes by their paths, of a result that was loaded.
         checkpoint: the file that keeps the run until its result is saved; None without one.
     """
 

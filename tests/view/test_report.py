@@ -28,6 +28,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_what_it_says(page: Path) -> None:
     words = page.read_text()
     assert page.stat().st_size < 10_000_000
+    assert words.index("<iframe") < 1_000_000  # the strip, however much it shows
     assert "<title>a &lt;b&gt;beam&lt;/b&gt;</title>" in words
     assert "<b>NOT trusted</b>: beam &quot;blade&quot;" in words
     for heading in ("The mechanism", "The run", "Curves", "The certificate", "The equations"):

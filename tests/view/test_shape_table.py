@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,9 @@ from view import scenes
 
 import mstmm
 from mstmm.errors import SceneError
+from mstmm.runtime.model.loading import load_netcdf
+from mstmm.runtime.result.record import Record
+from mstmm.runtime.result.result import Result
 from mstmm.runtime.result.view.staging import staged
 
 TETRAHEDRON = """\
@@ -70,6 +75,31 @@ def test_meshes(tmp_path: Path) -> None:
     [mesh] = [s for s in staged(run, "mesh").solids if s.part == "shape1"]
     assert len(mesh.surface.faces) == 4
     assert mesh.surface.vertices.max(axis=0) == pytest.approx([0.1, 0.2, 1.3])
+
+
+def by_file(run: Result, folder: Path) -> Record:
+    first = load_netcdf(run.save(folder / "run.nc"))
+    return load_netcdf(first.save(folder / "again.nc"))
+
+
+def by_pickle(run: Result, folder: Path) -> Record:
+    path = folder / "run.pickle"
+    path.write_bytes(pickle.dumps(run))
+    sent: Record = pickle.loads(path.read_bytes())
+    return sent
+
+
+@pytest.mark.parametrize("sent", [by_file, by_pickle])
+def test_meshes_go_with_a_result(tmp_path: Path, sent: Callable[[Result, Path], Record]) -> None:
+    file = tmp_path / "hub.obj"
+    file.write_text(TETRAHEDRON)
+    scene = with_shape(on="hub", type="mesh", file=str(file))
+    run = mstmm.compile(scene, engine="looped").simulate(0.0)
+    before, there = staged(run, "mesh").solids, sent(run, tmp_path)
+    file.unlink()
+    for was, solid in zip(before, staged(there, "mesh").solids, strict=True):
+        assert np.array_equal(solid.surface.vertices, was.surface.vertices)
+        assert np.array_equal(solid.surface.faces, was.surface.faces)
 
 
 @pytest.mark.parametrize("text", [None, "", "v 1 2 3\n", "solid of no kind\n"])

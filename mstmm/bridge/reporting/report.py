@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Sequence
 from html import escape
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -64,9 +64,7 @@ def _seen(view: View | None) -> str:
     """A strip of moments, and the page that moves inside this one."""
     if view is None:
         return ""
-    drawing = StringIO()
-    view.draw_strip(drawing, _MOMENTS)
-    strip = drawing.getvalue()
-    strip = strip[strip.index("<svg") :]
+    drawn = b64encode(view.picture(_MOMENTS)).decode("ascii")
+    strip = f'<img alt="the mechanism at {_MOMENTS} moments" src="data:image/png;base64,{drawn}"/>'
     moving = f'<iframe title="the run as it moves" srcdoc="{escape(view.html)}"></iframe>'
     return f'<div class="strip">{strip}</div>{moving}'

@@ -10,6 +10,7 @@ from mstmm.extras import missing
 from mstmm.ir.facts import effort_unit
 
 from ...engine.shown import BODY, HINGE, SUMS, acceleration_name, rate_unit
+from .. import meshes
 from ..flexible import dataset as flexible
 from ..owners.angles import EULER
 from . import provenance
@@ -40,7 +41,8 @@ def dataset(result: Record) -> Any:
         raise missing("io", "an xarray Dataset", error) from None
     found, labels = variables(result)
     found |= provenance.variables(result)
-    return xarray.Dataset(found, labels, provenance.attributes(result))
+    files = meshes.variables(result.model.scene, result.meshes)
+    return xarray.Dataset({**found, **files}, labels, provenance.attributes(result))
 
 
 Variable = tuple[tuple[str, ...], Any, dict[str, str]]

@@ -57,7 +57,7 @@ def shots_of(parts: Sequence[Part], whole: Stage, count: int) -> list[Shot]:
     return [Shot(flat, int(k), f"{what} = {whole.times[k]:.3g} {unit}") for k in some]
 
 
-def strip(shots: Sequence[Shot], file: Path | IO[str], kind: str, title: str = "") -> None:
+def strip(shots: Sequence[Shot], file: Path | IO[bytes], kind: str, title: str = "") -> None:
     """Pictures side by side, for papers; `kind` is png, svg or pdf."""
     shape = shots[0].flat.shape
     columns = _columns(len(shots), shape)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -18,17 +20,22 @@ from .stage import Solid
 _ROUND, _MOST = 32, 200_000
 
 
-def solid(shape: Shape, at: Vector, axes: Matrix, colour: Colour) -> Solid:
-    """A shape on an end that is at `at` (m) with `axes` (end to body) in the axes of its body."""
-    own = _surface(shape).placed(shape.position, np.array(shape.rotation))
+def solid(
+    shape: Shape, at: Vector, axes: Matrix, colour: Colour, kept: Mapping[str, bytes]
+) -> Solid:
+    """A shape on an end that is at `at` (m) with `axes` (end to body) in the axes of its body.
+
+    `kept`: contents of mesh files that came with the run, by path; others are read now.
+    """
+    own = _surface(shape, kept).placed(shape.position, np.array(shape.rotation))
     owner = "ground" if shape.is_on_ground else f"bodies/{shape.owner}"
     colour = colour if shape.color is None else _colour(shape.color)
     return Solid(owner, shape.name, own.placed(at, np.array(axes)), colour, shape.opacity)
 
 
-def _surface(shape: Shape) -> Surface:
+def _surface(shape: Shape, kept: Mapping[str, bytes]) -> Surface:
     if shape.type == "mesh":
-        return _mesh(shape)
+        return _mesh(shape, kept.get(shape.file or ""))
     if shape.size is not None:
         return box(shape.size)
     radius, length = shape.radius or 0.0, shape.length or 0.0
@@ -37,18 +44,21 @@ def _surface(shape: Shape) -> Surface:
     return (cylinder if shape.type == "cylinder" else capsule)(radius, length, _ROUND)
 
 
-def _mesh(shape: Shape) -> Surface:
-    """The triangles of a file.  SceneError for a file that is none, EnvironmentFailure without the
-    extra that reads it."""
+def _mesh(shape: Shape, content: bytes | None) -> Surface:
+    """The triangles of a file, or of what is known of its content.
+
+    SceneError for a file that is none, EnvironmentFailure without the extra that reads it.
+    """
     try:
         import trimesh
     except ImportError as error:
         raise missing("view", f'the mesh of shape "{shape.name}"', error) from None
     path = Path(shape.file or "")
-    if not path.is_file():
+    if content is None and not path.is_file():
         raise SceneError(f'shape "{shape.name}": file: there is no file "{path}"')
     try:
-        read = trimesh.load_mesh(str(path), process=False)
+        file = BytesIO(path.read_bytes() if content is None else content)
+        read = trimesh.load_mesh(file, file_type=path.suffix[1:].lower(), process=False)
         vertices, faces = np.array(read.vertices, dtype=float), np.array(read.faces)
     except Exception as error:  # whatever its readers make of a file that is none
         raise SceneError(

@@ -130,15 +130,17 @@ class _Staging:
 
     def _shapes(self) -> Iterator[Solid]:
         """Every shape of the scene: such a body is drawn by its shapes alone."""
+        kept = self.run.meshes
         for shape in self.scene.shape:
             if shape.is_on_ground:
-                yield shapes.solid(shape, (0.0, 0.0, 0.0), IDENTITY, hinges.GROUND)
+                yield shapes.solid(shape, (0.0, 0.0, 0.0), IDENTITY, hinges.GROUND, kept)
                 continue
             number = self.skeleton.bodies.find(shape.owner)
             assert number is not None
             body, end = self.skeleton.bodies[number], split(shape.on)[1]
             place, axes = body.end_position(end), body.end_rotation(end)
-            yield shapes.solid(shape, place, axes, _COLOURS[number % len(_COLOURS)])
+            colour = _COLOURS[number % len(_COLOURS)]
+            yield shapes.solid(shape, place, axes, colour, kept)
 
     def _bent(self) -> Iterator[Bent]:
         shaped = {shape.owner for shape in self.scene.shape}

@@ -6,9 +6,10 @@ import shutil
 from collections.abc import Sequence
 from functools import cached_property
 from html import escape
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from mstmm.arrays import whole
 from mstmm.errors import SceneError
@@ -83,9 +84,11 @@ class View:
                 film(shots_over(self.parts, self.stage), made)
                 shutil.copyfile(made, part)
 
-    def draw_strip(self, file: IO[str], moments: int = 6) -> None:
-        """The same strip as SVG into an open file."""
-        strip(shots_of(self.parts, self.stage, moments), file, "svg")
+    def picture(self, moments: int = 6) -> bytes:
+        """The same strip as a PNG in memory, which stays small where there is much to draw."""
+        drawn = BytesIO()
+        strip(shots_of(self.parts, self.stage, moments), drawn, "png")
+        return drawn.getvalue()
 
     def _repr_html_(self) -> str:
         return (
