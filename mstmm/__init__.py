@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from .runtime.result.result import Result
     from .scene import Scene
     from .scene.load import load_scene
+    from .scene.robots.export import export_robot
     from .scene.robots.files import import_robot
 
 #: Public name -> (module, name there).
@@ -51,6 +52,7 @@ _LAZY = {
     "Scene": (".scene", "Scene"),
     "load_scene": (".scene.load", "load_scene"),
     "import_robot": (".scene.robots.files", "import_robot"),
+    "export_robot": (".scene.robots.export", "export_robot"),
     "advise": (".bridge.advising", "advise"),
     "chart": (".bridge.charting", "chart"),
     "compile": (".bridge.compilation", "compile_scene"),
@@ -70,8 +72,8 @@ _LAZY = {
 __all__ = [
     "Advice", "Atlas", "Chart", "ElementError", "EnvironmentFailure", "ExpressionError", "Model",
     "MstmmError", "NumericalFailure", "Result", "RiskRefused", "Scene", "SceneError", "advise",
-    "chart", "compile", "equations", "generate_file", "import_robot", "load_result", "load_scene",
-    "register", "report", "stability",
+    "chart", "compile", "equations", "export_robot", "generate_file", "import_robot", "load_result",
+    "load_scene", "register", "report", "stability",
 ]  # fmt: skip
 
 

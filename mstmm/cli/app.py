@@ -13,6 +13,7 @@ from .cache import cache
 from .check import check
 from .demo import demo
 from .doctor import doctor
+from .export_robot import export_robot
 from .generate import generate
 from .import_robot import import_robot
 from .listing import list_elements
@@ -86,6 +87,7 @@ app.command("modes")(modes)
 app.command("frf")(frf)
 app.command("check")(check)
 app.command("import")(import_robot)
+app.command("export")(export_robot)
 app.command("list")(list_elements)
 app.command("show")(show)
 app.command("stability")(stability)

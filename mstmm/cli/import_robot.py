@@ -55,12 +55,12 @@ def import_robot(
         notes = [{"where": n.where, "element": n.element, "text": n.text} for n in found.notes]
         emit_json({"scene": str(target), "names": dict(found.names), "notes": notes})
         return
-    for line in _together(found.notes):
+    for line in together(found.notes):
         say(line)
     say(f"{target}: {found.scene.summary}")
 
 
-def _together(notes: Iterable[Note]) -> list[str]:
+def together(notes: Iterable[Note]) -> list[str]:
     """A line for each text, with what it is about."""
     about = defaultdict[str, list[str]](list)
     for note in notes:

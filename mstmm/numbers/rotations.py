@@ -148,6 +148,19 @@ def from_rpy(angles: Sequence[float]) -> Matrix:
     )
 
 
+def to_rpy(matrix: Matrix) -> Vector:
+    """(roll, pitch, yaw), rad, of a rotation matrix; at a pitch of a quarter turn with yaw 0.
+
+    Roll is found behind yaw and in its axes, so that the three give the matrix again near such a
+    pitch too, where each of them is nearly undetermined.
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, _, _) = matrix
+    yaw = math.atan2(yx, xx)
+    c, s = cos_sin(yaw)
+    roll = math.atan2(s * xz - c * yz, c * yy - s * xy)
+    return (roll, math.atan2(-zx, c * xx + s * yx), yaw)
+
+
 def from_orientation(orientation: Sequence[float]) -> Matrix:
     """Rotation matrix from three numbers (roll, pitch, yaw) or four (quaternion w, x, y, z)."""
     return from_rpy(orientation) if len(orientation) == 3 else from_quaternion(orientation)

@@ -1,4 +1,4 @@
-"""`mstmm import`: the scene it writes, and what it tells."""
+"""`mstmm import` and `mstmm export`: what they write, and what they tell."""
 
 from __future__ import annotations
 
@@ -35,3 +35,15 @@ def test_bad_input(mstmm: Command) -> None:
     assert done.code == 2 and "not valid XML" in done.err
     done = mstmm("import", "arm.urdf", "--base", "flying")
     assert done.code == 2 and 'expected "fixed" or "free"' in done.err
+
+
+def test_a_scene_becomes_a_robot_again(mstmm: Command) -> None:
+    Path("arm.urdf").write_text(ARM)
+    assert mstmm("import", "arm.urdf").code == 0
+    done = mstmm("export", "arm.toml", "-o", "again.urdf")
+    assert done.code == 0 and done.out.splitlines()[-1].startswith("again.urdf: 5 links")
+    assert mstmm("check", "again.urdf").code == 0
+    told = json.loads(mstmm("export", "arm.toml", "--json").out)
+    assert told["robot"] == "arm.urdf" and isinstance(told["notes"], list)
+    done = mstmm("export", "arm.toml", "-o", "arm.xml")
+    assert done.code == 2 and ".urdf" in done.err

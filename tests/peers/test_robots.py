@@ -14,7 +14,7 @@ import pytest
 import mstmm
 from mstmm.scene.robots.convert import Choices, Imported, converted
 from mstmm.scene.robots.mjcf import read_mjcf
-from peers.robot_pairs import Pair, apart, pairs
+from peers.robot_pairs import Pair, apart, imported, pairs, published
 
 #: Speeds of robots whose derivatives are compared: those of larger ones take long to prepare.
 MOST = 6
@@ -183,3 +183,30 @@ def test_what_mujoco_refuses_is_refused_in_one_message(tmp_path: Path) -> None:
     path.write_text(MACHINE)
     with pytest.raises(mstmm.SceneError, match="in MJCF a <freejoint> says so"):
         mstmm.import_robot(path, base="free")
+
+
+@pytest.mark.parametrize("name", ["ur5_robot.urdf", "panda.urdf", "go2.urdf"])
+def test_others_read_what_is_exported(name: str, rng: np.random.Generator) -> None:
+    """Pinocchio has the same accelerations from our file as from the published one; MuJoCo reads it
+    too."""
+    path = next(path for path in published() if path.name == name)
+    text = mstmm.export_robot(imported(path, "fixed").scene).text
+    first, again = pin.buildModelFromUrdf(str(path)), pin.buildModelFromXML(text)
+    q, v = pin.neutral(again), rng.uniform(-1, 1, again.nv)
+    at = pin.neutral(first)
+    places = [(first.getJointId(n), again.getJointId(n)) for n in list(first.names)[1:]]
+    at_v = np.zeros(first.nv)
+    for one, other in places:
+        angle = rng.uniform(-1, 1)
+        circle = np.array([np.cos(angle), np.sin(angle)])
+        for model, k, where in ((first, one, at), (again, other, q)):
+            width = model.nqs[k]
+            where[model.idx_qs[k] : model.idx_qs[k] + width] = circle if width == 2 else angle
+        at_v[first.idx_vs[one]] = v[again.idx_vs[other]]
+    wanted = pin.aba(first, first.createData(), at, at_v, np.zeros(first.nv))
+    found = pin.aba(again, again.createData(), q, v, np.zeros(again.nv))
+    for one, other in places:
+        assert found[again.idx_vs[other]] == pytest.approx(
+            wanted[first.idx_vs[one]], rel=1e-11, abs=1e-11 * np.abs(wanted).max()
+        )
+    assert mujoco.MjModel.from_xml_string(text).nv == again.nv

@@ -38,6 +38,9 @@ _KINDS = {
     )
 }  # fmt: skip
 _UNLIMITED = "continuous"
+#: Joints without limits -> those with; and a hinge's joint, without limits where there is one.
+LIMITED = {_UNLIMITED: "revolute"}
+BY_HINGE = {kind.hinge: kind for kind in _KINDS.values()}
 _READ = ("link", "joint", "material")
 _MATERIAL = "material"
 

@@ -1,0 +1,264 @@
+"""A scene -> a robot's file, with a note for everything of the scene that the file does not say."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ...errors import SceneError
+from ...numbers.pose import IN_PLACE, Pose
+from ...numbers.rotations import perpendicular, product, transpose
+from ..rules.values import GROUND
+from .robot import FIXED, Joint, Link, Look, Mimic, Note, Robot
+from .urdf import BY_HINGE
+from .urdf_text import as_urdf
+
+if TYPE_CHECKING:
+    from ..scene import Scene
+    from ..tables.body import Body
+    from ..tables.closures import Coupling
+    from ..tables.hinge import Hinge
+    from ..tables.outside.shape import Shape
+
+#: Tables of a scene of which a robot's file has nothing.
+_LEFT_OUT = (
+    "load", "spring", "bushing", "event", "input", "signal", "output", "controller",
+)  # fmt: skip
+#: Types of shapes that URDF draws.
+_DRAWN = ("box", "sphere", "cylinder", "mesh")
+#: What importers of URDF take for granted, m/s^2.
+_GRAVITY = (0.0, 0.0, -9.81)
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A robot's file as text, and notes on what it does not say of the scene."""
+
+    text: str
+    notes: tuple[Note, ...]
+    links: int
+    joints: int
+
+    @property
+    def summary(self) -> str:
+        """How much there is of what: 3 links, 2 joints."""
+        return f"{self.links} links, {self.joints} joints"
+
+
+def export_robot(scene: Scene, name: str = "robot") -> Exported:
+    """The URDF of a scene: a tree of rigid bodies on the joints that URDF has.
+
+    Each body is a link whose axes are those of the end that holds it, each further end a link on a
+    fixed joint; damping, Coulomb's friction, stops (without their stiffness), couplings of two
+    joints and shapes go along.  What else acts in the scene is left out, with a note.
+
+    Raises SceneError for closed loops, flexible bodies, bodies of users' types and hinges that URDF
+    does not have.
+    """
+    found = _Reader(scene).robot(name)
+    return Exported(as_urdf(found), found.notes, len(found.links), len(found.joints))
+
+
+class _Reader:
+    """Links and joints of a scene."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.notes = scene, list[Note]()
+        _refuse(scene)
+        self.bodies = {body.name: body for body in scene.bodies}
+        self.world = "world" if "world" not in self.bodies else GROUND
+        held = {hinge.outboard_body: hinge.outboard_end for hinge in scene.hinges}
+        #: Axes of a body's link in those of the body.
+        self.frames = {name: _end(body, held.get(name, "")) for name, body in self.bodies.items()}
+        #: Ends that are not the place of a joint alone.
+        self.ends = [
+            (body.name, end) for body in scene.bodies for end in body.ends
+            if end != held.get(body.name) and not self._is_of_joint(body.name, end)
+        ]  # fmt: skip
+        self._once = Counter([*self.bodies, *(end for _, end in self.ends)])
+
+    def robot(self, name: str) -> Robot:
+        ends = [self._end_link(*one) for one in self.ends]
+        links = (Link(self.world), *map(self._link, self.bodies.values()), *(x for x, _ in ends))
+        joints = (*map(self._joint, self.scene.hinges), *(joint for _, joint in ends))
+        mimics = tuple(x for one in self.scene.coupling if (x := self._mimic(one)))
+        looks = tuple(self._look(shape) for shape in self.scene.shape if self._is_drawn(shape))
+        self._tell_rest()
+        return Robot(name, name, links, joints, mimics, looks, tuple(self.notes))
+
+    def _note(self, element: str, text: str) -> None:
+        self.notes.append(Note("scene", element, text))
+
+    def _is_of_joint(self, body: str, end: str) -> bool:
+        """Whether an end has the name of the hinge that it is the place of, as importing leaves."""
+        return any(h.name == end and h.inboard == f"{body}.{end}" for h in self.scene.hinges)
+
+    def _in_link(self, body: str, pose: Pose) -> Pose:
+        """A frame of a body in the axes of its link."""
+        frame = self.frames[body]
+        return pose if frame == IN_PLACE else frame.inverse.then(pose)
+
+    def _link(self, body: Body) -> Link:
+        frame, inertia = self.frames[body.name], body.inertia_matrix
+        center = self._in_link(body.name, Pose(body.center_of_mass)).position
+        if frame.rotation != IN_PLACE.rotation:
+            inertia = product(product(transpose(frame.rotation), inertia), frame.rotation)
+        return Link(body.name, body.mass, center, inertia)
+
+    def _end_link(self, body: str, end: str) -> tuple[Link, Joint]:
+        name = end if self._once[end] == 1 and end != self.world else f"{body}_{end}"
+        pose = self._in_link(body, _end(self.bodies[body], end))
+        return Link(name), Joint(self._free_name(f"{name}_fixed"), FIXED, body, name, pose)
+
+    def _free_name(self, name: str) -> str:
+        """One that no hinge has."""
+        taken = {hinge.name for hinge in self.scene.hinges}
+        while name in taken:
+            name += "_"
+        return name
+
+    def _joint(self, hinge: Hinge) -> Joint:
+        turned = Pose(rotation=hinge.rotation)
+        if hinge.inboard_body == GROUND:
+            parent, pose = self.world, Pose(hinge.position).then(turned)
+        else:
+            parent = hinge.inboard_body
+            pose = self._in_link(parent, _end(self.bodies[parent], hinge.inboard_end)).then(turned)
+        self._tell_hinge(hinge)
+        return Joint(hinge.name, hinge.type, parent, hinge.outboard_body, pose, _keys(hinge))
+
+    def _tell_hinge(self, hinge: Hinge) -> None:
+        facts, element = hinge.facts, f"hinge {hinge.name!r}"
+        assert facts is not None
+        one = len(facts.speeds) == 1
+        laws = hinge.law.entries()
+        lost = {
+            "stiffness": any(law.stiffness for law in laws),
+            "efforts": any(not law.effort.is_zero for law in laws),
+            "inertia of its drive": any(law.inertia for law in laws),
+            "drive": hinge.drive is not None,
+            "release": hinge.release is not None,
+            "damping": not one and any(law.damping for law in laws),
+            "friction": not one and any(law.friction.acts for law in laws),
+            "stiffness of its stops": any(law.limits.acts for law in laws),
+            "start": hinge.initial is not None and (
+                hinge.initial.q != facts.start or any(hinge.initial.u or ())
+            ),
+            "direction of x": hinge.unit_axis2 is not None
+            and hinge.unit_axis2 != perpendicular(hinge.unit_axis),
+        }  # fmt: skip
+        if names := [name for name, is_lost in lost.items() if is_lost]:
+            self._note(element, f"left out: {', '.join(names)}")
+
+    def _mimic(self, coupling: Coupling) -> Mimic | None:
+        """One joint that goes with another; None, with a note, for other couplings."""
+        found = _line(coupling)
+        if found is None:
+            self._note(f"coupling {coupling.name!r}", "left out: no joint that goes with another")
+        return found
+
+    def _is_drawn(self, shape: Shape) -> bool:
+        if shape.type not in _DRAWN:
+            self._note(f"shape on {shape.on!r}", f"left out: URDF has no {shape.type}")
+        return shape.type in _DRAWN
+
+    def _look(self, shape: Shape) -> Look:
+        pose = Pose(shape.position, shape.rotation)
+        keys = {
+            key: value for key in ("type", "size", "radius", "length", "file", "scale", "color")
+            if (value := getattr(shape, key)) is not None
+        }  # fmt: skip
+        body, _, end = shape.on.partition(".")
+        if body == GROUND:
+            return Look(self.world, pose, keys)
+        return Look(body, self._in_link(body, _end(self.bodies[body], end)).then(pose), keys)
+
+    def _tell_rest(self) -> None:
+        for table in _LEFT_OUT:
+            if count := len(getattr(self.scene, table)):
+                self._note(
+                    f"[[{table}]]", f"left out, {count} of them" if count > 1 else "left out"
+                )
+        if self.scene.gravity != _GRAVITY:
+            self._note("gravity", "left out; readers of URDF take 9.81 m/s^2 against z")
+
+
+def _refuse(scene: Scene) -> None:
+    """SceneError for what no note could make good."""
+    if scene.beam or scene.elastic:
+        one = (*scene.beam, *scene.elastic)[0]
+        raise SceneError(
+            f'"{one.name}": URDF has rigid bodies alone; export the scene with rigid ones'
+        )
+    for body in scene.bodies:
+        if body.type != "rigid":
+            raise SceneError(
+                f'body "{body.name}": URDF has no body of type {body.type}; make it rigid'
+            )
+    if scene.constraint:
+        raise SceneError("[[constraint]]: URDF has no loops; leave the constraints out first")
+    held = Counter(hinge.outboard_body for hinge in scene.hinges)
+    for hinge in scene.hinges:
+        if hinge.type not in BY_HINGE:
+            raise SceneError(
+                f'hinge "{hinge.name}": URDF has no joint like a {hinge.type} hinge; write pins '
+                "and slides in a row, with bodies without mass between them"
+            )
+        if held[hinge.outboard_body] > 1:
+            raise SceneError(
+                f'hinge "{hinge.name}" closes a loop, which URDF has not; leave it out first'
+            )
+
+
+def _end(body: Body, end: str) -> Pose:
+    return Pose(body.end_position(end), body.end_rotation(end)) if end else IN_PLACE
+
+
+def _keys(hinge: Hinge) -> dict[str, Any]:
+    """The axis, and of the law what URDF has."""
+    kind, facts = BY_HINGE[hinge.type], hinge.facts
+    keys: dict[str, Any] = {kind.axis: hinge.unit_axis} if kind.axis else {}
+    if facts is None or len(facts.speeds) != 1:
+        return keys
+    entry = hinge.law.entry(0)
+    limits = (entry.limits.lower, entry.limits.upper)
+    law: dict[str, Any] = {"damping": entry.damping} if entry.damping else {}
+    if entry.friction.acts:
+        law["friction"] = {"coulomb": entry.friction.coulomb}
+    if entry.limits.acts:
+        law["limits"] = dict(zip(("lower", "upper"), limits, strict=True))
+    return keys | {"law": law}
+
+
+def _line(coupling: Coupling) -> Mimic | None:
+    """q_1 = m q_2 + b of a row that is linear in two coordinates; None for others."""
+    names, equals = list(_coordinates(coupling)), coupling.equals
+    if coupling.expression is None or len(names) != 2 or (equals is not None and equals.names):
+        return None
+    if equals is None:
+        return None
+    row = coupling.expression
+
+    def at(a: float, b: float) -> float:
+        given = dict(zip(names, (a, b), strict=True))
+        return row.evaluate(lambda name: given[name.text.partition(".")[0]])
+
+    zero = at(0.0, 0.0)
+    a, b = at(1.0, 0.0) - zero, at(0.0, 1.0) - zero
+    straight = all(
+        abs(at(x, y) - (zero + a * x + b * y)) <= 1e-12 * (abs(zero) + abs(a * x) + abs(b * y))
+        for x, y in ((2.5, -1.25), (-0.7, 3.1), (11.0, 17.0))
+    )
+    if not straight or a == 0 or b == 0:
+        return None
+    return Mimic(names[0], names[1], -b / a, ((equals.constant or 0.0) - zero) / a)
+
+
+def _coordinates(coupling: Coupling) -> Iterator[str]:
+    """Hinges of one coordinate that a row names."""
+    for name in coupling.row.names:
+        hinge, _, what = name.text.partition(".")
+        if what == "q":
+            yield hinge

@@ -1,0 +1,141 @@
+"""Scenes as URDF: what comes back is the scene, and what URDF does not say is told or refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mstmm
+from mstmm.numbers.rotations import from_rpy, to_rpy
+from robots.test_urdf import ARM, written
+
+HINGES: tuple[dict[str, Any], ...] = (
+    {"name": "mast", "type": "pin", "inboard": "ground", "position": [0.1, 0.2, 0.3],
+     "orientation": [0.3, -0.4, 0.5], "axis": [1, 2, 2], "law": {"damping": 0.3}},
+    {"name": "boom", "type": "prismatic", "inboard": "part0.far", "axis": [0, 1, 1],
+     "orientation": [0.1, 0.2, 0.7]},
+    {"name": "ball", "type": "ball", "inboard": "part1.far", "orientation": [-1, 0.2, 0.1]},
+    {"name": "bolt", "type": "fixed", "inboard": "part2", "orientation": [0.2, 0, 0]},
+    {"name": "wheel", "type": "pin", "inboard": "part3.far", "axis": [1, 0, 0],
+     "law": {"friction": {"coulomb": 0.2},
+             "limits": {"lower": -1.0, "upper": 0.5, "stiffness": 1e3}}},
+    {"name": "balloon", "type": "free", "inboard": "ground", "position": [0, 3, 0]},
+)  # fmt: skip
+
+
+def scene(**more: Any) -> mstmm.Scene:
+    """One hinge of each kind; every other body is held by an end that is turned."""
+    bodies = [
+        {"name": f"part{k}", "mass": 1 + k, "center_of_mass": [0.1, 0.02 * k, 0.3],
+         "inertia": [0.3, 0.4, 0.5, 0.01, -0.02, 0.03],
+         "ends": {"far": {"position": [0.1, 0, 0.5 + k], "orientation": [0.1 * k, 0.3, 0.2]},
+                  "grip": {"position": [0.1, -0.2, 0.05], "orientation": [0.4, 0.5, 0.6 + k]}}}
+        for k in range(len(HINGES))
+    ]  # fmt: skip
+    held = [hinge | {"outboard": f"part{k}{'.grip' if k % 2 else ''}"}
+            for k, hinge in enumerate(HINGES)]  # fmt: skip
+    return mstmm.Scene(**{"gravity": [0, 0, -9.81], "body": bodies, "hinge": held} | more)
+
+
+def back(one: mstmm.Scene, folder: Path, **choices: Any) -> Any:
+    (folder / "back.urdf").write_text(mstmm.export_robot(one).text)
+    return mstmm.import_robot(folder / "back.urdf", merge=False, **choices)
+
+
+def test_a_scene_comes_back_and_moves_alike(tmp_path: Path, rng: np.random.Generator) -> None:
+    one = scene()
+    found = back(one, tmp_path, stops=1e3)
+    ours, again = mstmm.compile(one), mstmm.compile(found.scene)
+    assert ours.layout.hinges.keys() <= again.layout.hinges.keys()
+    q, u = rng.uniform(-0.7, 0.7, (40, ours.nq)), rng.uniform(-1, 1, (40, ours.nu))
+    there_q, there_u = np.zeros((40, again.nq)), np.zeros((40, again.nu))
+    places = list[tuple[slice, slice]]()
+    for name, slots in ours.layout.hinges.items():
+        other = again.layout.hinges[name]
+        if slots.nq >= 4:
+            turn = q[:, slots.q + slots.nq - 4 : slots.q + slots.nq]
+            turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+        there_q[:, other.q_slice], there_u[:, other.u_slice] = (
+            q[:, slots.q_slice],
+            u[:, slots.u_slice],
+        )
+        places.append((slots.u_slice, other.u_slice))
+    wanted, got = ours.accelerations(q, u), again.accelerations(there_q, there_u)
+    for mine, other_place in places:
+        assert got[:, other_place] == pytest.approx(wanted[:, mine], rel=1e-12, abs=1e-11)
+    runs = (x.simulate(0.0, initial=(a[0], b[0]))
+            for x, a, b in ((ours, q, u), (again, there_q, there_u)))  # fmt: skip
+    mine_run, other_run = runs
+    frame = other_run.position(found.links["part4_far"])
+    assert frame == pytest.approx(mine_run.position("part4.far"), abs=1e-13)
+
+
+def test_a_robots_file_comes_back_as_the_same_scene(tmp_path: Path) -> None:
+    first = mstmm.import_robot(written(tmp_path, ARM), stops=1e4)
+    exported = mstmm.export_robot(first.scene)
+    (tmp_path / "again.urdf").write_text(exported.text)
+    again = mstmm.import_robot(tmp_path / "again.urdf", stops=1e4)
+    assert [one.name for one in again.scene.hinge] == [one.name for one in first.scene.hinge]
+    assert again.tables["coupling"] == first.tables["coupling"]
+    assert again.tables["shape"] == [
+        {**shape, **{key: pytest.approx(shape[key]) for key in ("position", "orientation")
+                     if key in shape}} for shape in first.tables["shape"]
+    ]  # fmt: skip
+    ours, theirs = mstmm.compile(first.scene), mstmm.compile(again.scene)
+    q, u = ours.initial_state()
+    assert theirs.accelerations(q, u + 0.1) == pytest.approx(
+        ours.accelerations(q, u + 0.1), rel=1e-12
+    )
+    told = [f"{note.element}: {note.text}" for note in exported.notes]
+    assert "hinge 'shoulder_1': left out: stiffness of its stops" in told
+
+
+def test_what_urdf_does_not_say_is_told() -> None:
+    changed = [dict(hinge) for hinge in scene().model_dump(mode="json")["hinge"]]
+    changed[0] |= {"law": {"stiffness": 4.0, "effort": "2*t", "inertia": 0.1},
+                   "initial": {"q": [0.2], "u": [0.0]}}  # fmt: skip
+    more = {"gravity": [0, -9.81, 0], "hinge": changed,
+            "load": [{"on": "part0", "force": [1, 0, 0]}],
+            "shape": [{"on": "part1.far", "type": "capsule", "radius": 0.1, "length": 1}],
+            "coupling": [{"name": "cam", "expression": "mast.q^2 - boom.q", "equals": 0.04}],
+            }  # fmt: skip
+    told = [f"{note.element}: {note.text}" for note in mstmm.export_robot(scene(**more)).notes]
+    assert told[0] == ("hinge 'mast': left out: stiffness, efforts, inertia of its drive, start")
+    for part in ("coupling 'cam'", "shape on 'part1.far'", "[[load]]", "gravity"):
+        assert any(line.startswith(f"{part}: left out") for line in told), part
+
+
+BAR = {"name": "bar", "mass": 1.0, "ends": {"tip": [1, 0, 0]}}
+PIN = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "bar"}
+
+
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        ({"hinge": [PIN, PIN | {"name": "other", "outboard": "bar.tip"}]}, "closes a loop"),
+        ({"hinge": [PIN | {"type": "cylindrical"}]}, "no joint like a cylindrical hinge"),
+        ({"hinge": [PIN], "constraint": [
+            {"type": "distance", "from": "ground", "to": "bar.tip", "length": 1.0}
+        ]}, "URDF has no loops"),
+        ({"body": [], "hinge": [PIN], "beam": [
+            {"name": "bar", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 10.0}
+        ]}, "rigid bodies alone"),
+    ],
+)  # fmt: skip
+def test_what_urdf_cannot_say_is_refused(tables: dict[str, Any], message: str) -> None:
+    with pytest.raises(mstmm.SceneError, match=message):
+        mstmm.export_robot(mstmm.Scene(**{"gravity": [0, 0, -9.81], "body": [BAR]} | tables))
+
+
+def test_three_angles_give_the_rotation_again(rng: np.random.Generator) -> None:
+    quarter = np.pi / 2
+    near = [[a, quarter + 10.0**-k, b] for a in (0.3, -2.0) for b in (1.0, 3.0) for k in range(17)]
+    for angles in (*rng.uniform(-4, 4, (200, 3)), *near):
+        matrix = from_rpy(angles.tolist() if hasattr(angles, "tolist") else angles)
+        assert np.array(from_rpy(to_rpy(matrix))) == pytest.approx(np.array(matrix), abs=1e-15)
+    for whole in np.ndindex(4, 4, 4):
+        matrix = from_rpy([quarter * k for k in whole])
+        assert from_rpy(to_rpy(matrix)) == matrix
