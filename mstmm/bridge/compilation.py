@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -37,7 +37,7 @@ def compile_scene(
     accuracy: float = 1e-8,
     bake: bool = False,
     flexibility: str | None = None,
-    simplify: bool | Collection[str] = True,
+    simplify: bool | Collection[str] | Mapping[str, bool | float] = True,
 ) -> Model:
     """Model of a scene, ready to compute.
 
@@ -59,8 +59,9 @@ def compile_scene(
         flexibility: level of model of all flexible bodies: "coupled", "one-way" (they are rigid in
             the run, then respond elastically to its motion and loads) or "rigid"; None takes each
             body's own `model`.
-        simplify: what may be packed otherwise than the scene says it, without changing what it
-            does: True (all of it), False, or some of "welds" (rigid bodies on fixed hinges as one).
+        simplify: what may be packed otherwise than the scene says it: True ("welds"), False, or
+            some of "welds" (rigid bodies on fixed hinges as one) and "turns" (orientations within
+            1e-11 rad of quarter turns are these; {"turns": 1e-5} with another tolerance).
             `model.simplifications` tells what was done.
 
     Raises SceneError for hinges that do not form a tree, types that nobody defines, and masses that
@@ -84,7 +85,7 @@ def compile_level(
     accuracy: float = 1e-8,
     bake: bool = False,
     flexibility: str | None = None,
-    simplify: bool | Collection[str] = True,
+    simplify: bool | Collection[str] | Mapping[str, bool | float] = True,
 ) -> Model:
     """The same of a scene at a lower level of model, which may lack what an output is of: its
     results do not have that output."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from mstmm.errors import NumericalFailure, SceneError
@@ -32,7 +33,7 @@ def compiled(
     sweep: str = "riccati",
     engine: str = "auto",
     flexibility: str | None = None,
-    simplify: bool = True,
+    simplify: bool | Mapping[str, bool | float] = True,
 ) -> Model:
     """The model of a scene file.
 

@@ -15,8 +15,8 @@ from ..pack import parameters as named_parameters
 from ..pack import product
 from ..pack.elements import Known
 from ..pack.layout import Layout
-from ..pack.merge.simplification import Simplification
-from ..pack.pack import pack, unsimplified
+from ..pack.merge.simplification import NOTHING, Simplification, Words
+from ..pack.pack import pack, unmerged
 from ..pack.packed import Packed, resize
 from .code import Fusing, NotFused
 from .engine import Engine
@@ -29,7 +29,7 @@ from .slopes import Slopes
 
 #: What a scene is compiled with: fused code, accuracy of the plain product, whether the sweep is
 #: that of least squares, and what may be simplified.
-Asked = tuple[Callable[[Packed, Known], Fusing] | None, float | None, bool, tuple[str, ...]]
+Asked = tuple[Callable[[Packed, Known], Fusing] | None, float | None, bool, Words]
 
 
 class Compiled:
@@ -50,11 +50,11 @@ class Compiled:
         fusing: Callable[[Packed, Known], Fusing] | None = None,
         product_accuracy: float | None = None,
         least_squares: bool = False,
-        simplify: tuple[str, ...] = (),
+        simplify: Words = NOTHING,
     ) -> None:
         self.scene = scene
         self._fusing, self._product_accuracy = fusing, product_accuracy
-        self._simplify = simplify if product_accuracy is None else ()
+        self._simplify = simplify if product_accuracy is None else NOTHING
         self.looped = Engine(
             pack(scene, known, product_accuracy, least_squares=least_squares,
                  simplify=self._simplify)
@@ -82,9 +82,9 @@ class Compiled:
 
     @cached_property
     def apart(self) -> Engine:
-        """The looped engine on the scene as it is described, nothing of it simplified: for what is
-        asked of a body or a hinge that is part of another one."""
-        packed = unsimplified(self.packed)
+        """The looped engine with every body by itself: for what is asked of a body or a hinge that
+        is part of another one."""
+        packed = unmerged(self.packed)
         if packed is self.packed:
             return self.looped
         engine = Engine(packed)

@@ -13,7 +13,7 @@ from ..flexible.modal_body import ModalBody
 from .elements import Elements
 from .flexible.expansion import Expanded
 from .layout import Layout
-from .merge.simplification import Simplification
+from .merge.simplification import Simplification, Words
 from .placement import Placement
 
 
@@ -34,6 +34,7 @@ class Frames:
     hinge_position: Mapping[str, int]
     expanded: Expanded
     simplified: tuple[Simplification, ...]  #: what is packed otherwise than it is described
+    simplify: Words  #: what was to be
 
     @property
     def described(self) -> Scene:

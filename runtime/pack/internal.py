@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from mstmm.expression.expression import Expression
@@ -30,7 +31,8 @@ from .loops.curves import elements_of
 from .loops.opened import opened
 from .loops.unknown import refuse_beside_bending
 from .merge.carried import Carried, carried_in, contracted
-from .merge.simplification import WELDS
+from .merge.simplification import NOTHING, TURNS, WELDS, Simplification, Words
+from .merge.turns import with_exact_turns
 from .slots import layout_of
 from .system import Held, LoadNumbers, Numbers, System
 from .values import MOVING, Values, drive_kernel
@@ -65,7 +67,7 @@ def system_of(
     align: bool = True,
     flexible: Mapping[str, ModalBody] | None = None,
     moving: Mapping[int, Any] | None = None,
-    simplify: Collection[str] = (),
+    simplify: Words = NOTHING,
 ) -> tuple[System, Frames]:
     """The numbers of a scene, and where everything lies; `known` are elements beyond the prebuilt.
 
@@ -76,7 +78,7 @@ def system_of(
 
     Raises SceneError for hinges that do not form a tree or types that nobody defines.
     """
-    expanded = expansion_of(scene, flexible)
+    expanded, told = _with_exact_turns(expansion_of(scene, flexible), simplify)
     elements = Elements({**(known or {}), **elements_of(scene.constraint)})
     nodes, tree = expanded.scene, build(expanded.scene)
     carried = carried_in(expanded, tree) if WELDS in simplify else Carried()
@@ -88,7 +90,7 @@ def system_of(
     frames = Frames(
         nodes, tree, layout, elements, releases, Lookup(nodes.bodies, bodies.placement),
         Lookup(nodes.bodies, tree.place_of_body), Lookup(nodes.hinges, tree.place_of_hinge),
-        expanded, tuple(carried.told(nodes)),
+        expanded, (*carried.told(nodes), *told), simplify,
     )  # fmt: skip
     ports = [Port(MOVING, (1 + max(moving),))] if moving else []
     driven, values = list(_driven(nodes, tree)), Values(layout, ports)
@@ -107,6 +109,13 @@ def system_of(
         couplings, coupled,
     )  # fmt: skip
     return system, frames
+
+
+def _with_exact_turns(expanded: Expanded, simplify: Words) -> tuple[Expanded, list[Simplification]]:
+    scene, told = expanded.scene, list[Simplification]()
+    if TURNS in simplify:
+        scene, told = with_exact_turns(scene, simplify[TURNS])
+    return (replace(expanded, scene=scene) if told else expanded), told
 
 
 def _held(scene: Scene, first: int) -> Held:

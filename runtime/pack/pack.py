@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import fields, replace
 
 from mstmm.scene import Scene
@@ -13,6 +13,7 @@ from . import product, qr
 from .elements import Known
 from .frames import Frames
 from .internal import system_of
+from .merge.simplification import NOTHING, WELDS, Words
 from .packed import Packed, resize
 from .records.model import write
 from .system import System
@@ -26,7 +27,7 @@ def pack(
     least_squares: bool = False,
     align: bool = True,
     flexible: Mapping[str, ModalBody] | None = None,
-    simplify: Collection[str] = (),
+    simplify: Words = NOTHING,
 ) -> Packed:
     """Engine arrays of a scene; as `system_of`.
 
@@ -43,12 +44,14 @@ def pack(
     return packed
 
 
-def unsimplified(packed: Packed) -> Packed:
-    """The same with everything as it is described, under the same inputs; states and memory are
-    the same."""
-    if not packed.simplified:
+def unmerged(packed: Packed) -> Packed:
+    """The same with every body by itself, under the same inputs; states and memory are the same."""
+    if not any(one.kind == WELDS for one in packed.simplified):
         return packed
-    system, frames = system_of(packed.described, packed.elements.known, flexible=packed.modal)
+    words = {word: given for word, given in packed.simplify.items() if word != WELDS}
+    system, frames = system_of(
+        packed.described, packed.elements.known, flexible=packed.modal, simplify=words
+    )
     now = packed.system
     both = zip(system.couplings, now.couplings, strict=True)
     same = replace(

@@ -165,6 +165,11 @@ def simulate(
         typer.Option("--simplify/--no-simplify", help="Pack bodies on fixed hinges as one with "
                      "what holds them, which changes no result."),
     ] = True,
+    turns: Annotated[
+        float | None,
+        typer.Option("--turns", metavar="X", parser=not_negative, help="Take orientations within "
+                     "so many rad of quarter turns as these."),
+    ] = None,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Simulate a scene and save the result; Ctrl-C keeps what was computed."""
@@ -174,7 +179,7 @@ def simulate(
         None if plot is None else output_file(plot, PICTURES, "--plot"),
         tuple(quantity or ()), certify, resume, sweep, engine, flexibility, accuracy,
         max_step or 0.0, radius, scheme, iterations, tangent, error, tuple(of or ()),
-        on_risk, tuple(inputs or ()), simplify,
+        on_risk, tuple(inputs or ()), simplify, turns or 0.0,
     )  # fmt: skip
     refuse_endless(plan)
     refuse_beside_error(plan)
@@ -215,7 +220,8 @@ def _model(plan: Plan) -> Model:
     scene, level = mstmm.load_scene(plan.scene), plan.flexibility
     if plan.inputs:
         scene = with_inputs(scene, plan.inputs)
-    model = compiled(plan.scene, scene, plan.sweep, plan.engine, level, plan.simplify)
+    words = {"welds": plan.simplify, "turns": plan.turns}
+    model = compiled(plan.scene, scene, plan.sweep, plan.engine, level, words)
     if plan.quantities:
         start = model.simulate(t_end=0.0, method="dop853")
         pictures = start.pictures()

@@ -48,6 +48,7 @@ class Plan:
     on_risk: str = "warn"
     inputs: tuple[str, ...] = ()
     simplify: bool = True
+    turns: float = 0.0
 
     @property
     def resumable(self) -> bool:

@@ -19,7 +19,7 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
 from ...pack.loops.variants import by_hinges, geometric
-from ...pack.pack import packed_system, unsimplified
+from ...pack.pack import packed_system, unmerged
 from ..engine import Engine
 from .calls import LoopCalls
 from .stress import not_unique
@@ -100,7 +100,7 @@ def _way(calls: LoopCalls, change: Array) -> float:
 def judging(engine: Engine, q: Array) -> LoopCalls:
     """Of the scene in the metric of its hinges, with the mobilities of bodies all alike; of all
     hinges, those too that weld bodies packed as one."""
-    packed = unsimplified(engine.packed)
+    packed = unmerged(engine.packed)
     mobility = LoopCalls(Engine(packed_system(geometric(packed.system), packed)), q).mobility
     slides = {
         packed.hinge_position[hinge.name]: hinge.facts.slides

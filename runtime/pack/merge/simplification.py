@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
+from mstmm.arrays import real
 from mstmm.errors import SceneError
 
-#: Rigid bodies on fixed hinges are packed as one.
-WELDS = "welds"
+#: Rigid bodies on fixed hinges are packed as one; orientations near quarter turns are exact.
+WELDS, TURNS = "welds", "turns"
 
 #: Kind -> what is counted of it, one and many, and what becomes of them.
-COUNTED = {WELDS: ("body", "bodies", "on fixed hinges packed as part of what holds them")}
-#: All that can be asked for.
-ALL = tuple(COUNTED)
+COUNTED = {
+    WELDS: ("body", "bodies", "on fixed hinges packed as part of what holds them"),
+    TURNS: ("orientation", "orientations", "within a tolerance of quarter turns taken as these"),
+}
+#: Word -> whether it is done, or up to which tolerance.
+Words = Mapping[str, bool | float]
+#: What a word means by itself.  Orientations may be off by so many rad: files write quarter turns
+#: as 1.57079632679, which is off by 4.9e-12.
+_ALONE: Words = {WELDS: True, TURNS: 1e-11}
+#: What is done where nothing is asked, and nothing at all.  Turns change results by as much as an
+#: orientation is off, so that they have to be asked for.
+USUAL: Words = {WELDS: True}
+NOTHING: Words = {}
+#: The largest tolerance, rad.
+_MOST = 0.01
 
 
 @dataclass(frozen=True)
@@ -21,8 +34,8 @@ class Simplification:
     """One thing that is packed otherwise.
 
     Attributes:
-        kind: the word that switches it on: "welds".
-        elements: names of the hinges and bodies concerned.
+        kind: the word that switches it on: "welds" or "turns".
+        elements: names of the hinges, bodies and ends concerned.
         text: what was done, and why.
     """
 
@@ -34,15 +47,24 @@ class Simplification:
         return self.text
 
 
-def asked_for(simplify: bool | Collection[str]) -> tuple[str, ...]:
+def asked_for(simplify: bool | Collection[str] | Words) -> Words:
     """The words that an option means; SceneError for others."""
     if isinstance(simplify, bool):
-        return ALL if simplify else ()
-    words = (simplify,) if isinstance(simplify, str) else tuple(simplify)
+        return USUAL if simplify else NOTHING
+    words = [simplify] if isinstance(simplify, str) else list(simplify)
     for word in words:
-        if word not in ALL:
+        if word not in _ALONE:
             raise SceneError(
                 f"simplify: {word!r} is not known; expected True, False, or some of: "
-                + ", ".join(ALL)
+                + ", ".join(_ALONE)
             )
-    return words
+    if not isinstance(simplify, Mapping):
+        return {word: _ALONE[word] for word in words}
+    found = {word: _ALONE[word] if given is True else given for word, given in simplify.items()}
+    turns = real("simplify: turns", found.get(TURNS) or 0.0)
+    if not 0 <= turns <= _MOST:
+        raise SceneError(
+            f"simplify: turns = {turns!r}: expected an angle from 0 to {_MOST} rad, or True for "
+            f"{_ALONE[TURNS]:g}"
+        )
+    return {word: given for word, given in found.items() if given}
