@@ -9,13 +9,15 @@ equilibrium or a linear model asks for is R and its tangent, eliminated from the
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from mstmm.arrays import Array, Integers
 from mstmm.errors import SceneError
+
+from .across import across_of
 
 if TYPE_CHECKING:
     from .engine import Engine
@@ -39,9 +41,10 @@ class Tangent:
         self.workspace = np.zeros(packed.workspace)
         self.numbers = np.zeros(max(1, _laid(engine)))
         self.work = np.zeros(engine.lib.mstmm_tangent_work(model, slopes.slots))
-        self.couplings, self.coupled = _couplings(engine)
-        self.answers = np.zeros(max(1, self.coupled * self.nu))
-        self.closure = np.zeros(self.coupled * (self.coupled + 3) + 1)
+        across = across_of(engine)
+        self.couplings, self.coupled = across.written(engine), across.count
+        self.answers = np.zeros(max(1, len(across.passes) * self.nu))
+        self.closure = np.zeros(self.coupled * (across.width + 4) + 1)
         self.record = record = ffi.new("mstmm_tangent *")
         record.model, record.slots = model, slopes.slots
         record.couplings, record.n_coupled = self.couplings[0], self.coupled
@@ -177,59 +180,6 @@ def count_negative(pivots: Array, sizes: Integers) -> Integers:
         blocks = pivots[:, places].reshape(len(pivots), -1, n, n)
         values = np.linalg.eigvalsh(blocks) if n > 1 else blocks
         found += (values < 0).reshape(len(pivots), -1).sum(axis=1)
-    return found
-
-
-def _couplings(engine: Engine) -> tuple[list[Any], int]:
-    """The record of what reaches across the tree with what keeps it, and how many numbers it is."""
-    ffi, reach, rows = engine.ffi, engine.packed.written.reach, _rows_of_loops(engine)
-    record, efforts = ffi.new("mstmm_couplings *"), list(_efforts(engine))
-    kept = [record]
-    for name, kind, numbers in (
-        ("bodies", "int[]", list(reach.across)), ("efforts", "int64_t[]", [e for e, _ in efforts]),
-        ("speeds", "int[]", [speed for _, speed in efforts]),
-    ):  # fmt: skip
-        array = ffi.new(kind, numbers or [0])
-        kept.append(array)
-        setattr(record, name, array)
-    kept.append(ffi.new("mstmm_coupled_row[]", rows or [(0, 0, -1, -1)]))
-    record.rows = kept[-1]
-    record.n_bodies, record.n_efforts = len(reach.across), len(efforts)
-    record.n_rows = len(rows)
-    return kept, 6 * len(reach.across) + len(efforts) + len(rows)
-
-
-def _efforts(engine: Engine) -> Iterator[tuple[int, int]]:
-    """(place in the workspace, speed) of efforts that expressions of the state and couplings give,
-    these for hinges of the tree."""
-    packed, lib, model = engine.packed, engine.lib, engine.packed.model
-    values = packed.scratch + engine.nq + engine.nu
-    for value, speed in packed.written.reach.efforts:
-        yield values + value, speed
-    first, loops = packed.system.places["u"], packed.written.loops
-    frames = {one.frame for one in packed.system.closures}
-    coupled = {place for one in loops.couplings for place in one.columns} if loops else set()
-    for place in sorted(coupled - frames):
-        body = model.bodies[place]
-        at = body.block + lib.MSTMM_BLOCK_FIXED + lib.MSTMM_SPEED_TAU * body.nu
-        for k in range(body.nu):
-            yield int(at) + k, int(first[place]) + k
-
-
-def _rows_of_loops(engine: Engine) -> list[tuple[int, int, int, int]]:
-    """(frame, direction, speed, row) of what hinges that close loops leave unknown: accelerations
-    of their speeds, and multipliers of their rows; -1 for the other of the two, and for the frame
-    of a coupling."""
-    packed, loops = engine.packed, engine.packed.written.loops
-    found = list[tuple[int, int, int, int]]()
-    if loops is None:
-        return found
-    first = packed.system.places["u"]
-    for one in loops.closures:
-        speeds = range(packed.system.body(one.frame).nu)
-        found += [(one.frame, k, int(first[one.frame]) + k, -1) for k in speeds]
-        found += [(one.frame, direction, -1, row) for direction, row in one.rows.items()]
-    found += [(-1, 0, -1, one.row) for one in (() if loops is None else loops.couplings)]
     return found
 
 

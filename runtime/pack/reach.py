@@ -23,12 +23,14 @@ GROUND = -1
 class Reach:
     """`loads` and `forces` say of each whether it changes with the place of its body alone;
     `placed` are the places of the bodies that lead to such loads, `across` those on which others
-    act, `efforts` (value, speed) of every effort of a law that an expression of the state gives."""
+    act, `watched` those by whose motion what acts on each of these changes, None where any may,
+    `efforts` (value, speed) of every effort of a law that an expression of the state gives."""
 
     loads: tuple[bool, ...]
     forces: tuple[bool, ...]
     placed: tuple[int, ...]
     across: tuple[int, ...]
+    watched: tuple[frozenset[int] | None, ...]
     efforts: tuple[tuple[int, int], ...]
 
 
@@ -41,20 +43,49 @@ def reach_of(system: System) -> Reach:
         for load, reading in zip(system.loads, changing, strict=True)
     )
     forces = tuple(map(_to_ground, system.forces))
-    own, across = set[int](), set[int]()
+    efforts = tuple(_efforts_of_state(system, depends))
+    own, across = set[int](), _Across()
     for load, alone, reading in zip(system.loads, loads, changing, strict=True):
         if alone:
             own.add(load.body)
         elif reading or load.axes != load.body:  # a follower of given size turns with its body
-            across.add(load.body)
+            across.act([load.body], None if reading else [load.body, load.axes])
     for force, alone in zip(system.forces, forces, strict=True):
-        (own if alone else across).update(body for body, _, _ in force.ends)
+        ends = [body for body, _, _ in force.ends]
+        if alone:
+            own.update(ends)
+        else:
+            across.act(ends, None if _told(force) else ends)
+    given = {speed for _, speed in efforts}
+    places, parents = system.places["u"].tolist(), system.parents.tolist()
     for closure in system.closures:
-        across.update((int(system.parents[closure.frame]), closure.outboard))
+        first = places[closure.frame]
+        ends = [parents[closure.frame], closure.outboard]
+        speeds = range(first, first + system.body(closure.frame).nu)
+        across.act(ends, ends if given.isdisjoint(speeds) else None)
     return Reach(
-        loads, forces, _to_the_root(system, own | set(system.dragged)),
-        tuple(sorted(across - {GROUND})), tuple(_efforts_of_state(system, depends)),
-    )  # fmt: skip
+        loads, forces, _to_the_root(system, own | set(system.dragged)), *across.found(), efforts
+    )
+
+
+class _Across:
+    """Bodies on which others act, and those that each of them watches (None: any)."""
+
+    def __init__(self) -> None:
+        self._watched: dict[int, set[int] | None] = {}
+
+    def act(self, bodies: Sequence[int], watched: Sequence[int] | None) -> None:
+        for body in bodies:
+            known = self._watched.setdefault(body, set())
+            if known is not None and watched is not None:
+                known.update(watched)
+            else:
+                self._watched[body] = None
+
+    def found(self) -> tuple[tuple[int, ...], tuple[frozenset[int] | None, ...]]:
+        places = tuple(sorted(self._watched.keys() - {GROUND}))
+        all_of = [self._watched[place] for place in places]
+        return places, tuple(None if one is None else frozenset(one - {GROUND}) for one in all_of)
 
 
 def _to_the_root(system: System, bodies: set[int]) -> tuple[int, ...]:
@@ -73,9 +104,13 @@ def _reads_state(load: LoadNumbers, depends: Sequence[bool]) -> bool:
 
 def _to_ground(force: ForceNumbers) -> bool:
     ends = [body for body, _, _ in force.ends]
+    return ends.count(GROUND) == 1 and not _told(force)
+
+
+def _told(force: ForceNumbers) -> bool:
+    """Whether an expression of the state gives its effort."""
     effort = force.effort
-    told = effort is not None and (reads(effort, "q") or reads(effort, "u"))
-    return ends.count(GROUND) == 1 and not told
+    return effort is not None and (reads(effort, "q") or reads(effort, "u"))
 
 
 def _efforts_of_state(system: System, depends: Sequence[bool]) -> list[tuple[int, int]]:

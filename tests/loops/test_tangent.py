@@ -15,7 +15,7 @@ from mstmm.runtime.engine.tangent import Tangent
 from . import test_four_bar as pins
 from .constraints.scenes import cycloid, governor, on_a_road
 from .linkages import bricard, cranks, legs
-from .scenes import andrews
+from .scenes import andrews, four_bars
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 RNG = np.random.default_rng(3)
@@ -38,6 +38,12 @@ def driven_where_it_closes() -> dict[str, Any]:
     return scene
 
 
+#: Windows side by side, with a spring between two that do not touch.
+TIED = four_bars(4, angle=0.7) | {
+    "spring": [{"from": "coupler0", "to": "crank3.tip", "law": {"stiffness": 40.0}}]
+}
+
+
 #: Scene, inverse time of the step, how far from a closed state (rad, m).
 CASES: dict[str, tuple[dict[str, Any], float, float]] = {
     "laws on a tree": (pins.linkage("rocker_pin"), 37.0, 1e-2),
@@ -48,6 +54,7 @@ CASES: dict[str, tuple[dict[str, Any], float, float]] = {
     "redundant rows": (bricard(), 37.0, 0.0),
     "redundant across loops": (cranks(), 37.0, 0.0),
     "legs": (legs(law=100.0), 37.0, 1e-2),
+    "side by side": (TIED, 37.0, 1e-2),
     "loops in one point": (andrews(), 1e5, 1e-5),
     "distances": (governor("constraint"), 37.0, 1e-2),
     "a disc that rolls": (on_a_road(), 37.0, 1e-2),

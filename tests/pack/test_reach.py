@@ -28,7 +28,7 @@ def reach(**tables: list[dict[str, Any]]) -> Reach:
 
 
 def test_no_loads() -> None:
-    assert reach() == Reach((), (), (), (), ())
+    assert reach() == Reach((), (), (), (), (), ())
 
 
 @pytest.mark.parametrize(
@@ -64,3 +64,25 @@ def test_springs(
 ) -> None:
     found = reach(spring=[spring])
     assert (found.forces, found.placed, found.across) == ((own,), placed, across)
+
+
+@pytest.mark.parametrize(
+    ("tables", "watched"),
+    [
+        ({"load": [{"on": "arm", "force": [0, 0, 1.0], "axes": "flag"}]}, [{1, 3}]),
+        ({"load": [{"on": "flag", "force": [0, "to_base.q", 0]}]}, [None]),
+        (
+            {"spring": [{"from": "base", "to": "flag", "law": {"stiffness": 1.0}},
+                        {"from": "arm", "to": "flag", "law": {"stiffness": 1.0}}]},
+            [{0, 3}, {1, 3}, {0, 1, 3}],
+        ),
+        (
+            {"spring": [{"from": "base", "to": "flag", "law": {"stiffness": 1.0}},
+                        {"from": "arm", "to": "flag", "law": {"effort": "to_hand.u"}}]},
+            [{0, 3}, None, None],
+        ),
+    ],
+    ids=["another's axes", "by the state", "springs", "one by the state"],
+)  # fmt: skip
+def test_what_is_watched(tables: dict[str, Any], watched: list[set[int] | None]) -> None:
+    assert list(reach(**tables).watched) == watched

@@ -2,7 +2,6 @@
  * see across.h. */
 #include "across.h"
 
-#include "sparse_lu.h"
 #include "sweep_steps.h"
 
 /* What is not above it in parts of its column is no pivot. */
@@ -26,6 +25,17 @@ static int64_t place_of_row(const mstmm_model *model, const mstmm_coupled_row *o
     if (one->frame < 0) return model->loops + MSTMM_ROW * (int64_t)one->row + MSTMM_ROW_KNOWN;
     const mstmm_closure *closure = model->looped[one->frame].closure;
     return model->loops + closure->numbers + MSTMM_CLOSURE_L + one->direction;
+}
+
+/* Entries of a list that are of pass or group k (-1: none). */
+static int first_of(const int *firsts, int k)
+{
+    return k < 0 ? 0 : firsts[k];
+}
+
+static int end_of(const int *firsts, int k)
+{
+    return firsts[k + 1]; /* none before the first */
 }
 
 /* Imposed speeds do not change; a row without a multiplier says nothing of its own. */
@@ -89,15 +99,26 @@ void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *o
 
 /* --- along a direction --- */
 
-/* Changes along the direction in `parts`, and by one of the multiplier of `row` (-1: of none). */
-static int changes_of(mstmm_tangent *at, const mstmm_parts *parts, int row, real *changes)
+/* Number of the multiplier that an unknown is; -1: none. */
+static int multiplier(const mstmm_tangent *at, int k)
 {
+    return k < n_changes(at) ? -1 : at->couplings->rows[k - n_changes(at)].row;
+}
+
+/* Changes along the direction in `parts`, and by one of the multipliers of a pass (-1: of none). */
+static int changes_of(mstmm_tangent *at, const mstmm_parts *parts, int pass, real *changes)
+{
+    const mstmm_couplings *all = at->couplings;
     mstmm_state state = known_state(at, parts), slope = slope_of(at, parts, parts->required);
     state.slope = &slope;
     memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real));
     mstmm_set_own_apart(at, parts->d_a, parts->answer);
     mstmm_keep_multipliers(at->model, slope.workspace);
-    if (row >= 0) row_numbers(at->model, slope.workspace, row)[MSTMM_ROW_X] = 1;
+    for (int s = first_of(all->first_seed, pass); s < end_of(all->first_seed, pass); s++) {
+        const int row = multiplier(at, all->seed[s]);
+        if (row >= 0 && is_unknown(at, all->seed[s]))
+            row_numbers(at->model, slope.workspace, row)[MSTMM_ROW_X] = 1;
+    }
     const int code = mstmm_run_applied_slope(&state);
     for (int k = 0; !code && k < n_changes(at); k++) changes[k] = *change_across(at, &slope, k);
     if (!code) mstmm_rows_along(at, slope.workspace, parts->answer, changes + n_changes(at));
@@ -105,23 +126,23 @@ static int changes_of(mstmm_tangent *at, const mstmm_parts *parts, int row, real
 }
 
 /* The same where rows are asked of positions: in a step those go by accelerations alone. */
-static int changes_at_end(mstmm_tangent *at, const mstmm_parts *parts, int row, real *changes)
+static int changes_at_end(mstmm_tangent *at, const mstmm_parts *parts, int pass, real *changes)
 {
     const size_t speeds = (size_t)at->model->nu * sizeof(real);
     real *loads = mstmm_across_missing(at);
     memcpy(parts->still_efforts, parts->d_a, speeds);
-    int code = changes_of(at, parts, row, changes);
+    int code = changes_of(at, parts, pass, changes);
     memcpy(loads, changes, (size_t)n_changes(at) * sizeof(real));
     memset(parts->d_q, 0, (size_t)at->model->nq * sizeof(real));
     memset(parts->d_u, 0, speeds);
     memcpy(parts->d_a, parts->still_efforts, speeds);
-    if (!code) code = changes_of(at, parts, row, changes);
+    if (!code) code = changes_of(at, parts, pass, changes);
     memcpy(changes, loads, (size_t)n_changes(at) * sizeof(real));
     return code;
 }
 
 /* The same along x and increments that are known (NULL: none). */
-static int changes_along(mstmm_tangent *at, const real *x, const mstmm_known *known, int row,
+static int changes_along(mstmm_tangent *at, const real *x, const mstmm_known *known, int pass,
                          real *changes)
 {
     const mstmm_model *model = at->model;
@@ -135,8 +156,8 @@ static int changes_along(mstmm_tangent *at, const real *x, const mstmm_known *kn
     }
     for (int i = 0; known && i < model->nq; i++) parts.d_q[i] += known->q[i];
     for (int j = 0; known && j < model->nu; j++) parts.d_a[j] += known->a[j];
-    return at->on_positions ? changes_at_end(at, &parts, row, changes)
-                            : changes_of(at, &parts, row, changes);
+    return at->on_positions ? changes_at_end(at, &parts, pass, changes)
+                            : changes_of(at, &parts, pass, changes);
 }
 
 int mstmm_coupled_along(mstmm_tangent *at, const real *x, const real *d_u, const real *d_a,
@@ -155,24 +176,40 @@ int mstmm_coupled_along(mstmm_tangent *at, const real *x, const real *d_u, const
 
 int mstmm_hook_unit_load(mstmm_state *state)
 {
-    *state->tangents->unit = 1;
+    const mstmm_tangents *step = state->tangents;
+    for (int k = 0; k < step->n_unit; k++) state->slope->workspace[step->unit[k]] = 1;
     return 0;
 }
 
-/* x to r beside increments that are known (NULL: none), and to one of change k (-1: of none). */
-static int solve_alone(mstmm_tangent *at, const real *r, const mstmm_known *known, int k, real *x)
+/* Efforts of a pass in a right-hand side. */
+static void set_efforts(const mstmm_tangent *at, int pass, real value, real *column)
+{
+    const mstmm_couplings *all = at->couplings;
+    const int loads = 6 * all->n_bodies;
+    for (int s = first_of(all->first_seed, pass); s < end_of(all->first_seed, pass); s++)
+        if (all->seed[s] >= loads && all->seed[s] < n_changes(at))
+            column[all->speeds[all->seed[s] - loads]] = value;
+}
+
+/* x to r beside increments that are known (NULL: none), and to one of each change of a pass (-1: of
+ * none). */
+static int solve_alone(mstmm_tangent *at, const real *r, const mstmm_known *known, int pass,
+                       real *x)
 {
     const mstmm_parts parts = parts_of(at);
+    const mstmm_couplings *all = at->couplings;
     mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq,
                            .kappa = at->kappa, .kept = at->kept};
     mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
-    const int loads = 6 * at->couplings->n_bodies;
     state.slope = &slope;
     state.tangents = &step;
     state.column = r;
     state.answer = x;
-    if (k >= 0 && k < loads) step.unit = change_across(at, &slope, k);
-    if (k >= loads) parts.column[at->couplings->speeds[k - loads]] = 1;
+    if (pass >= 0) {
+        step.unit = all->unit + all->first_unit[pass];
+        step.n_unit = all->first_unit[pass + 1] - all->first_unit[pass];
+    }
+    set_efforts(at, pass, 1, parts.column);
     memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real));
     if (known) {
         memset(parts.d_u, 0, (size_t)at->model->nu * sizeof(real));
@@ -180,60 +217,96 @@ static int solve_alone(mstmm_tangent *at, const real *r, const mstmm_known *know
         slope.given = known->a;
     }
     /* Hinges that close loops are no part of the tree. */
-    for (int i = 0; i < at->couplings->n_rows; i++)
-        if (at->couplings->rows[i].speed >= 0) x[at->couplings->rows[i].speed] = 0;
+    for (int i = 0; i < all->n_rows; i++)
+        if (all->rows[i].speed >= 0) x[all->rows[i].speed] = 0;
     const int code =
         known ? mstmm_run_tangent_beyond(&state) : mstmm_run_tangent_solution(&state);
-    if (k >= loads) parts.column[at->couplings->speeds[k - loads]] = 0;
+    set_efforts(at, pass, 0, parts.column);
     return code;
 }
 
-/* The tree's answer to one of unknown k, and all that comes with both. */
-static int answer_to(mstmm_tangent *at, int k, real *x, real *changes)
+/* The tree's answer to one of each unknown of a pass, and all that comes with both. */
+static int answer_to(mstmm_tangent *at, int pass, real *x, real *changes)
 {
-    const int first = n_changes(at);
-    int row = -1;
-    if (k < first) {
-        const int code = solve_alone(at, parts_of(at).column, NULL, k, x);
+    const mstmm_couplings *all = at->couplings;
+    const int first = n_changes(at), *seeds = all->seed + all->first_seed[pass];
+    memset(x, 0, (size_t)at->model->nu * sizeof(real));
+    if (seeds[0] < first) { /* loads and efforts stand before the rest */
+        const int code = solve_alone(at, parts_of(at).column, NULL, pass, x);
         if (code) return code;
-    } else {
-        memset(x, 0, (size_t)at->model->nu * sizeof(real));
-        row = at->couplings->rows[k - first].row;
-        if (row < 0) x[at->couplings->rows[k - first].speed] = 1;
     }
-    return changes_along(at, x, NULL, row, changes);
+    for (int s = 0; s < all->first_seed[pass + 1] - all->first_seed[pass]; s++)
+        if (seeds[s] >= first && multiplier(at, seeds[s]) < 0 && is_unknown(at, seeds[s]))
+            x[all->rows[seeds[s] - first].speed] = 1;
+    return changes_along(at, x, NULL, pass, changes);
 }
 
 /* --- all together --- */
 
-/* With changes c = G x and rows 0 = G x, and answers Y to each: x = x_0 + Y c, (1 - G Y) c = G x_0,
- * where rows have no 1. */
+/* Is any of a pass unknown? */
+static int asks(const mstmm_tangent *at, int pass)
+{
+    const mstmm_couplings *all = at->couplings;
+    for (int s = all->first_seed[pass]; s < all->first_seed[pass + 1]; s++)
+        if (is_unknown(at, all->seed[s])) return 1;
+    return 0;
+}
+
+/* Column k of 1 - G Y, where rows have no 1, by the changes that come of its pass. */
+static void set_column(const mstmm_tangent *at, const mstmm_band *matrix, int k,
+                       const real *changes)
+{
+    const mstmm_couplings *all = at->couplings;
+    const int column = all->rank[k], group = all->group[k], unknown = is_unknown(at, k);
+    for (int s = all->first_reader[group]; unknown && s < all->first_reader[group + 1]; s++) {
+        const int i = all->reader[s];
+        if (is_unknown(at, i)) *mstmm_band_at(matrix, all->rank[i], column) = -changes[i];
+    }
+    if (k < n_changes(at) || !unknown) *mstmm_band_at(matrix, column, column) += 1;
+}
+
+/* With changes c = G x and rows 0 = G x, and answers Y to each: x = x_0 + Y c, (1 - G Y) c = G x_0. */
 int mstmm_across_factor(mstmm_tangent *at, int negative)
 {
-    const int m = at->n_coupled, nu = at->model->nu, first = n_changes(at);
+    const mstmm_couplings *all = at->couplings;
+    const mstmm_band matrix = mstmm_across_band(at);
     real *changes = mstmm_across_changes(at), *exchanges = mstmm_across_exchanges(at);
-    memset(parts_of(at).column, 0, (size_t)nu * sizeof(real));
-    for (int k = 0; k < m; k++) {
-        real *answer = at->answers + (int64_t)k * nu;
-        const int unknown = is_unknown(at, k);
-        const int code = unknown ? answer_to(at, k, answer, changes) : 0;
+    memset(parts_of(at).column, 0, (size_t)at->model->nu * sizeof(real));
+    memset(matrix.a, 0, (size_t)(matrix.n * matrix.width) * sizeof(real));
+    for (int pass = 0; pass < all->n_passes; pass++) {
+        real *answer = at->answers + (int64_t)pass * at->model->nu;
+        const int code = asks(at, pass) ? answer_to(at, pass, answer, changes) : 0;
         if (code) return code;
-        for (int i = 0; i < m; i++) {
-            const int counts = unknown && is_unknown(at, i), one = i == k && (i < first || !unknown);
-            at->closure[(int64_t)i * m + k] = one - (counts ? changes[i] : 0);
-        }
+        for (int s = all->first_seed[pass]; s < all->first_seed[pass + 1]; s++)
+            set_column(at, &matrix, all->seed[s], changes);
     }
-    const int code = mstmm_sparse_factor(m, at->closure, exchanges, changes, NO_PIVOT);
+    const int code = mstmm_band_factor(&matrix, exchanges, changes, NO_PIVOT);
     if (code != 1 && (at->counts || (code == 2) == negative)) return 0;
     return mstmm_fail(&(mstmm_state){.failure = &at->failure}, MSTMM_FAILED_TANGENT, -1,
                       code == 1 ? 1 : MSTMM_NEGATIVE);
 }
 
+/* Adds the answers to what the unknowns are, in the order of the matrix. */
+static void add_answers(const mstmm_tangent *at, const real *amounts, real *x)
+{
+    const mstmm_couplings *all = at->couplings;
+    for (int pass = 0; pass < all->n_passes; pass++) {
+        const real *answer = at->answers + (int64_t)pass * at->model->nu;
+        for (int s = all->first_seed[pass]; s < all->first_seed[pass + 1]; s++) {
+            const int k = all->seed[s], *end = all->moved + all->first_moved[all->group[k] + 1];
+            if (!is_unknown(at, k)) continue;
+            for (const int *j = all->moved + all->first_moved[all->group[k]]; j < end; j++)
+                x[*j] += answer[*j] * amounts[all->rank[k]];
+        }
+    }
+}
+
 int mstmm_across_solve(mstmm_tangent *at, const real *r, const mstmm_known *known,
                        const real *missing, real *x)
 {
-    const int m = at->n_coupled, nu = at->model->nu, first = n_changes(at);
-    real *amounts = mstmm_across_changes(at);
+    const mstmm_band matrix = mstmm_across_band(at);
+    const int m = at->n_coupled, first = n_changes(at);
+    real *changes = mstmm_across_changes(at), *amounts = mstmm_across_ordered(at);
     int code = 0;
     if (known && !at->kept) { /* the first to ask for what is known: it will not be the last */
         at->keeps = 1;
@@ -241,13 +314,13 @@ int mstmm_across_solve(mstmm_tangent *at, const real *r, const mstmm_known *know
     }
     if (!code) code = solve_alone(at, r, known, -1, x);
     if (code || !m) return code;
-    code = changes_along(at, x, known, -1, amounts);
+    code = changes_along(at, x, known, -1, changes);
     if (code) return code;
-    for (int k = first; k < m; k++)
-        amounts[k] = is_unknown(at, k) ? amounts[k] - (missing ? missing[k - first] : 0) : 0;
-    mstmm_sparse_solve(m, at->closure, mstmm_across_exchanges(at), amounts);
-    for (int k = 0; k < m; k++)
-        for (int j = 0; is_unknown(at, k) && j < nu; j++)
-            x[j] += at->answers[(int64_t)k * nu + j] * amounts[k];
+    for (int k = 0; k < m; k++) {
+        const real lacks = k < first || !missing ? 0 : missing[k - first];
+        amounts[at->couplings->rank[k]] = is_unknown(at, k) ? changes[k] - lacks : 0;
+    }
+    mstmm_band_solve(&matrix, mstmm_across_exchanges(at), amounts);
+    add_answers(at, amounts, x);
     return 0;
 }

@@ -4,6 +4,7 @@
 #ifndef MSTMM_ACROSS_H
 #define MSTMM_ACROSS_H
 
+#include "band_lu.h"
 #include "tangent_parts.h"
 
 /* The answer to one of each, and how they answer one another, for the tangent in hand.  `negative`:
@@ -23,10 +24,15 @@ void mstmm_rows_along(const mstmm_tangent *at, real *workspace, const real *own,
 void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *own,
                    real *required);
 
-/* `closure`: the factored matrix, its exchanges of rows, changes, what rows miss. */
+/* `closure`: the factored matrix, its exchanges of rows, changes, what rows miss, and changes in the
+ * order of the matrix. */
+static inline mstmm_band mstmm_across_band(const mstmm_tangent *at)
+{
+    return mstmm_band_of(at->n_coupled, at->couplings->below, at->couplings->above, at->closure);
+}
 static inline real *mstmm_across_exchanges(const mstmm_tangent *at)
 {
-    return at->closure + (int64_t)at->n_coupled * at->n_coupled;
+    return at->closure + (int64_t)at->n_coupled * mstmm_across_band(at).width;
 }
 static inline real *mstmm_across_changes(const mstmm_tangent *at)
 {
@@ -35,6 +41,10 @@ static inline real *mstmm_across_changes(const mstmm_tangent *at)
 static inline real *mstmm_across_missing(const mstmm_tangent *at)
 {
     return mstmm_across_changes(at) + at->n_coupled;
+}
+static inline real *mstmm_across_ordered(const mstmm_tangent *at)
+{
+    return mstmm_across_missing(at) + at->n_coupled;
 }
 
 #endif

@@ -351,7 +351,8 @@ typedef struct mstmm_tangents {
     int *negative; /* whether the determinant is so far; NULL: one of a body's is a failure */
     const real *rho;      /* nq: what the rates lack */
     real *change;         /* nq: change of the coordinates */
-    real *unit;           /* a load that is one in a right-hand side; NULL: none */
+    const int64_t *unit;  /* where loads are one in a right-hand side; NULL: nowhere */
+    int n_unit;
 } mstmm_tangents;
 
 /* What a sweep is at. */

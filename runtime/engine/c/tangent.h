@@ -15,13 +15,21 @@ typedef struct {
 
 /* What the elimination does not see, as it reaches across the tree: loads on bodies that change with
  * what other bodies do, efforts that expressions of the state and couplings give, hinges that close
- * loops, and couplings. */
+ * loops, and couplings.  These unknowns (n_coupled) come in groups, each of which moves its speeds
+ * and is read by some of the unknowns; lists of those go from first_.. of a group or a pass to that
+ * of the next. */
 typedef struct {
-    int n_bodies, n_efforts, n_rows;
+    int n_bodies, n_efforts, n_rows, n_passes;
     const int *bodies; /* on which such loads act: 6 numbers each */
     const int64_t *efforts; /* where an effort changes, in the derivatives' workspace */
     const int *speeds;      /* and the speed that it acts on */
     const mstmm_coupled_row *rows;
+    const int *group, *rank; /* of every unknown, its group and its place in the matrix */
+    const int *first_reader, *reader, *first_moved, *moved; /* by group: unknowns, and speeds */
+    const int *first_seed, *seed; /* by pass: unknowns that are answered together */
+    const int *first_unit;        /* and where the loads among these stand, */
+    const int64_t *unit;          /* in the derivatives' workspace */
+    int below, above;             /* how far the matrix is filled beside its diagonal */
 } mstmm_couplings;
 
 /* A scene at one state with its derivatives: everything is the caller's.  `work` has
@@ -32,8 +40,8 @@ typedef struct {
     int64_t slots;        /* largest workspace of a tape of derivatives */
     const mstmm_couplings *couplings;
     int n_coupled;        /* numbers that they change by */
-    real *answers;        /* n_coupled x nu: to one of each */
-    real *closure;        /* n_coupled x (n_coupled + 3) */
+    real *answers;        /* passes x nu: to one of each unknown */
+    real *closure;        /* n_coupled x (numbers of a row of the matrix + 4) */
     int known;            /* there has been a residual since the memory changed */
     int laws_alone;       /* the last tangent was that of mstmm_laws_factor */
     int on_positions;     /* rows are asked of positions alone: see mstmm_across_solve */

@@ -1,0 +1,250 @@
+"""What the elimination of a tangent does not see, as it reaches across the tree: which unknowns
+there are, and which of them know nothing of each other.
+
+Unknowns are changes of loads and efforts, then accelerations and multipliers of what closes loops.
+Those of one `group` move the same part of the scene: all that stands on the ground by one hinge, or
+one hinge that closes a loop.  Where no load and no row feels two groups at once, the tree answers
+one unknown of each in the same pass, so that the number of passes does not grow with that of the
+loops that stand side by side; the matrix that is left has a band (E. Cuthill, J. McKee, Proc. 24th
+ACM National Conference (1969) 157-172; A. R. Curtis, M. J. D. Powell, J. K. Reid, J. Inst. Math.
+Appl. 13 (1974) 117-119).  Where an expression or a coupling may read any state there is one group.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mstmm.arrays import Integers
+
+from ..pack.reach import GROUND
+from ..pack.system import System
+
+if TYPE_CHECKING:
+    from .engine import Engine
+
+
+@dataclass(frozen=True)
+class Across:
+    """`bodies`, `efforts` (place in the workspace, speed) and `rows` (frame, direction, speed, row)
+    make the unknowns, 6 of each body first.  By group: the `members`, the `readers` among the
+    unknowns, and the speeds that are `moved`; `passes` are those that are answered together.
+    `ranks` (count,) are the places of unknowns in the matrix, which is filled so far `below` and
+    `above` its diagonal."""
+
+    bodies: Sequence[int]
+    efforts: Sequence[tuple[int, int]]
+    rows: Sequence[tuple[int, int, int, int]]
+    members: Sequence[Sequence[int]]
+    readers: Sequence[Sequence[int]]
+    moved: Sequence[Sequence[int]]
+    passes: Sequence[Sequence[int]]
+    ranks: Integers
+    below: int
+    above: int
+
+    @property
+    def count(self) -> int:
+        """How many unknowns there are."""
+        return 6 * len(self.bodies) + len(self.efforts) + len(self.rows)
+
+    @property
+    def width(self) -> int:
+        """Numbers of a row of the factored matrix, with those that exchanged rows fill."""
+        return min(self.count, 2 * self.below + self.above + 1)
+
+    def written(self, engine: Engine) -> list[Any]:
+        """The record of it for C, followed by what keeps it."""
+        ffi, blocks = engine.ffi, engine.packed.written.blocks
+        record = ffi.new("mstmm_couplings *")
+        kept = [record]
+        groups = np.empty(self.count, dtype=np.int64)
+        for number, members in enumerate(self.members):
+            groups[list(members)] = number
+        first = engine.lib.MSTMM_BLOCK_E
+        loads = [blocks[body] + first + k for body in self.bodies for k in range(6)]
+        units = [[loads[k] for k in one if k < len(loads)] for one in self.passes]
+        arrays: dict[str, tuple[str, Sequence[Any]]] = {
+            "bodies": ("int[]", self.bodies),
+            "efforts": ("int64_t[]", [place for place, _ in self.efforts]),
+            "speeds": ("int[]", [speed for _, speed in self.efforts]),
+            "rows": ("mstmm_coupled_row[]", self.rows),
+            "group": ("int[]", groups.tolist()), "rank": ("int[]", self.ranks.tolist()),
+            "unit": ("int64_t[]", [place for one in units for place in one]),
+            "first_unit": ("int[]", _firsts(units)),
+        }  # fmt: skip
+        for name, lists in (("reader", self.readers), ("moved", self.moved), ("seed", self.passes)):
+            arrays[name] = "int[]", [entry for one in lists for entry in one]
+            arrays[f"first_{name}"] = "int[]", _firsts(lists)
+        for name, (kind, numbers) in arrays.items():
+            array = ffi.new(kind, list(numbers) or 1)
+            kept.append(array)
+            setattr(record, name, array)
+        for name in ("bodies", "efforts", "rows", "passes"):
+            setattr(record, f"n_{name}", len(getattr(self, name)))
+        record.below, record.above = self.below, self.above
+        return kept
+
+
+def _firsts(lists: Sequence[Sequence[int]]) -> list[int]:
+    return [0, *np.cumsum([len(one) for one in lists]).tolist()]
+
+
+def across_of(engine: Engine) -> Across:
+    """What reaches across the tree of a packed scene."""
+    packed = engine.packed
+    reach, loops = packed.written.reach, packed.written.loops
+    efforts, rows = list(_efforts(engine)), _rows_of_loops(engine)
+    count = 6 * len(reach.across) + len(efforts) + len(rows)
+    unknowns = list(reach.across), efforts, rows
+    watched = [one for one in reach.watched if one is not None]
+    if len(watched) < len(reach.watched) or efforts or (loops and loops.couplings) or not count:
+        return at_once(*unknowns, engine.nu)
+    branches = _branches(packed.system)
+    closures = {one.frame: (one.inboard, one.outboard) for one in (loops.closures if loops else ())}
+    felt = {body: {branches[other] for other in one}
+            for body, one in zip(reach.across, watched, strict=True)}  # fmt: skip
+    for frame, ends in closures.items():
+        for body in ends:
+            if body != GROUND:
+                felt[body].add(frame)
+    by_rows = {frame: {frame} | {branches[body] for body in ends if body != GROUND}
+               for frame, ends in closures.items()}  # fmt: skip
+    moving = [branches[body] for body in reach.across for _ in range(6)]
+    moving += [frame for frame, _, _, _ in rows]
+    feeling = [felt[body] for body in reach.across for _ in range(6)]
+    feeling += [by_rows[frame] for frame, _, _, _ in rows]
+    feeling = [one - {GROUND} for one in feeling]
+    return _apart(unknowns, moving, feeling, _speeds(packed.system, branches, set(closures)))
+
+
+def at_once(bodies: Sequence[int], efforts: Any, rows: Any, nu: int) -> Across:
+    """All unknowns in one group, so that each has a pass and the matrix is full."""
+    count = 6 * len(bodies) + len(efforts) + len(rows)
+    alone, last = [range(count)], max(count - 1, 0)
+    return Across(bodies, efforts, rows, alone, alone, [range(nu)], [[k] for k in range(count)],
+                  np.arange(count), last, last)  # fmt: skip
+
+
+def _apart(
+    unknowns: tuple[Any, Any, Any],
+    moving: Sequence[int],
+    feeling: Sequence[set[int]],
+    speeds: dict[int, list[int]],
+) -> Across:
+    """Groups, passes and places of unknowns: what each moves, and all that each feels."""
+    names = _in_order(sorted(set(moving)), {frozenset(one) for one in feeling})
+    members, readers = {name: list[int]() for name in names}, {name: list[int]() for name in names}
+    for k, (name, felt) in enumerate(zip(moving, feeling, strict=True)):
+        members[name].append(k)
+        for other in felt & members.keys():
+            readers[other].append(k)
+    ranks = np.empty(len(moving), dtype=np.int64)
+    ranks[[k for name in names for k in members[name]]] = np.arange(len(moving))
+    below = above = 0
+    for name in names:
+        own, reading = ranks[members[name]], ranks[readers[name]]
+        if len(reading):
+            below = max(below, int(reading.max() - own.min()))
+            above = max(above, int(own.max() - reading.min()))
+    return Across(
+        *unknowns, list(members.values()), list(readers.values()),
+        [speeds.get(name, []) for name in names], _passes(members, readers, feeling),
+        ranks, below, above,
+    )  # fmt: skip
+
+
+def _in_order(names: list[int], together: set[frozenset[int]]) -> list[int]:
+    """Groups in an order in which those that are felt together stand near each other."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    places = {name: place for place, name in enumerate(names)}
+    pairs = [(place, place) for place in places.values()] + [
+        (places[one], places[other])
+        for felt in together
+        for one in felt & places.keys()
+        for other in felt & places.keys()
+    ]
+    rows, columns = np.array(pairs).T
+    graph = coo_array((np.ones(len(pairs)), (rows, columns)), shape=(len(names), len(names)))
+    return [names[place] for place in reverse_cuthill_mckee(graph.tocsr(), symmetric_mode=True)]
+
+
+def _passes(
+    members: dict[int, list[int]], readers: dict[int, list[int]], feeling: Sequence[set[int]]
+) -> list[list[int]]:
+    """Unknowns that are answered together, where nothing feels two of them."""
+    found, taken = list[list[int]](), {name: set[int]() for name in members}
+    for name, own in members.items():
+        felt_with = set[int]().union(*(feeling[k] for k in readers[name])) & members.keys()
+        used, turn = set[int]().union(*(taken[other] for other in felt_with)), 0
+        for k in own:
+            while turn in used:
+                turn += 1
+            if turn == len(found):
+                found.append([])
+            found[turn].append(k)
+            taken[name].add(turn)
+            turn += 1
+    return [sorted(one) for one in found]
+
+
+def _branches(system: System) -> list[int]:
+    """Of each body the first on its way from the ground that a load can move."""
+    found = list[int]()
+    stiff = system.rows(lambda one: not one.nu and one.modal is None and one.section is None)
+    for place, parent in enumerate(system.parents.tolist()):
+        held = parent == GROUND or found[parent] == GROUND
+        found.append(found[parent] if not held else GROUND if stiff[place] else place)
+    return found
+
+
+def _speeds(system: System, branches: Sequence[int], frames: set[int]) -> dict[int, list[int]]:
+    """The speeds by branch, and by hinge that closes a loop."""
+    found, first = dict[int, list[int]](), system.places["u"].tolist()
+    of_hinges = system.rows(lambda one: one.nu).tolist()
+    bent = system.rows(lambda one: one.modal is not None)
+    for place, branch in enumerate(branches):
+        own = found.setdefault(place if place in frames else branch, [])
+        own += range(first[place], first[place] + of_hinges[place])
+        if bent[place] and (modal := system.body(place).modal):
+            own += range(modal.u, modal.u + modal.n)
+    return found
+
+
+def _efforts(engine: Engine) -> Iterator[tuple[int, int]]:
+    """(place in the workspace, speed) of efforts that expressions of the state and couplings give,
+    these for hinges of the tree."""
+    packed, lib, model = engine.packed, engine.lib, engine.packed.model
+    values = packed.scratch + engine.nq + engine.nu
+    for value, speed in packed.written.reach.efforts:
+        yield values + value, speed
+    first, loops = packed.system.places["u"], packed.written.loops
+    frames = {one.frame for one in packed.system.closures}
+    coupled = {place for one in loops.couplings for place in one.columns} if loops else set()
+    for place in sorted(coupled - frames):
+        body = model.bodies[place]
+        at = body.block + lib.MSTMM_BLOCK_FIXED + lib.MSTMM_SPEED_TAU * body.nu
+        for k in range(body.nu):
+            yield int(at) + k, int(first[place]) + k
+
+
+def _rows_of_loops(engine: Engine) -> list[tuple[int, int, int, int]]:
+    """(frame, direction, speed, row) of what hinges that close loops leave unknown: accelerations
+    of their speeds, and multipliers of their rows; -1 for the other of the two, and for the frame
+    of a coupling."""
+    packed, loops = engine.packed, engine.packed.written.loops
+    found = list[tuple[int, int, int, int]]()
+    if loops is None:
+        return found
+    first = packed.system.places["u"]
+    for one in loops.closures:
+        speeds = range(packed.system.body(one.frame).nu)
+        found += [(one.frame, k, int(first[one.frame]) + k, -1) for k in speeds]
+        found += [(one.frame, direction, -1, row) for direction, row in one.rows.items()]
+    found += [(-1, 0, -1, one.row) for one in (() if loops is None else loops.couplings)]
+    return found

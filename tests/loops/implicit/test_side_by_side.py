@@ -1,0 +1,99 @@
+"""Loops that stand side by side are answered together, as if each had been asked alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mstmm
+from mstmm.runtime.engine import tangent
+from mstmm.runtime.engine.across import Across, across_of, at_once
+from mstmm.runtime.engine.engine import Engine
+
+from ..bent.test_against_tree import hung, meshed, shackled
+from ..linkages import cranks, legs
+from ..scenes import andrews, four_bars, scissors
+
+SEED = 20
+
+
+def on_a_frame(count: int) -> dict[str, Any]:
+    """Windows whose feet stand on a body that is welded to the ground."""
+    scene = four_bars(count, angle=0.7)
+    ends = dict[str, list[float]]()
+    for hinge in scene["hinge"]:
+        if hinge["inboard"] == "ground":
+            ends[hinge["name"]] = hinge.pop("position")
+            hinge["inboard"] = f"frame.{hinge['name']}"
+    frame = {"name": "frame", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "ends": ends}
+    weld = {"name": "held", "type": "fixed", "inboard": "ground", "outboard": "frame"}
+    return scene | {"body": [frame, *scene["body"]], "hinge": [weld, *scene["hinge"]]}
+
+
+def with_springs() -> dict[str, Any]:
+    """Windows tied to others, a load in axes of another one's body."""
+    law = {"stiffness": 40.0, "damping": 1.0}
+    return four_bars(6, angle=0.7) | {
+        "spring": [
+            {"from": "coupler0", "to": "crank3.tip", "law": law},
+            {"from": "crank1", "to": "coupler5.tip", "law": law},
+        ],
+        "load": [{"on": "crank2", "force": [1.0, "3*sin(t)", 0], "axes": "coupler4"}],
+    }
+
+
+SCENES = {
+    "windows": four_bars(6, angle=0.7), "on a frame": on_a_frame(5), "springs": with_springs(),
+    "cranks": cranks(), "legs": legs(law=100.0), "Andrews": andrews(), "scissors": scissors(4),
+    "a blade that hangs": hung(), "shapes in mesh": meshed(), "a flexible rod": shackled(),
+}  # fmt: skip
+
+
+def engine_of(scene: dict[str, Any]) -> Engine:
+    return mstmm.compile(mstmm.Scene(**scene), engine="looped").looped
+
+
+def answers(engine: Engine, q: Any, u: Any, s: float) -> list[Any]:
+    """One step's answers to a right-hand side and to increments that are known."""
+    rng = np.random.default_rng(SEED)
+    one = tangent.Tangent(engine)
+    one.residual(0.1, q, u)
+    one.factor(s, s)
+    r, d_a = rng.normal(size=(2, engine.nu))
+    d_q = one.coordinates(np.zeros(engine.nu), rng.normal(size=engine.nq))
+    found = [one.solve(r), one.solve(r, d_q, d_a)]
+    return [*found, one.accelerations_rate()]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_answers_are_those_of_the_full_matrix(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = mstmm.compile(mstmm.Scene(**SCENES[name]), engine="looped")
+    engine, state = model.looped, model.initial_state()
+    s = 1e5 if name == "Andrews" else 50.0
+    found = answers(engine, *state, s)
+
+    def full(engine: Engine) -> Across:
+        own = across_of(engine)
+        return at_once(own.bodies, own.efforts, own.rows, engine.nu)
+
+    monkeypatch.setattr(tangent, "across_of", full)
+    for one, other in zip(found, answers(engine, *state, s), strict=True):
+        assert np.abs(one - other).max() <= 1e-11 * np.abs(other).max()
+
+
+@pytest.mark.parametrize("make", [lambda n: four_bars(n, angle=0.7), on_a_frame])
+def test_passes_do_not_grow_with_the_windows(make: Any) -> None:
+    few, many = (across_of(engine_of(make(count))) for count in (8, 32))
+    assert many.count == 4 * few.count
+    assert len(many.passes) == len(few.passes) < 40
+    assert many.width == few.width < 120
+
+
+def test_expressions_of_the_state_may_read_anything() -> None:
+    told = four_bars(3, angle=0.7) | {
+        "load": [{"on": "crank1", "force": ["foot0.q", 0.0, 0.0], "axes": "body"}]
+    }
+    across = across_of(engine_of(told))
+    assert len(across.passes) == across.width == across.count
