@@ -9,7 +9,8 @@ design; `apart` tells how far its accelerations are from those of the rigid plat
 squeezer, run for 0.03 s to an error of its crank of 1e-6 rad, by each tool's cheapest setting that
 keeps it: DOP853 in C around Pinocchio's constrained dynamics, Exudyn's generalized alpha; `apart`
 is the error.  Ours is the looped engine, and fused code where it says so, of one state at a time.
-Building what each needs is not counted; peers that are not there are left out.
+Windows are also measured by the tangent of an implicit step and one solution with it.  Building
+what each needs is not counted; peers that are not there are left out.
 """
 
 from __future__ import annotations
@@ -29,8 +30,11 @@ sys.path.insert(0, str(HERE.parent))
 from common import measure, mstmm_engines  # noqa: E402
 
 import mstmm  # noqa: E402
+from mstmm.runtime.engine.tangent import Tangent  # noqa: E402
 
 SIZES = (10, 50, 200, 1000)
+#: Windows whose tangents are compared, as implicit steps take them.
+FACTORED = (50, 400)
 #: Scene, peer, ratio that was asked.
 COMPARED = (
     (f"{SIZES[-1]} windows", "Exudyn", 0.05), ("platform", "MuJoCo", 0.3),
@@ -106,14 +110,40 @@ def measured(quick: bool) -> list[dict[str, Any]]:
     for name, found in times.items():
         results.append(row_of(int(name), "mstmm", found))
     results += [row_of(SIZES[-1], "Exudyn", beside)] if beside else []
-    return results + platform_beside(rounds) + squeezer_beside(rounds)
+    return results + tangents(rounds) + platform_beside(rounds) + squeezer_beside(rounds)
 
 
-def row_of(count: int, tool: str, times: list[float]) -> dict[str, Any]:
-    """A row of the table for so many windows, by microseconds of an evaluation."""
+def row_of(count: int, tool: str, times: list[float], what: str = "") -> dict[str, Any]:
+    """A row of the table for so many windows, by microseconds of an evaluation or of `what`."""
     bodies = 2 * count + 1
-    return {"scene": f"{count} windows", "tool": tool, "us": times,
+    return {"scene": f"{count} windows{what}", "tool": tool, "us": times,
             "ns a body": [1e3 * us / bodies for us in times]}  # fmt: skip
+
+
+def tangents(rounds: int) -> list[dict[str, Any]]:
+    """Factors and one solution of an implicit step of 0.2 ms, windows in a row."""
+    rng, calls, work = np.random.default_rng(1), 4000, {}
+    for count in FACTORED:
+        model = mstmm.compile(windows(count), engine="looped")
+        work[count] = factoring(model, rng.normal(size=model.nu), calls // count)
+    timed = {str(count): lambda one=one: measure.once(one) for count, one in work.items()}
+    return [
+        row_of(int(name), "mstmm", [1e6 * s / (calls // int(name)) for s in found], ", implicit")
+        for name, found in measure.rounds(timed, rounds).items()
+    ]
+
+
+def factoring(model: mstmm.Model, r: np.ndarray, calls: int) -> Callable[[], None]:
+    """So many tangents at the start, each with a solution."""
+    tangent = Tangent(model.looped)
+    tangent.residual(0.0, *model.initial_state())
+
+    def run() -> None:
+        for _ in range(calls):
+            tangent.factor(5e3, 5e3)
+            tangent.solve(r)
+
+    return run
 
 
 def iteration_beside() -> list[float]:
@@ -185,6 +215,11 @@ def ratios(results: list[dict[str, Any]]) -> list[tuple[str, str, float, float]]
     bodies = {size: by[f"{size} windows", "mstmm"] / (2 * size + 1) for size in SIZES}
     found = [("a body / one of 50 windows", f"{SIZES[-1]} windows", bodies[SIZES[-1]] / bodies[50],
               1.2)]  # fmt: skip
+    few, many = ((f"{count} windows, implicit", "mstmm") for count in FACTORED)
+    loops = FACTORED[1] / FACTORED[0]
+    if many in by:
+        found.append((f"a loop / one of {FACTORED[0]} windows", many[0], by[many] / by[few] / loops,
+                      1.5))  # fmt: skip
     for scene, tool, asked in COMPARED:
         if (scene, tool) in by:
             own = "mstmm fused" if (scene, "mstmm fused") in by else "mstmm"
@@ -194,7 +229,8 @@ def ratios(results: list[dict[str, Any]]) -> list[tuple[str, str, float, float]]
 
 def table(results: list[dict[str, Any]]) -> str:
     """Least times, and ratios."""
-    lines = ["# Closed loops", "", "| scene | tool | us an evaluation or run | ns a body | apart |",
+    lines = ["# Closed loops", "",
+             "| scene | tool | us an evaluation, tangent or run | ns a body | apart |",
              "|---|---|---|---|---|"]  # fmt: skip
     for row in results:
         body = f"{min(row['ns a body']):.0f}" if "ns a body" in row else ""

@@ -15,18 +15,6 @@ static int n_changes(const mstmm_tangent *at)
     return at->n_coupled - at->couplings->n_rows;
 }
 
-static real *row_numbers(const mstmm_model *model, real *workspace, int row)
-{
-    return workspace + model->loops + MSTMM_ROW * (int64_t)row;
-}
-
-static int64_t place_of_row(const mstmm_model *model, const mstmm_coupled_row *one)
-{
-    if (one->frame < 0) return model->loops + MSTMM_ROW * (int64_t)one->row + MSTMM_ROW_KNOWN;
-    const mstmm_closure *closure = model->looped[one->frame].closure;
-    return model->loops + closure->numbers + MSTMM_CLOSURE_L + one->direction;
-}
-
 /* Entries of a list that are of pass or group k (-1: none). */
 static int first_of(const int *firsts, int k)
 {
@@ -44,7 +32,7 @@ static int is_unknown(const mstmm_tangent *at, int k)
     if (k < n_changes(at)) return 1;
     const mstmm_coupled_row *one = &at->couplings->rows[k - n_changes(at)];
     if (one->speed < 0)
-        return row_numbers(at->model, at->workspace, one->row)[MSTMM_ROW_INVERSE] > 0;
+        return mstmm_row_numbers(at->model, at->workspace, one->row)[MSTMM_ROW_INVERSE] > 0;
     const mstmm_body *body = &at->model->bodies[one->frame];
     return !(mstmm_imposed(body, at->memory) && body->imposed_mask[one->direction]);
 }
@@ -57,44 +45,6 @@ static real *change_across(const mstmm_tangent *at, const mstmm_state *slope, in
     if (k < 6 * all->n_bodies)
         return mstmm_block(model, slope->workspace, all->bodies[k / 6]) + MSTMM_BLOCK_E + k % 6;
     return slope->workspace + all->efforts[k - 6 * all->n_bodies];
-}
-
-void mstmm_set_own_apart(const mstmm_tangent *at, real *a, real *own)
-{
-    memcpy(own, a, (size_t)at->model->nu * sizeof(real));
-    for (int k = 0; k < at->couplings->n_rows; k++)
-        if (at->couplings->rows[k].speed >= 0) a[at->couplings->rows[k].speed] = 0;
-}
-
-/* What has to vanish: of a rotor its inertia times its acceleration less the multiplier. */
-void mstmm_rows_along(const mstmm_tangent *at, real *workspace, const real *own, real *rows)
-{
-    const mstmm_model *model = at->model;
-    for (int k = 0; k < at->couplings->n_rows; k++) {
-        const mstmm_coupled_row *one = &at->couplings->rows[k];
-        const real softness = one->row < 0 ? 0 : model->rows[one->row].softness;
-        if (softness > 0)
-            rows[k] = own[model->bodies[one->frame].u + one->direction]
-                      - softness * row_numbers(model, workspace, one->row)[MSTMM_ROW_X];
-        else
-            rows[k] = workspace[place_of_row(model, one)]
-                      - (one->speed < 0 ? 0 : own[one->speed]);
-    }
-}
-
-void mstmm_keep_multipliers(const mstmm_model *model, real *workspace)
-{
-    for (int r = 0; r < model->n_rows; r++) row_numbers(model, workspace, r)[MSTMM_ROW_X] = 0;
-}
-
-void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *own,
-                   real *required)
-{
-    for (int k = 0; at->model->looped && k < at->couplings->n_rows; k++) {
-        const mstmm_coupled_row *one = &at->couplings->rows[k];
-        if (one->speed >= 0)
-            required[one->speed] = own[one->speed] - workspace[place_of_row(at->model, one)];
-    }
 }
 
 /* --- along a direction --- */
@@ -117,7 +67,7 @@ static int changes_of(mstmm_tangent *at, const mstmm_parts *parts, int pass, rea
     for (int s = first_of(all->first_seed, pass); s < end_of(all->first_seed, pass); s++) {
         const int row = multiplier(at, all->seed[s]);
         if (row >= 0 && is_unknown(at, all->seed[s]))
-            row_numbers(at->model, slope.workspace, row)[MSTMM_ROW_X] = 1;
+            mstmm_row_numbers(at->model, slope.workspace, row)[MSTMM_ROW_X] = 1;
     }
     const int code = mstmm_run_applied_slope(&state);
     for (int k = 0; !code && k < n_changes(at); k++) changes[k] = *change_across(at, &slope, k);

@@ -24,6 +24,13 @@ void mstmm_rows_along(const mstmm_tangent *at, real *workspace, const real *own,
 void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *own,
                    real *required);
 
+/* Numbers of a row of the loops in a workspace. */
+static inline real *mstmm_row_numbers(const mstmm_model *model, real *workspace,
+                                      int row)
+{
+    return workspace + model->loops + MSTMM_ROW * (int64_t)row;
+}
+
 /* `closure`: the factored matrix, its exchanges of rows, changes, what rows miss, and changes in the
  * order of the matrix. */
 static inline mstmm_band mstmm_across_band(const mstmm_tangent *at)
