@@ -41,6 +41,11 @@ def import_robot(
         typer.Option("--stops", metavar="STIFFNESS", parser=positive, help="Make the limits of "
                      "joints stops of this stiffness (N m/rad or N/m)."),
     ] = None,
+    hold_mimics: Annotated[
+        bool,
+        typer.Option("--hold-mimics", help="Hold joints that go with others where they start, "
+                     "instead of coupling them."),
+    ] = False,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Write the scene of a robot, and tell what of the file a scene has not."""
@@ -49,7 +54,10 @@ def import_robot(
     from .output import emit_json, say
 
     target = output_file(output or f"{Path(robot).stem}.toml", (".toml",))
-    found = mstmm.import_robot(robot, base=base, merge=not keep_fixed, stops=stops)
+    found = mstmm.import_robot(
+        robot, base=base, merge=not keep_fixed, stops=stops,
+        mimics="held" if hold_mimics else "coupled",
+    )  # fmt: skip
     target.write_text(found.to_toml(), encoding="utf-8")
     if json:
         notes = [{"where": n.where, "element": n.element, "text": n.text} for n in found.notes]

@@ -158,7 +158,7 @@ def to_rpy(matrix: Matrix) -> Vector:
     yaw = math.atan2(yx, xx)
     c, s = cos_sin(yaw)
     roll = math.atan2(s * xz - c * yz, c * yy - s * xy)
-    return (roll, math.atan2(-zx, c * xx + s * yx), yaw)
+    return (roll, math.atan2(0.0 - zx, c * xx + s * yx), yaw)
 
 
 def from_orientation(orientation: Sequence[float]) -> Matrix:

@@ -200,3 +200,15 @@ def test_choices_that_are_none(tmp_path: Path) -> None:
         mstmm.import_robot(path, stops=-1.0)
     with pytest.raises(mstmm.SceneError, match="expected a robot's file ending in"):
         mstmm.import_robot(tmp_path / "arm.toml")
+
+
+def test_a_joint_that_mimics_may_be_held(tmp_path: Path) -> None:
+    path = written(tmp_path, ARM)
+    found = mstmm.import_robot(path, mimics="held")
+    assert not found.scene.coupling
+    assert "held at 0.01; it mimics another" in [note.text for note in found.notes]
+    run = mstmm.compile(found.scene).simulate(0.2)
+    held = run.model.layout.hinges["other_jaw"].q
+    assert run.success and np.ptp(run.q[:, held]) == 0 and run.q[0, held] == 0.01
+    with pytest.raises(mstmm.SceneError, match='expected "coupled" or "held", found'):
+        mstmm.import_robot(path, mimics="frozen")

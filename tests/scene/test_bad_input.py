@@ -141,7 +141,7 @@ BAD: list[tuple[Data, str]] = [
         in_hinge(orientation=[0, 0, 0, 0]),
         "a quaternion of zero length; no rotation is [1, 0, 0, 0]",
     ),
-    (in_hinge(orientation=[1, 2]), "[roll, pitch, yaw] in rad or a quaternion"),
+    (in_hinge(orientation=[1, 2]), "[roll, pitch, yaw] in rad, a quaternion"),
     (changed(arm(), "hinge", 1, "position", to=[1, 0, 0]), 'give "rod1" an end there'),
     # keys of the types
     (one(type="fixed", axis=[1, 0, 0]), "a fixed hinge has no axis"),

@@ -66,6 +66,8 @@ BAD = [
     (one(type="pinn"), 'there is no hinge type "pinn"; did you mean "pin"?'),
     (one(type="kne"), 'there is no hinge type "kne"; did you mean "knee"?'),
     (one(type="spring"), 'there is no hinge type "spring"'),
+    (one(type="Revolute"), 'there is no hinge type "Revolute"; it is called "pin" here'),
+    (one(type="weld_joint"), 'there is no hinge type "weld_joint"; it is called "fixed" here'),
     (
         changed(one(), "body", 0, "type", to="rigidd"),
         'no body type "rigidd"; did you mean "rigid"?',

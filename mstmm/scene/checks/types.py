@@ -10,6 +10,7 @@ from ...ir.facts import builtin_hinges, effort_unit
 from ...ir.spec import ElementSpec
 from ..rules.messages import Problem, near
 from ..rules.values import Location, Refused
+from ..rules.words import ours
 from ..tables.hinge_rules import misplaced_keys, settled_as
 from .names import index_problem
 
@@ -51,11 +52,10 @@ def problems(scene: SceneTables, known: Mapping[tuple[str, str], ElementSpec]) -
         spec = known.get((kind, element.type))
         if spec is None:
             mine = [name for k, name in known if k == kind]
-            found.append((
-                (*place, "type"),
-                f'there is no {kind} type "{element.type}"'
-                f"{near(element.type, [*builtin[kind], *mine])}",
-            ))  # fmt: skip
+            called = ours(element.type) if kind == "hinge" else None
+            hint = near(element.type, [*builtin[kind], *mine])
+            hint = f'; it is called "{called}" here' if called else hint
+            found.append(((*place, "type"), f'there is no {kind} type "{element.type}"{hint}'))
         else:
             found += _element(scene, place, element, spec)
     return found

@@ -22,6 +22,7 @@ from .robot import FIXED, NOTHING, Joint, Link, Mimic, Note, Robot
 from .tree import Tree
 
 BASES = (FIXED, "free")
+COUPLED, HELD = MIMICS = ("coupled", "held")
 
 
 @dataclass(frozen=True)
@@ -30,12 +31,14 @@ class Choices:
 
     base: "fixed" on the ground, or "free".  merge: links on fixed joints become part of the body
     that holds them; their frames are ends of it.  stops: stiffness (N/m or N m/rad) of the stops at
-    the limits of joints, None: no stops.
+    the limits of joints, None: no stops.  mimics: joints that go with others are "coupled" to them,
+    or "held" where they start.
     """
 
     base: str = FIXED
     merge: bool = True
     stops: float | None = None
+    mimics: str = COUPLED
 
 
 @dataclass(frozen=True)
@@ -202,7 +205,10 @@ class _Writer:
                 law["limits"] = {**limits, "stiffness": self.choices.stops}
         if law:
             keys["law"] = law
-        if start is not None:
+        if start is not None and self.choices.mimics == HELD:
+            keys["drive"] = [start]
+            self._tell(joint, f"joint {joint.name!r}", f"held at {start:g}; it mimics another")
+        elif start:
             keys["initial"] = {"q": [start]}
         return keys
 
@@ -216,7 +222,7 @@ class _Writer:
             self._tell(self.tree.joints[mimic.of], f"joint {mimic.of!r}", what)
 
     def _couplings(self) -> Iterator[dict[str, Any]]:
-        for mimic, joint in self._mimics():
+        for mimic, joint in self._mimics() if self.choices.mimics == COUPLED else ():
             own, other = self.joints[mimic.of], self.joints.get(mimic.other)
             moves = other is not None and mimic.other not in self.held
             row = f"{own}.q - {mimic.multiplier!r}*{other}.q" if moves else f"{own}.q"
@@ -245,8 +251,7 @@ class _Writer:
                 raise SceneError(f"{joint.where}: joint {name!r} mimics itself in the end")
             return mimic.multiplier * start(mimic.other, asked | {name}) + mimic.offset
 
-        found = {name: start(name, frozenset()) for name in mimics}
-        return {name: q for name, q in found.items() if q != 0}
+        return {name: start(name, frozenset()) for name in mimics}
 
     def _shapes(self, folder: Path | None) -> Iterator[dict[str, Any]]:
         for look in self.robot.looks:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ...errors import SceneError
 from ..files.read import content_of
-from .convert import BASES, Choices, Imported, converted
+from .convert import BASES, COUPLED, MIMICS, Choices, Imported, converted
 from .mjcf import read_mjcf
 from .urdf import read_urdf
 
@@ -22,7 +22,7 @@ def is_robot(path: str | os.PathLike[str]) -> bool:
 
 def import_robot(
     path: str | os.PathLike[str], base: str = "fixed", merge: bool = True,
-    stops: float | None = None,
+    stops: float | None = None, mimics: str = COUPLED,
 ) -> Imported:  # fmt: skip
     """The scene of a robot's file, what became of its names, and notes on what differs.
 
@@ -30,11 +30,14 @@ def import_robot(
 
     base: "fixed" on the ground, or "free".  merge: links on fixed joints become part of the body
     that holds them, and their frames ends of it.  stops: stiffness (N/m or N m/rad) of stops at the
-    limits of joints; without it there are none.  Raises SceneError, and EnvironmentFailure where
-    MuJoCo is needed and not there.
+    limits of joints; without it there are none.  mimics: joints that go with others are "coupled"
+    to them, or "held" where they start, which leaves no loop.  Raises SceneError, and
+    EnvironmentFailure where MuJoCo is needed and not there.
     """
     if base not in BASES:
         raise SceneError(f'base: expected "fixed" or "free", found {base!r:.40}')
+    if mimics not in MIMICS:
+        raise SceneError(f'mimics: expected "coupled" or "held", found {mimics!r:.40}')
     if stops is not None and not 0 < stops < float("inf"):
         raise SceneError(f"stops: expected a stiffness above 0 in N m/rad or N/m, found {stops!r}")
     where, content = content_of(path, ENDINGS, "a robot's file")
@@ -45,4 +48,4 @@ def import_robot(
         raise SceneError(f'{where}: base = "free" is for URDF; in MJCF a <freejoint> says so')
     else:
         robot = read_mjcf(str(full), where)
-    return converted(robot, Choices(base, merge, stops), full.parent)
+    return converted(robot, Choices(base, merge, stops, mimics), full.parent)

@@ -18,7 +18,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema, core_schema
 
 from ...errors import ExpressionError
-from ...numbers.rotations import norm, unit
+from ...numbers.rotations import norm
 from . import written
 from .units import instead, with_unit
 
@@ -330,25 +330,3 @@ def direction() -> Rule:
         return result
 
     return Rule(expected, check, inner.schema)
-
-
-def orientation() -> Rule:
-    """[roll, pitch, yaw] in rad, or a quaternion [w, x, y, z], which is normalised."""
-    expected = "[roll, pitch, yaw] in rad or a quaternion [w, x, y, z]"
-    inner = numbers(expected, 3, 4)
-
-    def check(value: Any) -> tuple[float, ...]:
-        result: tuple[float, ...] = inner.check(value)
-        return quaternion(result, expected) if len(result) == 4 else result
-
-    return Rule(expected, check, inner.schema)
-
-
-def quaternion(q: tuple[float, ...], expected: str, *place: str | int) -> tuple[float, ...]:
-    """q / |q|; a quaternion (practically) zero is refused."""
-    if norm(q) < 1e-6:
-        raise refuse(
-            f"expected {expected}, found a quaternion of zero length; no rotation is [1, 0, 0, 0]",
-            *place,
-        )
-    return written.alike(unit(q), q)

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from ...numbers.rotations import IDENTITY, Matrix, Vector, from_orientation
 from ..rules import text as texts
+from ..rules import turns
 from ..rules import values as rules
 from ..rules.inertia import without_dust
 from ..rules.values import (
@@ -27,7 +28,7 @@ class End(Table):
     """An output end of a body: where it is (m) and how its axes lie, in body axes."""
 
     position: Annotated[Vector, rules.vector("m")]
-    orientation: Annotated[Orientation, rules.orientation()] = (0.0, 0.0, 0.0)
+    orientation: Annotated[Orientation, turns.orientation()] = (0.0, 0.0, 0.0)
 
     @property
     def rotation(self) -> Matrix:
@@ -60,10 +61,7 @@ class BodyTable(Table):
     type: Annotated[str, texts.name("a body type")] = "rigid"
     mass: Annotated[float, rules.number("kg", minimum=0)] = 0.0
     center_of_mass: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
-    inertia: Annotated[
-        Numbers,
-        rules.numbers("[xx, yy, zz] or [xx, yy, zz, xy, xz, yz] in kg m^2", 3, 6, of="kg m^2"),
-    ] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    inertia: Annotated[Numbers, turns.inertia()] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     allow_unphysical_inertia: Annotated[bool, texts.flag()] = False
     ends: Annotated[
         dict[str, End],

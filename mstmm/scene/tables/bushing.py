@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from ...numbers.rotations import Matrix, Vector, from_orientation
 from ..rules import text as texts
+from ..rules import turns
 from ..rules import values as rules
 from ..rules.symmetric import full, symmetric, triangle
 from ..rules.values import GROUND, Numbers, Orientation, Shorthand, Table, refuse, split
@@ -31,7 +32,7 @@ class Bushing(Table):
     from_: Annotated[str, texts.end()] = Field(alias="from")
     to: Annotated[str, texts.end()]
     position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
-    orientation: Annotated[Orientation, rules.orientation()] = (0.0, 0.0, 0.0)
+    orientation: Annotated[Orientation, turns.orientation()] = (0.0, 0.0, 0.0)
     rest: Annotated[
         End,
         Shorthand(

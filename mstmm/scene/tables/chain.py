@@ -10,6 +10,7 @@ from pydantic import BaseModel, model_validator
 
 from ...numbers.rotations import Vector
 from ..rules import text as texts
+from ..rules import turns
 from ..rules import values as rules
 from ..rules.values import GROUND, Location, Orientation, Refused, Shorthand, Table, refuse, split
 from .body import BodyTable
@@ -46,7 +47,7 @@ class Chain(Table):
     count: Annotated[int, rules.whole(1, MAX_COUNT)]
     inboard: Annotated[str, texts.end()]
     position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
-    orientation: Annotated[Orientation | None, rules.orientation()] = None
+    orientation: Annotated[Orientation | None, turns.orientation()] = None
     end: Annotated[str | None, texts.name("the end on which the next body hangs")] = None
     body: Annotated[tuple[BodyTable, ...], _pattern("body")]
     hinge: Annotated[tuple[HingeTable, ...], _pattern("hinge")]

@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 
 from ...numbers.rotations import Matrix, Vector, from_orientation
 from ..rules import text as texts
+from ..rules import turns
 from ..rules import values as rules
 from ..rules.values import NAME, Location, Refused, Rule, Shorthand, Table, found, plain, refuse
 from .flexible import AUTO, FlexibleTable, Numbers, decided, framed
@@ -194,7 +195,7 @@ class ElasticEnd(Table):
     sphere: Annotated[Numbers | None, rules.numbers("[x, y, z, radius] in m", 4, of="m")] = None
     set: Annotated[str | None, texts.label("the name of a surface in the mesh file")] = None
     position: Annotated[Vector | None, rules.vector("m")] = None
-    orientation: Annotated[Numbers, rules.orientation()] = (0.0, 0.0, 0.0)
+    orientation: Annotated[Numbers, turns.orientation()] = (0.0, 0.0, 0.0)
     coupling: Annotated[str, texts.choice(*COUPLINGS)] = COUPLINGS[0]
     static_shapes: Annotated[bool | None, decided(texts.flag())] = None
 

@@ -11,6 +11,7 @@ from ...expression.expression import Expression
 from ...ir.facts import HingeFacts, builtin_hinges
 from ...numbers.rotations import Matrix, Vector, from_orientation, reject, unit
 from ..rules import text as texts
+from ..rules import turns
 from ..rules import values as rules
 from ..rules.values import Location, Numbers, Orientation, Table
 from .law import Law
@@ -27,7 +28,7 @@ class HingeKeys(Table):
     """The keys of a hinge, as they are written and as `HingeTable` leaves them."""
 
     type: Annotated[str, texts.name("a hinge type", ", ".join(builtin_hinges()) + " or your own")]
-    orientation: Annotated[Orientation, rules.orientation()] = (0.0, 0.0, 0.0)
+    orientation: Annotated[Orientation, turns.orientation()] = (0.0, 0.0, 0.0)
     axis: Annotated[Vector, rules.direction()] = (0.0, 0.0, 1.0)
     axis2: Annotated[Vector | None, rules.direction()] = None
     normal: Annotated[Vector | None, rules.direction()] = None

@@ -12,7 +12,8 @@ from ...expression.expression import Expression
 from ...ir.facts import HingeFacts, effort_unit
 from ...numbers.rotations import cross, norm, perpendicular, unit
 from ..rules import written
-from ..rules.values import Location, Refused, counted, found, quaternion
+from ..rules.turns import quaternion
+from ..rules.values import Location, Refused, counted, found
 from .hinge_keys import HingeKeys, Initial
 from .law import Law, LawEntry
 

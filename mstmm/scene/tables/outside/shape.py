@@ -10,6 +10,7 @@ from pydantic import model_validator
 
 from ....numbers.rotations import Matrix, Vector, from_orientation
 from ...rules import text as texts
+from ...rules import turns
 from ...rules import values as rules
 from ...rules.values import (
     GROUND,
@@ -64,7 +65,7 @@ class Shape(Table):
     file: Annotated[str | None, path(".stl", ".obj")] = None
     scale: Annotated[float | None, rules.number("m per unit of the mesh", above=0)] = None
     position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
-    orientation: Annotated[Orientation, rules.orientation()] = (0.0, 0.0, 0.0)
+    orientation: Annotated[Orientation, turns.orientation()] = (0.0, 0.0, 0.0)
     color: Annotated[str | None, _colour()] = None
     opacity: Annotated[float, rules.number("0 to 1", above=0)] = 1.0
 

@@ -1,0 +1,20 @@
+"""What other programs call the hinges of a scene."""
+
+from __future__ import annotations
+
+import re
+
+_CALLED = {
+    "revolute": "pin", "continuous": "pin", "hinge": "pin", "pivot": "pin", "rotational": "pin",
+    "slider": "prismatic", "slide": "prismatic", "translational": "prismatic",
+    "spherical": "ball", "socket": "ball", "ballandsocket": "ball",
+    "weld": "fixed", "rigid": "fixed", "clamp": "fixed", "clamped": "fixed",
+    "floating": "free", "freejoint": "free", "freeflyer": "free",
+    "cardan": "universal", "hooke": "universal", "helical": "screw", "bushing": "elastic",
+}  # fmt: skip
+
+
+def ours(word: str) -> str | None:
+    """The type of hinge that others call so; None where nobody does."""
+    plain = re.sub("[^a-z]", "", word.lower())
+    return _CALLED.get(plain) or _CALLED.get(re.sub("(joint|hinge)$", "", plain))
