@@ -111,6 +111,17 @@ def test_link_reaches_its_room(room: str) -> None:
     assert (link / "__init__.py").samefile(ROOT / room / "__init__.py")
 
 
+def test_an_editable_install_is_the_path_of_this_folder() -> None:
+    """Not a finder in code, which no type checker follows."""
+    script = (
+        "import setuptools; from distutils.core import run_setup; "
+        "project = run_setup('setup.py', ['editable_wheel'], stop_after='commandline'); "
+        "command = project.get_command_obj('editable_wheel'); command.ensure_finalized(); "
+        "assert command.package_dir == {'': '.'}, command.package_dir"
+    )
+    subprocess.run([sys.executable, "-c", script], cwd=ROOT, check=True)
+
+
 @pytest.mark.parametrize(
     "folder", ["templates", "generated", "runtime/engine/c", "runtime/integrate/c"]
 )

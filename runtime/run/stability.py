@@ -130,11 +130,9 @@ def check_later(engine: Engine, run: Trajectory) -> StepCheck | None:
 
 
 def _explicit(engine: Engine, settings: Settings) -> Tableau | None:
-    """The method of fixed explicit steps of a tree that moves; None for other runs."""
+    """The method of fixed explicit steps of a scene that moves; None for other runs."""
     others = (*classical.METHODS, *second_opinion.METHODS)
     if settings.step is None or settings.method in others or engine.nu == 0:
-        return None
-    if engine.packed.system.closes:
         return None
     tableau = get(settings.method)
     return None if tableau.implicit else tableau

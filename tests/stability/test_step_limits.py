@@ -124,6 +124,55 @@ def test_a_failure_of_a_step_that_is_too_long_is_put_down_to_the_step(hinge: str
     assert "shapes" not in result.message
 
 
+def test_limit_of_a_spring_on_geared_rods() -> None:
+    """The second rod turns -1/2 as fast and adds a quarter of its inertia to that of the first."""
+    rods = [{"name": name, "mass": 1.0, "center_of_mass": [0.5, 0, 0],
+             "inertia": [ROD, ROD, ROD]} for name in ("first", "second")]  # fmt: skip
+    pins: list[dict[str, Any]] = [
+        {"name": f"pin_{rod['name']}", "type": "pin", "outboard": rod["name"], "inboard": "ground",
+         "position": [k, 0, 0]}
+        for k, rod in enumerate(rods)
+    ]  # fmt: skip
+    pins[0]["law"] = {"stiffness": 1e6}
+    gear = {"expression": "pin_first.angle + 2*pin_second.angle"}
+    scene = mstmm.Scene(gravity=(0, 0, 0), body=rods, hinge=pins, coupling=[gear])
+    model = mstmm.compile(scene, engine="looped")
+    rate = np.sqrt(1e6 / (1.25 * MU))
+    found = check_step(
+        model.looped, Settings(t_end=1.0, method="rk4", step=3.0 / rate), *model.initial_state()
+    )
+    assert found is not None and found.risk is not None
+    assert found.hinge == "pin_first"
+    assert found.rate == pytest.approx(rate, rel=1e-6)
+    assert found.stable_step == pytest.approx(IMAGINARY / rate, rel=1e-2)
+
+
+def test_a_step_too_long_is_told_first_of_a_loop_with_a_beam() -> None:
+    """A four-bar linkage whose coupler bends; what the beam runs into is the step's doing."""
+    bodies = [
+        {"name": "crank", "mass": 1.0, "center_of_mass": [0.1, 0, 0],
+         "inertia": [1e-3, 1e-2, 1e-2], "ends": {"tip": [0.2, 0, 0]}},
+        {"name": "rocker", "mass": 1.0, "center_of_mass": [0.4, 0, 0],
+         "inertia": [1e-2, 0.1, 0.1], "ends": {"tip": [0.8, 0, 0]}},
+    ]  # fmt: skip
+    coupler = {"name": "coupler", "length": 1.0, "mass_per_length": 1.0,
+               "bending_stiffness": 2e3, "modes": {"y": 2}}  # fmt: skip
+    ends = (("ground", "crank", 1.2), ("crank.tip", "coupler", -0.9), ("ground", "rocker", 1.5),
+            ("coupler.tip", "rocker.tip", 0.0))  # fmt: skip
+    pins: list[dict[str, Any]] = [
+        {"name": f"pin{k}", "type": "pin", "inboard": near, "outboard": far,
+         "initial": {"q": [angle]}}
+        for k, (near, far, angle) in enumerate(ends)
+    ]  # fmt: skip
+    pins[2]["position"] = [1.0, 0, 0]
+    del pins[3]["initial"]
+    scene = mstmm.Scene(gravity=(0, -9.81, 0), body=bodies, beam=[coupler], hinge=pins)
+    run = mstmm.compile(scene, engine="looped").simulate(1.0, "rk4", step=0.02)
+    assert not run.success
+    assert run.message.startswith("step = 0.02 s is too long")
+    assert "the run with it ended" in run.message
+
+
 def test_a_run_costs_no_look_at_its_step(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is looked at when somebody asks for what speaks against the numbers, once."""
     calls = []
