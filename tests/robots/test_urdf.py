@@ -110,7 +110,7 @@ def test_what_joints_say_becomes_laws_couplings_and_notes(tmp_path: Path) -> Non
     notes = [str(note).split(": ", 1)[1] for note in found.notes]
     assert "line 36: joint 'other jaw': goes with 'jaw', by a coupling" in notes
     assert "line 9: joint 'shoulder-1': its axis has not length 1; its direction counts" in notes
-    assert "line 28: link 'tool': a <mesh> is not drawn" in notes
+    assert "line 25: link 'tool': not all of it is drawn" in notes
     assert "line 2: <transmission>: left out" in notes
     (shape,) = found.scene.shape
     assert (shape.on, shape.color) == ("link_1st_arm", "#336699")
@@ -212,3 +212,24 @@ def test_a_joint_that_mimics_may_be_held(tmp_path: Path) -> None:
     assert run.success and np.ptp(run.q[:, held]) == 0 and run.q[0, held] == 0.01
     with pytest.raises(mstmm.SceneError, match='expected "coupled" or "held", found'):
         mstmm.import_robot(path, mimics="frozen")
+
+
+def test_meshes_lie_in_packages_above_and_collision_shapes_stand_in(tmp_path: Path) -> None:
+    folder = tmp_path / "my robots" / "arm" / "urdf"
+    folder.mkdir(parents=True)
+    for name in ("plate.stl", "tool.dae", "hull.obj"):
+        (folder.parent / name).write_text("o")
+    mesh = '<geometry><mesh filename="package://{}"/></geometry>'
+    text = ARM.replace('<box size="0.6 0.1 0.1"/>', '<mesh filename="package://arm/plate.stl"/>')
+    text = text.replace(
+        f"<visual>{mesh.format('arm/tool.dae')}</visual>",
+        f"<visual>{mesh.format('arm/tool.dae')}</visual>"
+        f"<collision>{mesh.format('my%20robots/arm/hull.obj')}</collision>"
+        f"<collision>{mesh.format('other/none.stl')}</collision>",
+    )
+    found = mstmm.import_robot(written(folder, text))
+    drawn = [Path(shape.file or "").name for shape in found.scene.shape]
+    assert drawn == ["plate.stl", "hull.obj"]
+    told = [f"{note.element}: {note.text}" for note in found.notes]
+    assert "link 'tool': drawn by its collision shapes" in told
+    assert "link 'tool': no mesh 'package://other/none.stl' to draw it with" in told

@@ -17,6 +17,7 @@ from ..rules.messages import near
 from ..rules.values import GROUND
 from ..scene import Scene
 from .masses import joined
+from .meshes import mesh_file
 from .names import Names
 from .robot import FIXED, NOTHING, Joint, Link, Mimic, Note, Robot
 from .tree import Tree
@@ -258,11 +259,12 @@ class _Writer:
             owner, frame = self.place[look.link]
             pose, keys = frame.then(look.pose), dict(look.keys)
             if file := keys.get("file"):
-                if folder is None or not (folder / file).is_file():
+                found = None if folder is None else mesh_file(folder, file)
+                if found is None:
                     link = self.tree.links[look.link]
                     self._tell(link, f"link {look.link!r}", f"no mesh {file!r} to draw it with")
                     continue
-                keys["file"] = str(folder / file)
+                keys["file"] = str(found)
             on = GROUND if owner == GROUND else self._bodies[owner]
             yield {"on": on, **_keys(pose), **keys}
 

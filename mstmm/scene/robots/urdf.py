@@ -80,8 +80,7 @@ class _Reader:
 
     def link(self, one: Element) -> Link:
         name = one.text("name")
-        for visual in one.all("visual"):
-            self._look(name, visual)
+        self._looks_of(one, name)
         inertial = one.first("inertial")
         if inertial is None:
             return Link(name, where=one.where)
@@ -152,26 +151,35 @@ class _Reader:
             self.note(one, f"joint {name!r}", "limits of effort and velocity left out")
         return {"law": law} if law else {}
 
-    def _look(self, link: str, visual: Element) -> None:
-        """What cannot be read of it is not drawn, for nothing moves otherwise."""
+    def _looks_of(self, one: Element, link: str) -> None:
+        """Its visuals; where none of them can be drawn, its collision shapes."""
+        drawn = [self._look(link, visual) for visual in one.all("visual")]
+        if all(drawn):
+            return
+        instead = [] if any(drawn) else [self._look(link, two) for two in one.all("collision")]
+        what = "drawn by its collision shapes" if any(instead) else "not all of it is drawn"
+        self.note(one, f"link {link!r}", what)
+
+    def _look(self, link: str, visual: Element) -> bool:
+        """Whether it is drawn; what cannot be read is not, for nothing moves otherwise."""
         try:
-            self._shape(link, visual)
+            return self._shape(link, visual)
         except SceneError as error:
             self.notes.append(Note(visual.where, f"link {link!r}", f"not drawn: {error}"))
+            return False
 
-    def _shape(self, link: str, visual: Element) -> None:
+    def _shape(self, link: str, visual: Element) -> bool:
         geometry = visual.first("geometry")
         if geometry is None or not geometry.children:
-            return
-        solid = geometry.children[0]
-        keys = _solid(solid)
+            return True
+        keys = _solid(geometry.children[0])
         if keys is None:
-            self.note(visual, f"link {link!r}", f"a <{solid.tag}> is not drawn")
-            return
+            return False
         if (material := visual.first(_MATERIAL)) is not None:
             found = _color(material) or self._colors.get(material.attributes.get("name", ""))
             keys |= {"color": found} if found else {}
         self.looks.append(Look(link, _pose(visual), keys))
+        return True
 
 
 def _pose(one: Element) -> Pose:
@@ -213,10 +221,9 @@ def _solid(one: Element) -> dict[str, Any] | None:
 
 
 def _mesh(file: str, scale: Vector | tuple[float, ...]) -> dict[str, Any] | None:
-    """A mesh beside the file, or below its folder; others lie in packages that are not here."""
-    beside = "://" not in file and not PurePosixPath(file).is_absolute()
+    """A mesh, wherever it is; None of one that is in a format that is not read, or squeezed."""
     readable = file.lower().endswith((".stl", ".obj")) and ".." not in PurePosixPath(file).parts
-    if not beside or not readable or len(set(scale)) != 1 or scale[0] <= 0:
+    if not readable or len(set(scale)) != 1 or scale[0] <= 0:
         return None
     return {"type": "mesh", "file": file} | ({"scale": scale[0]} if scale[0] != 1 else {})
 
