@@ -71,12 +71,17 @@ def _assignments(statements: Iterable[Statement]) -> Iterator[Assign]:
             yield from _assignments(statement.body)
 
 
-def reads(kernel: KernelIR, port: str) -> bool:
-    """Whether any statement reads the port."""
+def elements(kernel: KernelIR) -> list[Element]:
+    """What statements read of inputs and complete outputs."""
     operands = [operand for statement in assignments(kernel) for operand in statement.args]
     operands += [s.value for s in kernel.statements if isinstance(s, (Store, Sum))]
     operands += [s.condition for s in kernel.statements if isinstance(s, Guard)]
-    return any(isinstance(x, Element) and x.port == port for x in operands)
+    return [x for x in operands if isinstance(x, Element)]
+
+
+def reads(kernel: KernelIR, port: str) -> bool:
+    """Whether any statement reads the port."""
+    return any(x.port == port for x in elements(kernel))
 
 
 def check(kernel: KernelIR) -> None:

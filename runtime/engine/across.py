@@ -7,12 +7,12 @@ one hinge that closes a loop.  Where no load and no row feels two groups at once
 one unknown of each in the same pass, so that the number of passes does not grow with that of the
 loops that stand side by side; the matrix that is left has a band (E. Cuthill, J. McKee, Proc. 24th
 ACM National Conference (1969) 157-172; A. R. Curtis, M. J. D. Powell, J. K. Reid, J. Inst. Math.
-Appl. 13 (1974) 117-119).  Where an expression or a coupling may read any state there is one group.
+Appl. 13 (1974) 117-119).  Where there are couplings, there is one group.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -98,27 +98,29 @@ def across_of(engine: Engine) -> Across:
     packed = engine.packed
     reach, loops = packed.written.reach, packed.written.loops
     efforts, rows = list(_efforts(engine)), _rows_of_loops(engine)
-    count = 6 * len(reach.across) + len(efforts) + len(rows)
     unknowns = list(reach.across), efforts, rows
-    watched = [one for one in reach.watched if one is not None]
-    if len(watched) < len(reach.watched) or efforts or (loops and loops.couplings) or not count:
+    if (loops and loops.couplings) or not (reach.across or efforts):
         return at_once(*unknowns, engine.nu)
     branches = _branches(packed.system)
     closures = {one.frame: (one.inboard, one.outboard) for one in (loops.closures if loops else ())}
-    felt = {body: {branches[other] for other in one}
-            for body, one in zip(reach.across, watched, strict=True)}  # fmt: skip
+    group = dict(enumerate(branches)) | {frame: frame for frame in closures}
+    speeds = _speeds(packed.system, group)
+    of_speed = {speed: name for name, own in speeds.items() for speed in own}
+    felt = {body: {group[other] for other in watched}
+            for body, watched in zip(reach.across, reach.watched, strict=True)}  # fmt: skip
+    by_rows = dict[int, set[int]]()
     for frame, ends in closures.items():
-        for body in ends:
-            if body != GROUND:
-                felt[body].add(frame)
-    by_rows = {frame: {frame} | {branches[body] for body in ends if body != GROUND}
-               for frame, ends in closures.items()}  # fmt: skip
+        on = [body for body in ends if body != GROUND]
+        by_rows[frame] = {frame} | {branches[body] for body in on}
+        for body in on:
+            felt[body].add(frame)
     moving = [branches[body] for body in reach.across for _ in range(6)]
+    moving += [of_speed[speed] for _, speed in efforts]
     moving += [frame for frame, _, _, _ in rows]
     feeling = [felt[body] for body in reach.across for _ in range(6)]
+    feeling += [{group[body] for body in heard} for heard in reach.heard]
     feeling += [by_rows[frame] for frame, _, _, _ in rows]
-    feeling = [one - {GROUND} for one in feeling]
-    return _apart(unknowns, moving, feeling, _speeds(packed.system, branches, set(closures)))
+    return _apart(unknowns, moving, [one - {GROUND} for one in feeling], speeds)
 
 
 def at_once(bodies: Sequence[int], efforts: Any, rows: Any, nu: int) -> Across:
@@ -203,13 +205,13 @@ def _branches(system: System) -> list[int]:
     return found
 
 
-def _speeds(system: System, branches: Sequence[int], frames: set[int]) -> dict[int, list[int]]:
-    """The speeds by branch, and by hinge that closes a loop."""
+def _speeds(system: System, group: Mapping[int, int]) -> dict[int, list[int]]:
+    """The speeds by group, of which every body has one."""
     found, first = dict[int, list[int]](), system.places["u"].tolist()
     of_hinges = system.rows(lambda one: one.nu).tolist()
     bent = system.rows(lambda one: one.modal is not None)
-    for place, branch in enumerate(branches):
-        own = found.setdefault(place if place in frames else branch, [])
+    for place, name in group.items():
+        own = found.setdefault(name, [])
         own += range(first[place], first[place] + of_hinges[place])
         if bent[place] and (modal := system.body(place).modal):
             own += range(modal.u, modal.u + modal.n)

@@ -8,11 +8,14 @@ the tree.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from mstmm.ir import Assign, Element, KernelIR, Operand, Store, Temporary
-from mstmm.ir.kernel import reads
+import numpy as np
+
+from mstmm.arrays import Integers
+from mstmm.ir import Assign, Element, Operand, Store, Temporary
+from mstmm.ir.kernel import elements, reads
 
 from .system import ForceNumbers, LoadNumbers, System
 
@@ -23,69 +26,65 @@ GROUND = -1
 class Reach:
     """`loads` and `forces` say of each whether it changes with the place of its body alone;
     `placed` are the places of the bodies that lead to such loads, `across` those on which others
-    act, `watched` those by whose motion what acts on each of these changes, None where any may,
-    `efforts` (value, speed) of every effort of a law that an expression of the state gives."""
+    act, `watched` those by whose motion what acts on each of these changes, `efforts` (value,
+    speed) of every effort of a law that an expression of the state gives, and `heard` the places
+    of the bodies whose coordinates and speeds each of these reads."""
 
     loads: tuple[bool, ...]
     forces: tuple[bool, ...]
     placed: tuple[int, ...]
     across: tuple[int, ...]
-    watched: tuple[frozenset[int] | None, ...]
+    watched: tuple[frozenset[int], ...]
     efforts: tuple[tuple[int, int], ...]
+    heard: tuple[frozenset[int], ...]
 
 
 def reach_of(system: System) -> Reach:
     """What the loads of a system reach."""
-    depends = _depends_on_state(system.values)
-    changing = [_reads_state(load, depends) for load in system.loads]
+    heard = _heard(system)
+    told = [frozenset().union(*(heard[k] for k in _values_of(load))) for load in system.loads]
     loads = tuple(
-        load.axes == GROUND != load.body and not reading
-        for load, reading in zip(system.loads, changing, strict=True)
+        load.axes == GROUND != load.body and not by_state
+        for load, by_state in zip(system.loads, told, strict=True)
     )
-    forces = tuple(map(_to_ground, system.forces))
-    efforts = tuple(_efforts_of_state(system, depends))
-    own, across = set[int](), _Across()
-    for load, alone, reading in zip(system.loads, loads, changing, strict=True):
+    efforts = tuple(_efforts_of_state(system, heard))
+    own, watched = set[int](), dict[int, set[int]]()
+    for load, alone, by_state in zip(system.loads, loads, told, strict=True):
         if alone:
             own.add(load.body)
-        elif reading or load.axes != load.body:  # a follower of given size turns with its body
-            across.act([load.body], None if reading else [load.body, load.axes])
-    for force, alone in zip(system.forces, forces, strict=True):
-        ends = [body for body, _, _ in force.ends]
-        if alone:
+        elif by_state or load.axes != load.body:  # a follower of given size turns with its body
+            watched.setdefault(load.body, set()).update((load.body, load.axes), by_state)
+    forces = list[bool]()
+    for force in system.forces:
+        ends, by_state = [body for body, _, _ in force.ends], _told(system, force)
+        forces.append(ends.count(GROUND) == 1 and not by_state)
+        if forces[-1]:
             own.update(ends)
-        else:
-            across.act(ends, None if _told(force) else ends)
-    given = {speed for _, speed in efforts}
-    places, parents = system.places["u"].tolist(), system.parents.tolist()
-    for closure in system.closures:
-        first = places[closure.frame]
-        ends = [parents[closure.frame], closure.outboard]
-        speeds = range(first, first + system.body(closure.frame).nu)
-        across.act(ends, ends if given.isdisjoint(speeds) else None)
+        for body in () if forces[-1] else ends:
+            watched.setdefault(body, set()).update(ends, by_state)
+    for sides, by_state in _closures(system, {speed: heard[value] for value, speed in efforts}):
+        for body in sides:
+            watched.setdefault(body, set()).update(sides, by_state)
+    across = tuple(sorted(watched.keys() - {GROUND}))
     return Reach(
-        loads, forces, _to_the_root(system, own | set(system.dragged)), *across.found(), efforts
-    )
+        loads, tuple(forces), _to_the_root(system, own | set(system.dragged)), across,
+        tuple(frozenset(watched[body] - {GROUND}) for body in across),
+        efforts, tuple(heard[value] for value, _ in efforts),
+    )  # fmt: skip
 
 
-class _Across:
-    """Bodies on which others act, and those that each of them watches (None: any)."""
-
-    def __init__(self) -> None:
-        self._watched: dict[int, set[int] | None] = {}
-
-    def act(self, bodies: Sequence[int], watched: Sequence[int] | None) -> None:
-        for body in bodies:
-            known = self._watched.setdefault(body, set())
-            if known is not None and watched is not None:
-                known.update(watched)
-            else:
-                self._watched[body] = None
-
-    def found(self) -> tuple[tuple[int, ...], tuple[frozenset[int] | None, ...]]:
-        places = tuple(sorted(self._watched.keys() - {GROUND}))
-        all_of = [self._watched[place] for place in places]
-        return places, tuple(None if one is None else frozenset(one - {GROUND}) for one in all_of)
+def _closures(
+    system: System, heard: Mapping[int, frozenset[int]]
+) -> Iterator[tuple[tuple[int, int], frozenset[int]]]:
+    """Bodies on both sides of what closes loops, and those that the efforts of its laws read, which
+    are known by speed."""
+    if not system.closures:
+        return
+    first, parents = system.places["u"].tolist(), system.parents.tolist()
+    for one in system.closures:
+        speeds = range(first[one.frame], first[one.frame] + system.body(one.frame).nu)
+        read = frozenset().union(*(heard.get(speed, frozenset()) for speed in speeds))
+        yield (parents[one.frame], one.outboard), read
 
 
 def _to_the_root(system: System, bodies: set[int]) -> tuple[int, ...]:
@@ -98,48 +97,71 @@ def _to_the_root(system: System, bodies: set[int]) -> tuple[int, ...]:
     return tuple(sorted(found))
 
 
-def _reads_state(load: LoadNumbers, depends: Sequence[bool]) -> bool:
-    return any(depends[place] for place in (*load.force, *load.moment) if place >= 0)
+def _values_of(load: LoadNumbers) -> list[int]:
+    """Values of expressions that are components of a load."""
+    return [place for place in (*load.force, *load.moment) if place >= 0]
 
 
-def _to_ground(force: ForceNumbers) -> bool:
-    ends = [body for body, _, _ in force.ends]
-    return ends.count(GROUND) == 1 and not _told(force)
+def _told(system: System, force: ForceNumbers) -> frozenset[int]:
+    """Places of the bodies that the expression of a force reads."""
+    if force.effort is None or not (reads(force.effort, "q") or reads(force.effort, "u")):
+        return frozenset()
+    owners = _owners(system)
+    return frozenset().union(*(_read(x, owners) for x in elements(force.effort)))
 
 
-def _told(force: ForceNumbers) -> bool:
-    """Whether an expression of the state gives its effort."""
-    effort = force.effort
-    return effort is not None and (reads(effort, "q") or reads(effort, "u"))
-
-
-def _efforts_of_state(system: System, depends: Sequence[bool]) -> list[tuple[int, int]]:
+def _efforts_of_state(system: System, heard: Sequence[frozenset[int]]) -> Iterator[tuple[int, int]]:
+    if not system.laws or not any(heard):
+        return
     first = system.places["u"]
-    return [
-        (value, int(first[body]) + law.speed + j)
-        for run in system.laws
-        if any(x >= 0 and depends[x] for law in run.pattern for some in law.efforts for x in some)
-        for law, body, _, values in run.each()
-        for j, value in enumerate(values)
-        if value >= 0 and depends[value]
-    ]
+    for run in system.laws:
+        if any(x >= 0 and heard[x] for law in run.pattern for some in law.efforts for x in some):
+            for law, body, _, values in run.each():
+                for j, value in enumerate(values):
+                    if value >= 0 and heard[value]:
+                        yield value, int(first[body]) + law.speed + j
 
 
-def _depends_on_state(values: KernelIR | None) -> list[bool]:
-    """Whether each value of the scene's expressions reads coordinates or speeds."""
+def _heard(system: System) -> list[frozenset[int]]:
+    """Of each value of the scene's expressions, the places of the bodies whose coordinates and
+    speeds it reads."""
+    values = system.values
     if values is None:
         return []
-    reading: dict[int, bool] = {}
-    found = [False] * values.outputs[0].length(1)
+    owners = _owners(system) if reads(values, "q") or reads(values, "u") else {}
+    known: dict[int, frozenset[int]] = {}
+    found = [frozenset[int]()] * values.outputs[0].length(1)
 
-    def moving(operand: Operand) -> bool:
+    def read(operand: Operand) -> frozenset[int]:
         if isinstance(operand, Temporary):
-            return reading[operand.number]
-        return isinstance(operand, Element) and operand.port in ("q", "u")
+            return known[operand.number]
+        return _read(operand, owners)
 
     for statement in values.statements:
         if isinstance(statement, Assign):
-            reading[statement.number] = any(map(moving, statement.args))
+            known[statement.number] = frozenset().union(*map(read, statement.args))
         elif isinstance(statement, Store):
-            found[int(statement.index[0])] = moving(statement.value)
+            found[int(statement.index[0])] = read(statement.value)
+    return found
+
+
+def _read(operand: Operand, owners: Mapping[str, Integers]) -> frozenset[int]:
+    """The body whose number an operand is, if it is one of a coordinate or speed."""
+    if not isinstance(operand, Element) or operand.port not in owners:
+        return frozenset()
+    return frozenset((int(owners[operand.port][int(operand.index[0])]),))
+
+
+def _owners(system: System) -> dict[str, Integers]:
+    """Place of the body that each coordinate "q" and speed "u" belongs to."""
+    sizes = {"q": system.rows(lambda one: one.nq), "u": system.rows(lambda one: one.nu)}
+    found = {"q": np.full(system.nq, GROUND), "u": np.full(system.nu, GROUND)}
+    for port, firsts in system.places.items():
+        count = sizes[port]
+        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        found[port][np.repeat(firsts, count) + within] = np.repeat(np.arange(len(count)), count)
+    for place in np.flatnonzero(system.rows(lambda one: one.modal is not None)):
+        if modal := system.body(int(place)).modal:
+            found["q"][modal.q : modal.q + modal.n] = place
+            found["u"][modal.u : modal.u + modal.n] = place
     return found

@@ -15,12 +15,13 @@ BODIES = ("base", "arm", "hand", "flag")
 INBOARD = ("ground", "base.tip", "arm.tip", "arm.side")
 
 
-def reach(**tables: list[dict[str, Any]]) -> Reach:
+def reach(efforts: dict[str, str] | None = None, **tables: list[dict[str, Any]]) -> Reach:
     rod = {"mass": 1.0, "inertia": [0.1, 0.1, 0.1], "ends": {"tip": [1, 0, 0], "side": [0, 1, 0]}}
     hinge = [
-        {"name": f"to_{name}", "type": "pin", "inboard": inboard, "outboard": name}
+        {"name": f"to_{name}", "type": "pin", "inboard": inboard, "outboard": name,
+         "law": {"effort": (efforts or {}).get(name, 0.0)}}
         for name, inboard in zip(BODIES, INBOARD, strict=True)
-    ]
+    ]  # fmt: skip
     scene = mstmm.Scene(
         gravity=[0, 0, -9.81], body=[rod | {"name": name} for name in BODIES], hinge=hinge, **tables
     )
@@ -28,7 +29,7 @@ def reach(**tables: list[dict[str, Any]]) -> Reach:
 
 
 def test_no_loads() -> None:
-    assert reach() == Reach((), (), (), (), (), ())
+    assert reach() == Reach((), (), (), (), (), (), ())
 
 
 @pytest.mark.parametrize(
@@ -70,7 +71,7 @@ def test_springs(
     ("tables", "watched"),
     [
         ({"load": [{"on": "arm", "force": [0, 0, 1.0], "axes": "flag"}]}, [{1, 3}]),
-        ({"load": [{"on": "flag", "force": [0, "to_base.q", 0]}]}, [None]),
+        ({"load": [{"on": "flag", "force": [0, "to_base.q", 0]}]}, [{0, 3}]),
         (
             {"spring": [{"from": "base", "to": "flag", "law": {"stiffness": 1.0}},
                         {"from": "arm", "to": "flag", "law": {"stiffness": 1.0}}]},
@@ -79,10 +80,17 @@ def test_springs(
         (
             {"spring": [{"from": "base", "to": "flag", "law": {"stiffness": 1.0}},
                         {"from": "arm", "to": "flag", "law": {"effort": "to_hand.u"}}]},
-            [{0, 3}, None, None],
+            [{0, 3}, {1, 2, 3}, {0, 1, 2, 3}],
         ),
     ],
     ids=["another's axes", "by the state", "springs", "one by the state"],
 )  # fmt: skip
-def test_what_is_watched(tables: dict[str, Any], watched: list[set[int] | None]) -> None:
+def test_what_is_watched(tables: dict[str, Any], watched: list[set[int]]) -> None:
     assert list(reach(**tables).watched) == watched
+
+
+def test_efforts_hear_what_they_read() -> None:
+    """Of the values of a law those of the state count, by the bodies that they read."""
+    found = reach({"flag": "sin(t)*to_base.u", "hand": "cos(t)", "arm": "u - 2*to_hand.q"})
+    assert [speed for _, speed in found.efforts] == [1, 3]
+    assert found.heard == (frozenset({1, 2}), frozenset({0}))

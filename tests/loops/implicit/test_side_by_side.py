@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reference.random_couplings import random_coupled
 
 import mstmm
 from mstmm.runtime.engine import tangent
@@ -44,8 +45,19 @@ def with_springs() -> dict[str, Any]:
     }
 
 
+def told(count: int) -> dict[str, Any]:
+    """Cranks that follow their left neighbours, laws on what closes loops that feel a crank."""
+    scene = four_bars(count, angle=0.7)
+    hinges = {hinge["name"]: hinge for hinge in scene["hinge"]}
+    for k in range(count):
+        hinges[f"foot{k + 1}"]["law"] = {"effort": f"9*(foot{k}.q - q) - 0.3*u"}
+        hinges[f"right{k}"]["law"] = {"effort": f"0.1*foot{k}.u - 0.2*u"}
+    return scene | {"load": [{"on": "crank1", "force": ["foot0.q", 0, 0], "axes": "body"}]}
+
+
 SCENES = {
     "windows": four_bars(6, angle=0.7), "on a frame": on_a_frame(5), "springs": with_springs(),
+    "told": told(6),
     "cranks": cranks(), "legs": legs(law=100.0), "Andrews": andrews(), "scissors": scissors(4),
     "a blade that hangs": hung(), "shapes in mesh": meshed(), "a flexible rod": shackled(),
 }  # fmt: skip
@@ -83,7 +95,7 @@ def test_answers_are_those_of_the_full_matrix(name: str, monkeypatch: pytest.Mon
         assert np.abs(one - other).max() <= 1e-11 * np.abs(other).max()
 
 
-@pytest.mark.parametrize("make", [lambda n: four_bars(n, angle=0.7), on_a_frame])
+@pytest.mark.parametrize("make", [lambda n: four_bars(n, angle=0.7), on_a_frame, told])
 def test_passes_do_not_grow_with_the_windows(make: Any) -> None:
     few, many = (across_of(engine_of(make(count))) for count in (8, 32))
     assert many.count == 4 * few.count
@@ -91,9 +103,6 @@ def test_passes_do_not_grow_with_the_windows(make: Any) -> None:
     assert many.width == few.width < 120
 
 
-def test_expressions_of_the_state_may_read_anything() -> None:
-    told = four_bars(3, angle=0.7) | {
-        "load": [{"on": "crank1", "force": ["foot0.q", 0.0, 0.0], "axes": "body"}]
-    }
-    across = across_of(engine_of(told))
+def test_couplings_keep_all_in_one_group() -> None:
+    across = across_of(engine_of(random_coupled(4)[0]))
     assert len(across.passes) == across.width == across.count
