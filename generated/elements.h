@@ -1389,6 +1389,22 @@ int mstmm_sweep_link_pin_recover(const real *restrict link, const real *restrict
     const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
+extern const mstmm_element mstmm_sweep_link_pin_rotor;
+int mstmm_sweep_link_pin_rotor_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta);
+int mstmm_sweep_link_pin_rotor_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot);
+int mstmm_sweep_link_pin_rotor_condense(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict b, const real *restrict p,
+    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
+    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
+    real *restrict e_I);
+int mstmm_sweep_link_pin_rotor_recover(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
+
 extern const mstmm_element mstmm_sweep_link_prismatic;
 int mstmm_sweep_link_prismatic_angle(const real *restrict link, const real *restrict q,
     real *restrict theta);
@@ -1405,6 +1421,22 @@ int mstmm_sweep_link_prismatic_recover(const real *restrict link, const real *re
     const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
+extern const mstmm_element mstmm_sweep_link_prismatic_rotor;
+int mstmm_sweep_link_prismatic_rotor_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta);
+int mstmm_sweep_link_prismatic_rotor_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot);
+int mstmm_sweep_link_prismatic_rotor_condense(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict b, const real *restrict p,
+    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
+    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
+    real *restrict e_I);
+int mstmm_sweep_link_prismatic_rotor_recover(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
+
 extern const mstmm_element mstmm_sweep_link_screw;
 int mstmm_sweep_link_screw_angle(const real *restrict link, const real *restrict q,
     real *restrict theta);
@@ -1418,6 +1450,22 @@ int mstmm_sweep_link_screw_condense(const real *restrict link, const real *restr
     const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
     real *restrict e_I);
 int mstmm_sweep_link_screw_recover(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
+
+extern const mstmm_element mstmm_sweep_link_screw_rotor;
+int mstmm_sweep_link_screw_rotor_angle(const real *restrict link, const real *restrict q,
+    real *restrict theta);
+int mstmm_sweep_link_screw_rotor_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot);
+int mstmm_sweep_link_screw_rotor_condense(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict b, const real *restrict p,
+    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
+    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
+    real *restrict e_I);
+int mstmm_sweep_link_screw_rotor_recover(const real *restrict link, const real *restrict turn,
     const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 

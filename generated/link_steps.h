@@ -19,7 +19,7 @@ static inline int mstmm_at_link_forward(mstmm_link_at at)
     int code;
     code = mstmm_link_forward(at.forward,
         .link = at.numbers, .turn = at.link + MSTMM_LINK_TURN, .b = at.numbers + 5,
-        .p = at.numbers + 15, .q = at.q, .u = at.u, .motion_I = at.outer_motion,
+        .p = at.numbers + 16, .q = at.q, .u = at.u, .motion_I = at.outer_motion,
         .d = at.link + MSTMM_LINK_SHIFT, .motion = at.link + MSTMM_LINK_MOTION,
         .e_B = at.link + MSTMM_LINK_LOAD, .qdot = at.qdot);
     if (code) return mstmm_fail(at.state, MSTMM_FAILED_HINGE, at.index, code);
@@ -32,7 +32,7 @@ static inline int mstmm_at_link_condense(mstmm_link_at at)
     int code;
     code = mstmm_link_condense(at.condense,
         .link = at.numbers, .turn = at.link + MSTMM_LINK_TURN, .d = at.link + MSTMM_LINK_SHIFT,
-        .b = at.numbers + 5, .p = at.numbers + 15, .S_K = at.inner, .e_K = at.inner + 21,
+        .b = at.numbers + 5, .p = at.numbers + 16, .S_K = at.inner, .e_K = at.inner + 21,
         .e_B = at.link + MSTMM_LINK_LOAD, .tau = at.tau, .G = at.link + MSTMM_LINK_FIXED + at.nu,
         .g = at.link + MSTMM_LINK_FIXED, .S_I = at.outer, .e_I = at.outer + 21);
     if (code) return mstmm_fail(at.state, MSTMM_FAILED_UNDETERMINED, at.index, code);
@@ -44,7 +44,7 @@ static inline int mstmm_at_link_recover(mstmm_link_at at)
 {
     mstmm_link_recover(at.recover,
         .link = at.numbers, .turn = at.link + MSTMM_LINK_TURN, .d = at.link + MSTMM_LINK_SHIFT,
-        .p = at.numbers + 15, .G = at.link + MSTMM_LINK_FIXED + at.nu,
+        .p = at.numbers + 16, .G = at.link + MSTMM_LINK_FIXED + at.nu,
         .g = at.link + MSTMM_LINK_FIXED, .delta_I = at.outer_delta, .udot = at.udot,
         .delta = at.link + MSTMM_LINK_MOTION);
     return 0;

@@ -64,8 +64,11 @@ const mstmm_element *const mstmm_elements[] = {
     &mstmm_sweep_laws,
     &mstmm_sweep_link_cylindrical,
     &mstmm_sweep_link_pin,
+    &mstmm_sweep_link_pin_rotor,
     &mstmm_sweep_link_prismatic,
+    &mstmm_sweep_link_prismatic_rotor,
     &mstmm_sweep_link_screw,
+    &mstmm_sweep_link_screw_rotor,
     &mstmm_sweep_loops,
     &mstmm_sweep_modal,
     &mstmm_sweep_planar_pin,
@@ -74,4 +77,4 @@ const mstmm_element *const mstmm_elements[] = {
     NULL,
 };
 
-const int mstmm_element_count = 67;
+const int mstmm_element_count = 70;

@@ -56,7 +56,7 @@ static const mstmm_port mstmm_sweep_link_cylindrical_angle_outputs[] = {
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  turn[2] cosine and sine of the angle about z
- * in  b[10] parameters of the rigid body, body axes
+ * in  b[11] parameters of the rigid body, body axes; rotor inertia of its hinge
  * in  p[0] parameters
  * in  q[2] coordinates: displacement [m], angle [rad]
  * in  u[2] speeds: displacement_rate [m/s], angle_rate [rad/s]
@@ -268,7 +268,7 @@ static int mstmm_sweep_link_cylindrical_forward_call(int n, const real *const *i
 static const mstmm_port mstmm_sweep_link_cylindrical_forward_inputs[] = {
     {"link", 5, "", 0, 0},
     {"turn", 2, "", 0, 0},
-    {"b", 10, "", 0, 0},
+    {"b", 11, "", 0, 0},
     {"p", 0, "", 0, 0},
     {"q", 2, "", 0, 0},
     {"u", 2, "", 0, 0},
@@ -288,7 +288,7 @@ static const mstmm_port mstmm_sweep_link_cylindrical_forward_outputs[] = {
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  turn[2] cosine and sine of the angle about z
  * in  d[1] (m) shift along z
- * in  b[10] parameters of the rigid body, body axes
+ * in  b[11] parameters of the rigid body, body axes; rotor inertia of its hinge
  * in  p[0] parameters
  * in  S_K[21] S of what hangs on the body
  * in  e_K[6] (N, N*m) e of what hangs on the body
@@ -669,7 +669,7 @@ static const mstmm_port mstmm_sweep_link_cylindrical_condense_inputs[] = {
     {"link", 5, "", 0, 0},
     {"turn", 2, "", 0, 0},
     {"d", 1, "m", 0, 0},
-    {"b", 10, "", 0, 0},
+    {"b", 11, "", 0, 0},
     {"p", 0, "", 0, 0},
     {"S_K", 21, "", 0, 0},
     {"e_K", 6, "N, N*m", 0, 0},
@@ -818,7 +818,7 @@ static const mstmm_kernel mstmm_sweep_link_cylindrical_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_link_cylindrical_forward_inputs,
         .outputs = mstmm_sweep_link_cylindrical_forward_outputs,
-        .ir_hash = "c245e6dfedd11d547215640c328f6e913d2327914ae6f17a08f0595039635486",
+        .ir_hash = "d4acce38399b4670e52a2eb0a50886019f14c1c9e37e85a20176c26467690f20",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -830,7 +830,7 @@ static const mstmm_kernel mstmm_sweep_link_cylindrical_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_link_cylindrical_condense_inputs,
         .outputs = mstmm_sweep_link_cylindrical_condense_outputs,
-        .ir_hash = "027a647f9e66cbc3e960fe575ec3d8a2f1375fda1f04d1156677176393640c7a",
+        .ir_hash = "445fef227da22dbacdcd8d25d08809da0c3b429065b082db340b1ecf02b40b45",
         .n_guards = 6,
         .guards = mstmm_sweep_link_cylindrical_condense_guards,
     },
@@ -852,7 +852,7 @@ const mstmm_element mstmm_sweep_link_cylindrical = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_cylindrical",
-    .hash = "e697c5d89a4bf74252f9d4ced738e8680aca8ab7faed4c5079f878ebc8d56ae9",
+    .hash = "3b48591d3a8330acf54579d508b7fbf5e73d8e6b89563027bd82b017bf445db4",
     .nq = 0,
     .nu = 0,
     .np = 0,

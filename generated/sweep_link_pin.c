@@ -56,7 +56,7 @@ static const mstmm_port mstmm_sweep_link_pin_angle_outputs[] = {
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  turn[2] cosine and sine of the angle about z
- * in  b[10] parameters of the rigid body, body axes
+ * in  b[11] parameters of the rigid body, body axes; rotor inertia of its hinge
  * in  p[0] parameters
  * in  q[1] coordinates: angle [rad]
  * in  u[1] speeds: angle_rate [rad/s]
@@ -261,7 +261,7 @@ static int mstmm_sweep_link_pin_forward_call(int n, const real *const *in, real 
 static const mstmm_port mstmm_sweep_link_pin_forward_inputs[] = {
     {"link", 5, "", 0, 0},
     {"turn", 2, "", 0, 0},
-    {"b", 10, "", 0, 0},
+    {"b", 11, "", 0, 0},
     {"p", 0, "", 0, 0},
     {"q", 1, "", 0, 0},
     {"u", 1, "", 0, 0},
@@ -281,7 +281,7 @@ static const mstmm_port mstmm_sweep_link_pin_forward_outputs[] = {
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  turn[2] cosine and sine of the angle about z
  * in  d[1] (m) shift along z
- * in  b[10] parameters of the rigid body, body axes
+ * in  b[11] parameters of the rigid body, body axes; rotor inertia of its hinge
  * in  p[0] parameters
  * in  S_K[21] S of what hangs on the body
  * in  e_K[6] (N, N*m) e of what hangs on the body
@@ -636,7 +636,7 @@ static const mstmm_port mstmm_sweep_link_pin_condense_inputs[] = {
     {"link", 5, "", 0, 0},
     {"turn", 2, "", 0, 0},
     {"d", 1, "m", 0, 0},
-    {"b", 10, "", 0, 0},
+    {"b", 11, "", 0, 0},
     {"p", 0, "", 0, 0},
     {"S_K", 21, "", 0, 0},
     {"e_K", 6, "N, N*m", 0, 0},
@@ -772,7 +772,7 @@ static const mstmm_kernel mstmm_sweep_link_pin_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_link_pin_forward_inputs,
         .outputs = mstmm_sweep_link_pin_forward_outputs,
-        .ir_hash = "8e0b18e70f3948d73c0703ad655c6533d031b44e30da6299f4a031a5acc149a5",
+        .ir_hash = "c98c0a4ea0198e60250dc9ebb6ed712d83fd6a1266147be98a5cd2b4800a056a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -784,7 +784,7 @@ static const mstmm_kernel mstmm_sweep_link_pin_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_link_pin_condense_inputs,
         .outputs = mstmm_sweep_link_pin_condense_outputs,
-        .ir_hash = "f4d3f4ca4f38c36a268ff5c5399b47f01a3a11182795dd0f2ecd52b2689531e2",
+        .ir_hash = "f1beea11abead7c0a695646269e417aed74410f7a5f6d8cf19f6d27734eebddc",
         .n_guards = 3,
         .guards = mstmm_sweep_link_pin_condense_guards,
     },
@@ -806,7 +806,7 @@ const mstmm_element mstmm_sweep_link_pin = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_pin",
-    .hash = "c838314f107802e8553e896f3791e07616ae74f6a55cdb0697faf7b927aafcd2",
+    .hash = "77768c42dc48ff8df441808f92b15128b221f970e5ce7c800301b80d6b300247",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -56,7 +56,7 @@ static const mstmm_port mstmm_sweep_link_prismatic_angle_outputs[] = {
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  turn[2] cosine and sine of the angle about z
- * in  b[10] parameters of the rigid body, body axes
+ * in  b[11] parameters of the rigid body, body axes; rotor inertia of its hinge
  * in  p[0] parameters
  * in  q[1] coordinates: displacement [m]
  * in  u[1] speeds: displacement_rate [m/s]
@@ -262,7 +262,7 @@ static int mstmm_sweep_link_prismatic_forward_call(int n, const real *const *in,
 static const mstmm_port mstmm_sweep_link_prismatic_forward_inputs[] = {
     {"link", 5, "", 0, 0},
     {"turn", 2, "", 0, 0},
-    {"b", 10, "", 0, 0},
+    {"b", 11, "", 0, 0},
     {"p", 0, "", 0, 0},
     {"q", 1, "", 0, 0},
     {"u", 1, "", 0, 0},
@@ -282,7 +282,7 @@ static const mstmm_port mstmm_sweep_link_prismatic_forward_outputs[] = {
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  turn[2] cosine and sine of the angle about z
  * in  d[1] (m) shift along z
- * in  b[10] parameters of the rigid body, body axes
+ * in  b[11] parameters of the rigid body, body axes; rotor inertia of its hinge
  * in  p[0] parameters
  * in  S_K[21] S of what hangs on the body
  * in  e_K[6] (N, N*m) e of what hangs on the body
@@ -641,7 +641,7 @@ static const mstmm_port mstmm_sweep_link_prismatic_condense_inputs[] = {
     {"link", 5, "", 0, 0},
     {"turn", 2, "", 0, 0},
     {"d", 1, "m", 0, 0},
-    {"b", 10, "", 0, 0},
+    {"b", 11, "", 0, 0},
     {"p", 0, "", 0, 0},
     {"S_K", 21, "", 0, 0},
     {"e_K", 6, "N, N*m", 0, 0},
@@ -777,7 +777,7 @@ static const mstmm_kernel mstmm_sweep_link_prismatic_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_link_prismatic_forward_inputs,
         .outputs = mstmm_sweep_link_prismatic_forward_outputs,
-        .ir_hash = "ab35a779c59b9aa06beeeb9bc0d3be1730dfcea56eeeedb6f61a947fb3a29f53",
+        .ir_hash = "305d16d87de441135291eab511fdf57a81b6f1409a3c1e64b07c5565202688d2",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -789,7 +789,7 @@ static const mstmm_kernel mstmm_sweep_link_prismatic_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_link_prismatic_condense_inputs,
         .outputs = mstmm_sweep_link_prismatic_condense_outputs,
-        .ir_hash = "d4b0f7dd7ff2678e837cdfa0d81f3c2ee010a69bd7ab87e1284cf7ae7601e2d2",
+        .ir_hash = "2a3b8e0cdbd877c58e3fc58a318bdd8e9e6d1d4c9cbaf829b6ef3a9a1108fa44",
         .n_guards = 3,
         .guards = mstmm_sweep_link_prismatic_condense_guards,
     },
@@ -811,7 +811,7 @@ const mstmm_element mstmm_sweep_link_prismatic = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_prismatic",
-    .hash = "ab2f2ba2c7354f6f4d407084c2f172c991163b655bd5706c263f4f6f9237a886",
+    .hash = "87ba397b6730c90dcdbe99fa95f64533729159f3483c60d59ffcc88fe042f1e6",
     .nq = 0,
     .nu = 0,
     .np = 0,

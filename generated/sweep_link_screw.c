@@ -56,7 +56,7 @@ static const mstmm_port mstmm_sweep_link_screw_angle_outputs[] = {
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  turn[2] cosine and sine of the angle about z
- * in  b[10] parameters of the rigid body, body axes
+ * in  b[11] parameters of the rigid body, body axes; rotor inertia of its hinge
  * in  p[1] parameters: lead [m]
  * in  q[1] coordinates: angle [rad]
  * in  u[1] speeds: angle_rate [rad/s]
@@ -273,7 +273,7 @@ static int mstmm_sweep_link_screw_forward_call(int n, const real *const *in, rea
 static const mstmm_port mstmm_sweep_link_screw_forward_inputs[] = {
     {"link", 5, "", 0, 0},
     {"turn", 2, "", 0, 0},
-    {"b", 10, "", 0, 0},
+    {"b", 11, "", 0, 0},
     {"p", 1, "", 0, 0},
     {"q", 1, "", 0, 0},
     {"u", 1, "", 0, 0},
@@ -293,7 +293,7 @@ static const mstmm_port mstmm_sweep_link_screw_forward_outputs[] = {
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  turn[2] cosine and sine of the angle about z
  * in  d[1] (m) shift along z
- * in  b[10] parameters of the rigid body, body axes
+ * in  b[11] parameters of the rigid body, body axes; rotor inertia of its hinge
  * in  p[1] parameters: lead [m]
  * in  S_K[21] S of what hangs on the body
  * in  e_K[6] (N, N*m) e of what hangs on the body
@@ -746,7 +746,7 @@ static const mstmm_port mstmm_sweep_link_screw_condense_inputs[] = {
     {"link", 5, "", 0, 0},
     {"turn", 2, "", 0, 0},
     {"d", 1, "m", 0, 0},
-    {"b", 10, "", 0, 0},
+    {"b", 11, "", 0, 0},
     {"p", 1, "", 0, 0},
     {"S_K", 21, "", 0, 0},
     {"e_K", 6, "N, N*m", 0, 0},
@@ -886,7 +886,7 @@ static const mstmm_kernel mstmm_sweep_link_screw_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_link_screw_forward_inputs,
         .outputs = mstmm_sweep_link_screw_forward_outputs,
-        .ir_hash = "6f1af483160793e9c0f15cb2e86e076c74638e8a8f4c5faed096adff7c5af6d1",
+        .ir_hash = "a40986fec141999047eb42324a524475e10476a7dbb0ae72d2c07c62f25006dc",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -898,7 +898,7 @@ static const mstmm_kernel mstmm_sweep_link_screw_kernels[] = {
         .n_outputs = 4,
         .inputs = mstmm_sweep_link_screw_condense_inputs,
         .outputs = mstmm_sweep_link_screw_condense_outputs,
-        .ir_hash = "90a6abc8e703e7c66a6ed3414b24a252f4c6b816fde5a26bf0fe7d1846aebb9c",
+        .ir_hash = "8266328bbd57083467b4da17a18250dcfd0b049971cff05c9a9f0821ee72d12c",
         .n_guards = 3,
         .guards = mstmm_sweep_link_screw_condense_guards,
     },
@@ -920,7 +920,7 @@ const mstmm_element mstmm_sweep_link_screw = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_screw",
-    .hash = "ac351094ca517fb6e38d32e3b99eaef9dc5131352a766586a9d1148b1772d52b",
+    .hash = "f75e1861b83ba773da73bbad9597335f548e08f0eaa56d9602e7bd40323d9708",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -199,19 +199,31 @@ def _axial(hinge: Hinge) -> bool:
     return motion.nu > 0 and link.along_z(motion) is not None
 
 
+#: What follows the name of a hinge whose speed has a rotor, in that of its link.
+ROTOR = "_rotor"
+
+
+def link_names() -> dict[str, str]:
+    """Name of every link, a hinge's with and without a rotor -> what it is of; hinges of several
+    speeds have none with rotors."""
+    found = {name: f"rigid body behind the {hinge.title}" for name, hinge in links().items()}
+    single = [name for name, hinge in links().items() if motion_of(hinge).nu == 1]
+    return found | {f"{name}{ROTOR}": f"{found[name]} with a rotor" for name in single}
+
+
 def link_kernels(name: str) -> tuple[Kernel, ...]:
-    """A rigid body behind the hinge `name`, pass by pass."""
-    motion = motion_of(links()[name])
+    """A rigid body behind a hinge, pass by pass; `name` is one of `link_names`."""
+    motion, rotor = motion_of(links()[name.removesuffix(ROTOR)]), name.endswith(ROTOR)
     subspace = motion.in_arrays(motion.subspace)
     return (
         Kernel("angle", link.angle(motion)),
         Kernel("forward", link.forward(motion, RigidBody())),
         Kernel(
             "condense",
-            link.condense(motion, RigidBody()),
+            link.condense(motion, RigidBody(), rotor),
             sweep.pivot_guards(motion.nu, subspace, link.floor(RigidBody())),
         ),
-        Kernel("recover", link.recover(motion)),
+        Kernel("recover", link.recover(motion, rotor)),
     )
 
 
@@ -269,7 +281,7 @@ def built_in() -> dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]:
     table["sweep", "modal"] = modal_kernels
     table["sweep", "tangent"] = tangent_kernels
     table["sweep", "beam"] = beam_kernels
-    for name in links():
+    for name in link_names():
         table["sweep", f"link_{name}"] = lambda name=name: link_kernels(name)  # type: ignore[misc]
     for nu in range(MAX_SPEEDS + 1):
         table["sweep", f"generic{nu}"] = lambda nu=nu: generic_kernels(nu)  # type: ignore[misc]

@@ -24,7 +24,7 @@ from .kernels import (
     kernels_of,
     law_kernels,
     link_kernels,
-    links,
+    link_names,
     loop_kernels,
     modal_kernels,
     qr_kernels,
@@ -119,10 +119,10 @@ def shared_specs() -> list[ElementSpec]:
         *(
             plain(
                 name=f"link_{name}",
-                title=f"rigid body behind the {hinge.title}",
+                title=title,
                 kernels=_lowered(link_kernels(name)),
             )
-            for name, hinge in links().items()
+            for name, title in link_names().items()
         ),
         *(generic_spec(nu) for nu in range(MAX_SPEEDS + 1)),
     ]

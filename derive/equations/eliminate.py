@@ -28,19 +28,23 @@ def eliminate(
     subspace: sp.MatrixBase | None = None,
     inputs: tuple[Quantity, ...] = (),
     name: str | None = None,
+    rotor: sp.Expr | None = None,
 ) -> Derivation:
-    """G, g, S_Q, e_Q and the diagonal of D, for the speeds of `subspace` or of a given H with J."""
+    """G, g, S_Q, e_Q and the diagonal of D, for the speeds of `subspace`, of which one may have a
+    `rotor`, or of a given H with J."""
     tau = Quantity(symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
     h_given = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
-    rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
+    given_rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
     gain, offset = gains(nu)
     pivots = Quantity(symbol("D_ii", nu), "kg*m2 or kg", "diagonal of D")
     h: sp.Basic = h_given.symbol if subspace is None else sp.ImmutableDenseMatrix(subspace)
-    units = {} if subspace is None else unit_directions(subspace)
+    units = {} if subspace is None or rotor is not None else unit_directions(subspace)
     push, pivot, full = symbol("U", 6, nu), symbol("D", nu, nu), symbol("G_full", nu, 6)
     inertia = h.T * push
     if subspace is None:
-        inertia = inertia + sp.ImmutableDenseMatrix(sp.diag(*column(rotor.symbol)))
+        inertia = inertia + sp.ImmutableDenseMatrix(sp.diag(*column(given_rotor.symbol)))
+    elif rotor is not None:
+        inertia = inertia + sp.ImmutableDenseMatrix([rotor])
     zeros = tuple((i, j) for i in range(6) for j in range(6) if i in units or j in units)
     equations = (
         Equation("U = S H", push, S.symbol * h),
@@ -62,7 +66,7 @@ def eliminate(
         ),
         Equation("e_Q", REDUCED_E.symbol, replace_rows(symbol("e_full", 6), tau.symbol, units)),
     )
-    given = inputs if subspace is not None else (h_given, rotor)
+    given = inputs if subspace is not None else (h_given, given_rotor)
     return Derivation(
         name or f"generic{nu}",
         f"elimination of a hinge with {free_speeds(nu)}",

@@ -44,7 +44,9 @@ LINK = Quantity(
 )
 TURN = Quantity(symbol("turn", 2), "", "cosine and sine of the angle about z")
 SHIFT = Quantity(symbol("d", 1), "m", "shift along z")
-BODY = Quantity(symbol("b", 10), "", "parameters of the rigid body, body axes")
+BODY = Quantity(
+    symbol("b", 11), "", "parameters of the rigid body, body axes; rotor inertia of its hinge"
+)
 OWN_LOAD = Quantity(symbol("e_B", 6), "N, N*m", "load that the bias motion of the body needs")
 OUTER_S = Quantity(symbol("S_K", 6, 6), "", "S of what hangs on the body", symmetric=True)
 OUTER_E = Quantity(symbol("e_K", 6), "N, N*m", "e of what hangs on the body")
@@ -131,11 +133,12 @@ def _of_body(derivation: Derivation, name: str) -> sp.Basic:
     return matrix.xreplace({own[i, 0]: BODY.symbol[i, 0] for i in range(int(own.rows))})
 
 
-def condense(motion: HingeMotion, body: Body) -> Derivation:
-    """S and e of the body and all behind it at the parent's origin, parent's axes."""
+def condense(motion: HingeMotion, body: Body, rotor: bool = False) -> Derivation:
+    """S and e of the body and all behind it at the parent's origin, parent's axes; with a `rotor`
+    its inertia adds to D, and S keeps its row along the hinge."""
     nu, subspace = motion.nu, motion.in_arrays(motion.subspace)
     inputs = hinge_quantities(motion.hinge)[:1]
-    elimination = eliminate(nu, subspace, inputs)
+    elimination = eliminate(nu, subspace, inputs, rotor=BODY.symbol[10, 0] if rotor else None)
     gain, offset = gains(nu)
     tau = next(q for q in elimination.inputs if q.name == "tau")
     middle = (symbol("S_x", 6, 6), symbol("e_x", 6))
@@ -163,13 +166,13 @@ def floor(body: Body) -> sp.ImmutableDenseMatrix:
     return floor_of(_of_body(body_kernels.inertia(body), "S"))
 
 
-def recover(motion: HingeMotion) -> Derivation:
+def recover(motion: HingeMotion, rotor: bool = False) -> Derivation:
     """udot = g - G X delta_I and the body's own deviation X delta_I + H udot."""
     nu, subspace = motion.nu, motion.in_arrays(motion.subspace)
     gain, offset = gains(nu)
     rates = Quantity(symbol("udot", nu), "", "accelerations of the free coordinates")
     between, carried = symbol("delta_x", 6), symbol("delta_Q", 6)
-    full = with_unit_columns(gain.symbol, unit_directions(subspace))
+    full = with_unit_columns(gain.symbol, {} if rotor else unit_directions(subspace))
     return Derivation(
         motion.hinge.name,
         f"accelerations of a rigid body behind the {motion.hinge.title}",
@@ -178,9 +181,7 @@ def recover(motion: HingeMotion) -> Derivation:
         (
             *_about_x().deviation(PARENT_DELTA.symbol, between),
             *_about_z().deviation(between, carried),
-            Equation(
-                "udot = g - G X delta_I, G H = 1", rates.symbol, offset.symbol - full * carried
-            ),
+            Equation("udot = g - G X delta_I", rates.symbol, offset.symbol - full * carried),
             Equation("deviation of the body", DELTA.symbol, carried + subspace * rates.symbol),
         ),
         sources=SOURCES,

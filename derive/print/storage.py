@@ -157,7 +157,7 @@ _PLACES = {
     "scene.t": "&state->t", "sums.power": "&state->balance->power",
     "sums.potential": "&state->balance->potential", "identity": "mstmm_identity",
     "zero": "mstmm_zeros", "none": "mstmm_zeros",
-    "link.numbers": "at.numbers", "link.b": "at.numbers + 5", "link.p": "at.numbers + 15",
+    "link.numbers": "at.numbers", "link.b": "at.numbers + 5", "link.p": "at.numbers + 16",
     "link.q": "at.q", "link.u": "at.u", "link.qdot": "at.qdot", "link.udot": "at.udot",
     "link.tau": "at.tau", "link.turn": "at.link + MSTMM_LINK_TURN",
     "link.shift": "at.link + MSTMM_LINK_SHIFT", "link.motion": "at.link + MSTMM_LINK_MOTION",

@@ -120,7 +120,7 @@ end | 9 | axes of the end in the section
 """
 _OTHERS = """
 link.numbers | 5 | screws about x and z from link to link
-link.b | 10 | numbers of the rigid body
+link.b | 11 | numbers of the rigid body, and the rotor inertia of its hinge
 link.p | 1 | number of the hinge
 link.q | nq | coordinates; of a turned hinge with its constant angle
 link.u | nu | speeds

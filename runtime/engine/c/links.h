@@ -15,8 +15,8 @@
 #define MSTMM_LINK_FIXED 18
 #define MSTMM_LINK_PER_SPEED 7
 
-/* Numbers of a link that stay: link (5), b (10), p of the hinge (1 at most). */
-#define MSTMM_LINK_NUMBERS 16
+/* Numbers of a link that stay: link (5), b (11), p of the hinge (1 at most). */
+#define MSTMM_LINK_NUMBERS 17
 
 /* Splits the bodies into runs; returns their number.  `runs` holds n_bodies entries and `numbers`
  * one per body; links lie in the workspace from `place`; `size` receives how much they take.

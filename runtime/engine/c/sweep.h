@@ -76,7 +76,7 @@ typedef struct {
     const int *imposed_mask; /* per speed: 1 where imposed */
     mstmm_modal *modal;      /* the body is the floating frame of a flexible one; else NULL */
     mstmm_section *section;  /* its connection is a section of a flexible body; else NULL */
-    /* link (5), b (10), p of the kernels sweep link_*; NULL: no such connection */
+    /* link (5), b (11), p of the kernels sweep link_*; NULL: no such connection */
     const real *link;
 } mstmm_body;
 

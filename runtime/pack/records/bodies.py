@@ -35,7 +35,7 @@ class BodyRecords:
     def __init__(self, system: System, elements: Elements, memory: Memory, lib: Any) -> None:
         self.system, self.elements, self.memory = system, elements, memory
         self.modal = ModalRecords(memory, lib)
-        self._made: dict[tuple[Key, Key, bool], Any] = {}
+        self._made: dict[tuple[Key, Key, str], Any] = {}
         self.records = self._filled()
         memory.kept.append(self.records)
         self.blocks, behind = self._blocks(lib)
@@ -76,8 +76,8 @@ class BodyRecords:
         unknown = not self.elements[body.hinge].functions.get("condense")
         bound = any(body.imposed) or any(body.rotor)
         # Columns of rows and poses ask for the hinge's motion, which is then found once for all.
-        generic = unknown or bound or body.section is not None or self.system.closes
-        record.generic, record.kernels = int(generic), self._kernels(body, generic)
+        posed = unknown or body.section is not None or self.system.closes
+        record.generic, record.kernels = int(posed or bound), self._kernels(body, posed)
         if body.modal is not None:
             record.modal = self.modal.add_modal(place, body.modal)
         if body.section is not None:
@@ -88,7 +88,9 @@ class BodyRecords:
         link: Numbers = ()
         if body.link:
             rigid = body.body_p if body.body[1] == RIGID else ()
-            link = (*body.link, *rigid, *(body.hinge_p or (0.0,)))  # every link has room for it
+            rotor = body.rotor[0] if body.nu else 0.0
+            # every link has room for a number of its hinge
+            link = (*body.link, *rigid, rotor, *(body.hinge_p or (0.0,)))
         own = (*body.body_p, *body.body_frame)
         start = self.memory.reals(
             (*body.connection, 0.0, 0.0, -body.height, *body.rotor, *body.hinge_p, *own, *link)
@@ -99,15 +101,15 @@ class BodyRecords:
         if link:
             record.link = start + len(own)
 
-    def _kernels(self, body: BodyNumbers, generic: bool) -> Any:
+    def _kernels(self, body: BodyNumbers, posed: bool) -> Any:
         """Functions of the hinge, the body and the link, shared by bodies of one kind."""
-        linked = bool(body.link) and body.body[1] == RIGID and not generic
-        kind = (body.hinge, body.body, linked)
+        link = "" if posed else _link_of(body)
+        kind = (body.hinge, body.body, link)
         if kind not in self._made:
-            self._made[kind] = self._kernels_of(body.hinge, body.body, linked)
+            self._made[kind] = self._kernels_of(body.hinge, body.body, link)
         return self._made[kind]
 
-    def _kernels_of(self, of_hinge: Key, of_body: Key, linked: bool) -> Any:
+    def _kernels_of(self, of_hinge: Key, of_body: Key, link: str) -> Any:
         made, none = self.memory.new("mstmm_kernels *"), self.memory.ffi.NULL
         hinge, rigid = self.elements[of_hinge], self.elements[of_body].functions
         for name in _HINGE:
@@ -120,7 +122,16 @@ class BodyRecords:
         if hinge.tape is not None:
             made.tape = self.memory.tape(hinge.tape)
             made.slope_tape = self.memory.tape(hinge.slope_tape) if hinge.slope_tape else none
-        if linked:
-            for name, function in self.elements["sweep", f"link_{of_hinge[1]}"].functions.items():
+        if link:
+            for name, function in self.elements["sweep", link].functions.items():
                 setattr(made, f"link_{name}", function)
         return made
+
+
+def _link_of(body: BodyNumbers) -> str:
+    """The link that a body with its hinge is swept as; none where it is no link, where something
+    imposes the speed, and for several speeds with rotors."""
+    rotor = any(body.rotor)
+    if not body.link or body.body[1] != RIGID or any(body.imposed) or (rotor and body.nu > 1):
+        return ""
+    return f"link_{body.hinge[1]}{'_rotor' if rotor else ''}"
