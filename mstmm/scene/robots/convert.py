@@ -17,7 +17,7 @@ from ..rules.messages import near
 from ..rules.values import GROUND
 from ..scene import Scene
 from .masses import joined
-from .meshes import mesh_file
+from .meshes import Meshes
 from .names import Names
 from .robot import FIXED, NOTHING, Joint, Link, Mimic, Note, Robot
 from .tree import Tree
@@ -255,16 +255,17 @@ class _Writer:
         return {name: start(name, frozenset()) for name in mimics}
 
     def _shapes(self, folder: Path | None) -> Iterator[dict[str, Any]]:
+        meshes = None if folder is None else Meshes(folder)
         for look in self.robot.looks:
             owner, frame = self.place[look.link]
             pose, keys = frame.then(look.pose), dict(look.keys)
             if file := keys.get("file"):
-                found = None if folder is None else mesh_file(folder, file)
+                found = None if meshes is None else meshes.path(file)
                 if found is None:
                     link = self.tree.links[look.link]
                     self._tell(link, f"link {look.link!r}", f"no mesh {file!r} to draw it with")
                     continue
-                keys["file"] = str(found)
+                keys["file"] = found
             on = GROUND if owner == GROUND else self._bodies[owner]
             yield {"on": on, **_keys(pose), **keys}
 

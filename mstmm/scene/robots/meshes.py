@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from urllib.parse import unquote
 
 _PACKAGE, _FILE = "package://", "file://"
 
 
-def mesh_file(folder: Path, name: str) -> Path | None:
-    """The mesh that a robot's file in `folder` names; None where it is not there.
+class Meshes:
+    """The meshes around a robot's file in `folder`.
 
-    Packages are not looked up: "package://NAME/PLACE" is the nearest folder NAME that `folder` is
-    in, or that lies beside one that it is in.
+    Packages are not looked up: "package://NAME/PLACE" is in the nearest folder NAME that `folder`
+    is in, or that lies beside one that it is in.
     """
-    if name.startswith(_FILE):
-        return _there([Path(unquote(name.removeprefix(_FILE)))])
-    if name.startswith(_PACKAGE):
-        place = Path(unquote(name.removeprefix(_PACKAGE)))
-        return _there([above / place for above in (folder, *folder.parents)])
-    return _there([folder / name])
 
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._packages = dict[str, str | None]()
 
-def _there(places: list[Path]) -> Path | None:
-    return next((place for place in places if place.is_file()), None)
+    def path(self, name: str) -> str | None:
+        """The mesh of this name in the robot's file; None where it is not there."""
+        if name.startswith(_FILE):
+            place: str | None = unquote(name.removeprefix(_FILE))
+        elif name.startswith(_PACKAGE):
+            package, _, inside = unquote(name.removeprefix(_PACKAGE)).partition("/")
+            home = self._package(package)
+            place = None if home is None else os.path.join(home, inside)
+        else:
+            place = os.path.join(self.folder, name)
+        return place if place is not None and os.path.isfile(place) else None
+
+    def _package(self, name: str) -> str | None:
+        if name not in self._packages:
+            homes = (os.path.join(above, name) for above in (self.folder, *self.folder.parents))
+            self._packages[name] = next(filter(os.path.isdir, homes), None)
+        return self._packages[name]
