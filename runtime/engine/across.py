@@ -161,19 +161,27 @@ def _apart(
 
 def _in_order(names: list[int], together: set[frozenset[int]]) -> list[int]:
     """Groups in an order in which those that are felt together stand near each other."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import reverse_cuthill_mckee
+    near = {name: {name} for name in names}
+    for felt in together:
+        for name in felt & near.keys():
+            near[name] |= felt & near.keys()
+    found, placed = list[int](), set[int]()
+    for name in names:
+        if name in placed:
+            continue
+        end = _outwards(_outwards(name, near)[-1], near)[-1]
+        found += _outwards(end, near)
+        placed.update(found[len(placed) :])
+    return found
 
-    places = {name: place for place, name in enumerate(names)}
-    pairs = [(place, place) for place in places.values()] + [
-        (places[one], places[other])
-        for felt in together
-        for one in felt & places.keys()
-        for other in felt & places.keys()
-    ]
-    rows, columns = np.array(pairs).T
-    graph = coo_array((np.ones(len(pairs)), (rows, columns)), shape=(len(names), len(names)))
-    return [names[place] for place in reverse_cuthill_mckee(graph.tocsr(), symmetric_mode=True)]
+
+def _outwards(start: int, near: Mapping[int, set[int]]) -> list[int]:
+    """Groups that hang together with one, the nearest first, those with few neighbours before."""
+    found, seen = [start], {start}
+    for name in found:
+        found += sorted(near[name] - seen, key=lambda other: (len(near[other]), other))
+        seen |= near[name]
+    return found
 
 
 def _passes(
