@@ -13,6 +13,7 @@ from mstmm.errors import MstmmError, SceneError
 from mstmm.extras import missing
 from mstmm.scene import Scene
 
+from ..engine.code import NotFused
 from ..host.files import refuse_special, seal_is_broken
 from ..kernels import store
 from ..kernels.identity import kernels_hash
@@ -120,6 +121,7 @@ def _rebuilt(data: Any, path: Path) -> Result:
     scene.check_types(definitions)
     least_squares = data.attrs.get("sweep") == "qr"
     model = Model(scene, known=elements, least_squares=least_squares)
+    model.fusion = NotFused(f"the saved run was made by the {data.attrs['engine']} one")
     run = provenance.trajectory(data)
     if not _fits(model, run):
         raise SceneError(f'result file "{path}": its states do not fit its scene')

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -61,6 +61,15 @@ class Page:
             time.sleep(0.1)
         return None
 
+    def settled(self, fits: Callable[[bytes], bool], seconds: float = 60.0) -> bool:
+        """Does a picture of it fit, once it has drawn what it draws?"""
+        end = time.monotonic() + seconds
+        while not fits(self.picture()):
+            if time.monotonic() > end:
+                return False
+            time.sleep(0.3)
+        return True
+
     def picture(self) -> bytes:
         """A PNG of what is seen."""
         return base64.b64decode(self.ask("Page.captureScreenshot", format="png")["data"])
@@ -71,7 +80,7 @@ def opened(path: Path, size: tuple[int, int] = (900, 600), dark: bool = False) -
     """The file in a browser that finds no network."""
     from websockets.sync.client import connect
 
-    with tempfile.TemporaryDirectory() as profile:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:  # others still write
         program = subprocess.Popen(
             [str(PROGRAM), *_FLAGS, f"--user-data-dir={profile}",
              f"--window-size={size[0]},{size[1]}", "about:blank"],

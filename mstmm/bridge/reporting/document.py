@@ -23,8 +23,9 @@ table.rows { border-collapse: collapse; font-size: .93rem; }
 table.rows th { text-align: left; font-weight: 600; color: var(--soft); white-space: nowrap; }
 table.rows th, table.rows td { padding: .28rem 1rem .28rem 0; vertical-align: baseline;
   border-bottom: 1px solid var(--line); }
+:root { color-scheme: light; }
 iframe { width: 100%; height: 30rem; border: 1px solid var(--line); border-radius: 6px; }
-.strip img { width: 100%; height: auto; } .curves { min-height: 10rem; }
+.strip img { width: 100%; height: auto; } .curves { min-height: 10rem; overflow: hidden; }
 ul { padding-left: 1.2rem; margin: .4rem 0; } li { margin: .2rem 0; }
 details { margin: .6rem 0; } summary { cursor: pointer; color: var(--accent); }
 details > h1 { font-size: 1.2rem; margin-top: .8rem; }

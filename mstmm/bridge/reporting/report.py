@@ -66,5 +66,8 @@ def _seen(view: View | None) -> str:
         return ""
     drawn = b64encode(view.picture(_MOMENTS)).decode("ascii")
     strip = f'<img alt="the mechanism at {_MOMENTS} moments" src="data:image/png;base64,{drawn}"/>'
-    moving = f'<iframe title="the run as it moves" srcdoc="{escape(view.html)}"></iframe>'
+    moving = (
+        '<iframe title="the run as it moves" data-theme="light" '
+        f'srcdoc="{escape(view.html)}"></iframe>'
+    )
     return f'<div class="strip">{strip}</div>{moving}'

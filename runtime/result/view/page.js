@@ -6,7 +6,9 @@
     Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
   const times = floats(told.times);
   for (const one of Object.values(told.owners)) one.values = floats(one.values);
-  const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+  const within = window.frameElement;  // a page around this one may be light alone
+  const dark = !(within && within.dataset.theme === "light") &&
+    matchMedia("(prefers-color-scheme: dark)").matches;
   window.__VISER_EMBED_CONFIG__ = { darkMode: dark };
 
   const make = (tag, style, parent, text) => {
