@@ -284,3 +284,13 @@ def test_tangent_is_the_same_whatever_was_asked_before(rng: Generator) -> None:
     first = answer()
     tangent.slope(1.0, *(rng.normal(size=n) for n in (tangent.nq, tangent.nu, tangent.nu)))
     assert np.array_equal(answer(), first)
+
+
+def test_the_ground_rests_whatever_stood_in_its_place(rng: Generator) -> None:
+    """A sweep begins the ground's own numbers anew."""
+    scene, q, u = pushed_everywhere(4)
+    _, tangent = compiled(scene)
+    a = rng.normal(size=tangent.nu)
+    expected = tangent.residual(TIME, q, u, a).copy()
+    tangent.workspace[: tangent.engine.lib.MSTMM_BLOCK_FIXED] = np.nan
+    assert np.array_equal(tangent.residual(TIME, q, u, a), expected)

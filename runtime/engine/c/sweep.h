@@ -426,8 +426,9 @@ static inline void mstmm_ground(const mstmm_state *state)
 {
     real *ground = state->workspace;
     /* In pieces, which become plain stores: one memset of this size costs small scenes 3 %. */
-    for (int i = MSTMM_BLOCK_MOTION; i < MSTMM_BLOCK_HINGE_R; i += 8)
-        memset(ground + i, 0, 8 * sizeof(real));
+    for (int i = MSTMM_BLOCK_A; i < MSTMM_BLOCK_FLOOR; i += 7)
+        memset(ground + i, 0, 7 * sizeof(real));
+    memset(ground + MSTMM_BLOCK_MOTION, 0, 9 * sizeof(real));
     for (int i = 0; i < 3; i++) {
         ground[MSTMM_BLOCK_MOTION + 6 + i] = -state->model->gravity[i];
         ground[MSTMM_BLOCK_A + 4 * i] = 1;
