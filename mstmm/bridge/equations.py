@@ -147,7 +147,8 @@ def _items(
             Code("\n".join(lines)),
         ]
     items.append(Heading("Closed equations", 2))
-    return items + (_closed(found, measure) if found else [Paragraph(refused, "sources")])
+    told = Paragraph(f"They are not written out: {refused}.")
+    return items + (_closed(found, measure) if found else [told])
 
 
 def _closed(found: ClosedEquations, measure: Columns) -> list[Item]:

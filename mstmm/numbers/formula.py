@@ -77,7 +77,7 @@ class Book:
         if self._products > self._most:
             raise SceneError(
                 f"formulas take {self._products} products of terms so far; the limit is "
-                f"{self._most}; keep fewer names"
+                f"{self._most}; keep fewer names as symbols, or take a smaller scene"
             )
 
 
