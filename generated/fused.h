@@ -41,6 +41,9 @@ typedef struct {
     int (*rates)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *dq);
     int (*coordinates)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, const double *steps, const double *x, const double *rho,
                        double *dq);
+    /* Inverse dynamics and the mass matrix; see derive/fuse/inverse.py. */
+    int (*required)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *efforts);
+    int (*mass)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *M);
     /* The slopes of the residual about a state; see derive/fuse/linear.py. */
     int (*linear)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *M, double *C, double *K, double *G, double *r_t);
 } mstmm_fused;

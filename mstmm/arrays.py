@@ -155,6 +155,13 @@ def plain(value: ArrayLike, width: int) -> TypeGuard[Array]:
     )
 
 
+def row(value: ArrayLike, width: int) -> bytes | None:
+    """The same state's numbers as C reads them, a copy; None where it is no such state."""
+    if type(value) is np.ndarray and value.dtype is _DOUBLE and value.shape == (width,):
+        return value.tobytes()
+    return None
+
+
 #: How many numbers there are per state: one, a row of so many, or an array of such a shape.
 Width = int | tuple[int, int] | None
 

@@ -19,7 +19,7 @@ from ..schedule.steps import Run, Sweep
 from ..schedule.sweeps import INVERSE_DYNAMICS
 from .passes.balance import Balanced
 from .replay import Replay
-from .scene import Fused, inputs_of
+from .scene import FAILED, Fused, inputs_of
 from .state import FusionState, Kernels
 
 Matrix = list[Nodes]
@@ -27,8 +27,6 @@ Matrix = list[Nodes]
 #: differentiated along a direction, but the tangent takes ever more code: twice as much for 12
 #: speeds, which a compiler takes four times as long for.
 _MOST_WITH_SLOPES = 8
-#: Guard code of all these kernels: the looped engine names what fails.
-_FAILED = 1
 #: Drives have no say in it: coordinates are what they are.
 RATES = Sweep("rates", "Rates of the coordinates.", (Run(whole=PRESCRIBED), Run(whole=FORWARD)))
 
@@ -53,7 +51,7 @@ def fuse_implicit(structure: Structure, kernels: Kernels) -> Fused:
     if with_slopes:
         found += _Residual(structure, kernels).by_slopes()
     found += [_solution(structure.nu), *_Moving(structure, kernels).kernels()]
-    return Fused(Balanced(*found), ((0, -1, _FAILED),))
+    return Fused(Balanced(*found), ((0, -1, FAILED),))
 
 
 def _inputs(structure: Structure) -> list[Port]:
@@ -214,7 +212,7 @@ class _Residual:
             for one, imposed in zip(required, self._imposed, strict=True)
         ]
         for condition in replay.conditions:
-            state.graph.guard(condition, _FAILED, "the looped engine names what fails")
+            state.graph.guard(condition, FAILED, "the looped engine names what fails")
 
     def kernels(self, rest: bool = False) -> list[KernelIR]:
         """All but those of the slopes; the tangent last, whose pivots are guards of the graph."""

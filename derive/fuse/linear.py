@@ -19,11 +19,8 @@ from ..schedule.sweeps import INVERSE_DYNAMICS
 from .implicit import RATES
 from .passes.balance import balance
 from .replay import Replay
-from .scene import Fused, fuse, inputs_of
+from .scene import FAILED, Fused, fuse, inputs_of
 from .state import FusionState, Kernels
-
-#: Guard code: the looped engine names what fails.
-_FAILED = 1
 
 
 def fuse_linear(
@@ -58,14 +55,14 @@ def fuse_slopes(structure: Structure, kernels: Kernels) -> Fused:
              for k in range(body.modal.n)]  # fmt: skip
     about, n = _About(structure, kernels, sorted(free)), len(free)
     for condition in about.conditions:
-        about.graph.guard(condition, _FAILED, "the looped engine names what fails")
+        about.graph.guard(condition, FAILED, "the looped engine names what fails")
     values = about.slopes()
     values["G"] = about.turning()
     values["r_t"] = [about.along("t", 0, one) for one in about.r]
     outputs = [*(Port(name, (n, n)) for name in "MCKG"), Port("r_t", (n,))]
     kernel = about.graph.kernel("linear", _inputs(structure), outputs, values, as_made=True)
     both = {"accelerations": fuse(structure, kernels).kernels["accelerations"]}
-    return Fused(both | {kernel.name: balance(kernel)}, ((0, -1, _FAILED),))
+    return Fused(both | {kernel.name: balance(kernel)}, ((0, -1, FAILED),))
 
 
 def fuse_required(structure: Structure, kernels: Kernels) -> KernelIR:

@@ -80,7 +80,7 @@ class Replay(RowSlots):
         for subject in reversed(subjects) if whole.order == TIPS_TO_ROOT else subjects:
             self.enter(subject)
             if not (whole.skip and self._holds(whole.skip)):
-                self._steps(whole.steps)
+                self.steps(whole.steps)
 
     def _subjects(self, whole: Pass) -> list[Subject]:
         s = self.state.structure
@@ -198,20 +198,21 @@ class Replay(RowSlots):
 
     # --- steps ----------------------------------------------------------------------------------
 
-    def _steps(self, steps: Iterable[Step]) -> None:
+    def steps(self, steps: Iterable[Step]) -> None:
+        """Steps of a pass at the subject at hand."""
         for step in steps:
             if not step.when or self._holds(step.when):
                 _DO[type(step)](self, step)
 
     def _do(self, step: Do) -> None:
         assert step.whole is not None
-        self._steps(step.whole.steps)
+        self.steps(step.whole.steps)
 
     def _each(self, step: Each) -> None:
         at, local = self.at, self.local
         for subject in self.met(step.of):
             self.at = subject
-            self._steps(_at_entry(inner, "c", subject.direction) for inner in step.steps)
+            self.steps(_at_entry(inner, "c", subject.direction) for inner in step.steps)
         self.at, self.local = at, local
 
     def _rows_begun(self) -> None:
@@ -336,17 +337,17 @@ class Replay(RowSlots):
     def _each_speed(self, step: EachSpeed) -> None:
         for k in range(self.body.nu):
             if self.body.imposed[k] or not step.imposed:
-                self._steps(_at_entry(inner, "k", k) for inner in step.steps)
+                self.steps(_at_entry(inner, "k", k) for inner in step.steps)
 
     def _by_screw(self, step: ByScrew) -> None:
         rotation, position = self.get(step.rotation, 9), self.get(step.position, 3)
         axis = screw_axis(rotation, position)
         if axis:
-            self._steps(step.about_x if axis == "x" else step.about_z)
+            self.steps(step.about_x if axis == "x" else step.about_z)
         elif all(entry.value is None for entry in rotation):
-            self._steps(step.turning)
+            self.steps(step.turning)
         else:
-            self._steps(step.otherwise)
+            self.steps(step.otherwise)
 
     def _choose_bias(self, step: ChooseBias) -> None:
         """Not with rotor inertia, whose effort goes with the whole acceleration."""

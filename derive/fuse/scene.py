@@ -19,6 +19,9 @@ from .passes.balance import Balanced, balance
 from .replay import Replay
 from .state import FusionState, Kernels
 
+#: The one guard code of kernels whose failures the looped engine names.
+FAILED = 1
+
 #: Power and potential that add at most this part to the operations of accelerations are had with
 #: them: one text for both takes half the time to compile.
 _CHEAP = 0.03

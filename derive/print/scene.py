@@ -33,7 +33,7 @@ class FusedKernels(Protocol):
 
     @property
     def kernels(self) -> Mapping[str, KernelIR]:
-        """Those of `derive.fuse.scene.fuse`, of `fuse_implicit` or of `fuse_slopes`."""
+        """Those of `fuse`, `fuse_implicit`, `fuse_slopes` or `fuse_inverse`."""
 
     @property
     def failures(self) -> tuple[tuple[int, int, int], ...]:
@@ -71,7 +71,8 @@ def fused_sources(fused: FusedKernels, key: str, part: str = "scalar") -> dict[s
 
     Part "scalar" holds the kernels for one state (accelerations, accelerations_power, gaps, slips),
     part "lanes" those for several states at once (accelerations_lanes, accelerations_many), part
-    "implicit" what implicit methods ask for, part "linear" the slopes about a state.
+    "implicit" what implicit methods ask for, part "linear" the slopes about a state, part "inverse"
+    inverse dynamics and the mass matrix.
     """
     kernels = _written(fused, part)
     sizes = {port.name: port.length() for port in next(iter(kernels.values())).inputs}

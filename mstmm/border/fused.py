@@ -6,7 +6,7 @@ Both the printer of the C text and the opener of the library read it; no other m
 from __future__ import annotations
 
 #: Number of the layout below; changed with every change of it, and checked when a library opens.
-ABI = 7
+ABI = 8
 
 #: Name of the one variable that a library exports.
 SYMBOL = "mstmm_fused_library"
@@ -66,6 +66,9 @@ typedef struct {{
     int (*rates)({_GIVEN}, double *dq);
     int (*coordinates)({_GIVEN}, const double *steps, const double *x, const double *rho,
                        double *dq);
+    /* Inverse dynamics and the mass matrix; see derive/fuse/inverse.py. */
+    int (*required)({_GIVEN}, double *efforts);
+    int (*mass)({_GIVEN}, double *M);
     /* The slopes of the residual about a state; see derive/fuse/linear.py. */
     int (*linear)({_GIVEN}, double *M, double *C, double *K, double *G, double *r_t);
 }} mstmm_fused;

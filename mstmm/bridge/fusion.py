@@ -84,6 +84,7 @@ class Fusion:
         self.lanes: FusedLibrary | None = None
         self.implicit: FusedLibrary | None = None
         self.linear: FusedLibrary | None = None
+        self.inverse: FusedLibrary | None = None
         self.note = ""
         self._insisted = False  # engine="fused": batches too
         self.inputs: Places = ()
@@ -124,6 +125,7 @@ class Fusion:
         if self.structure == other.structure:
             self.library, self.lanes, self.note = other.library, other.lanes, other.note
             self.implicit, self.linear = other.implicit, other.linear
+            self.inverse = other.inverse
         elif other.library is not None:
             try:
                 self.build()
@@ -166,8 +168,19 @@ class Fusion:
         """The same for the slopes about a state, where the caller knows whether they pay."""
         return self._of_small("linear", pays)
 
+    def ready_inverse(self, calls: float) -> FusedLibrary | None:
+        """The same for inverse dynamics and mass matrix of trees that nothing drives."""
+        if self.obstacle or not self.structure.nu or self.structure.drives is not None:
+            return None
+        return self._of_trees("inverse", calls > self._break_even())
+
     def _of_small(self, part: str, pays: bool) -> FusedLibrary | None:
-        if self.obstacle or not 0 < self.structure.nu <= _MOST_UNKNOWNS or self.structure.closes:
+        if self.obstacle or not 0 < self.structure.nu <= _MOST_UNKNOWNS:
+            return None
+        return self._of_trees(part, pays)
+
+    def _of_trees(self, part: str, pays: bool) -> FusedLibrary | None:
+        if self.structure.closes:
             return None
         try:
             return self._get(part, build=self._insisted or pays)
@@ -216,7 +229,10 @@ class Fusion:
     def _sources(self, part: str, key: str) -> dict[str, str]:
         from ..derive.print.scene import fused_sources
 
-        make = {"implicit": self.fused_implicit, "linear": self.fused_linear}.get(part, self.fused)
+        make = {
+            "implicit": self.fused_implicit, "linear": self.fused_linear,
+            "inverse": self.fused_inverse,
+        }.get(part, self.fused)  # fmt: skip
         return fused_sources(make(self.structure), key, part)
 
     def columns(
@@ -277,6 +293,12 @@ class Fusion:
         from ..derive.fuse.linear import fuse_slopes
 
         return fuse_slopes(structure, kernels_of(self._definitions))
+
+    def fused_inverse(self, structure: Structure) -> Fused:
+        """The same of inverse dynamics and the mass matrix."""
+        from ..derive.fuse.inverse import fuse_inverse
+
+        return fuse_inverse(structure, kernels_of(self._definitions))
 
     def symbolic(self, linear: Equations, keep: Sequence[str]) -> Symbolic:
         """See `Equations.symbolic`; no compiler."""

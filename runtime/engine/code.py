@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 class Fusing(Protocol):
     """Fused libraries of a scene: `library` for one state, `lanes` for several side by side,
-    `implicit` for what implicit methods ask, `linear` for slopes about a state.
+    `implicit` for what implicit methods ask, `linear` for slopes about a state, `inverse` for
+    inverse dynamics and the mass matrix.
 
     `numbers` is the vector p they read, `inputs` where inputs stand in it; `note` says where the
     library came from, `obstacle` why there can be none.  `ready(n)` gives a library if it is there
@@ -34,6 +35,7 @@ class Fusing(Protocol):
     lanes: FusedLibrary | None
     implicit: FusedLibrary | None
     linear: FusedLibrary | None
+    inverse: FusedLibrary | None
     numbers: Array
     inputs: Places
     note: str
@@ -47,6 +49,7 @@ class Fusing(Protocol):
     def ready_lanes(self, evaluations: float) -> FusedLibrary | None: ...
     def ready_implicit(self, evaluations: float) -> FusedLibrary | None: ...
     def ready_linear(self, pays: bool) -> FusedLibrary | None: ...
+    def ready_inverse(self, calls: float) -> FusedLibrary | None: ...
     def fused(self, structure: Any) -> Any: ...
     def columns(
         self, structure: Any, kernels: Callable[[], Any], what: str, build: bool
@@ -64,6 +67,7 @@ class NotFused:
     lanes: FusedLibrary | None = None
     implicit: FusedLibrary | None = None
     linear: FusedLibrary | None = None
+    inverse: FusedLibrary | None = None
     note: str = ""
     numbers: Array = field(default_factory=lambda: np.zeros(0))
     inputs: Places = ()
@@ -92,6 +96,9 @@ class NotFused:
         return None
 
     def ready_linear(self, pays: bool) -> None:
+        return None
+
+    def ready_inverse(self, calls: float) -> None:
         return None
 
     def fused(self, structure: Any) -> Any:

@@ -218,9 +218,9 @@ class Model(Compiled):
         speeds do not decide the others.
         """
         if self.freedom is None:
-            refuse_dense(self.nu, "the mass matrix")
             if (alone := self._alone.mass_matrix(q)) is not None:
                 return alone
+            refuse_dense(self.nu, "the mass matrix")
         lead, (states,) = batch(("q", q, self.nq))
         if self.freedom is not None:
             from .actuated import reduced_mass
