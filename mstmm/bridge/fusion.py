@@ -50,8 +50,11 @@ MOST_ASKED = 400
 _SECONDS, _SECONDS_PER_BODY = 0.1, 0.04
 _SAVED_PER_BODY = 6e-8
 #: More unknowns than this are eliminated body by body, by the looped engine: the tangent as a whole
-#: and the matrices of a linear model cost the square of them.
+#: costs the square of them.
 _MOST_UNKNOWNS = 20
+#: The same for matrices of a linear model, by pairs of speeds of which one moves the other's hinge:
+#: 28 pins in a row have so many, or a humanoid of 38 speeds.  They compile 10 to 20 s.
+_MOST_PAIRS = 406
 #: A frame or section of a flexible body with n shapes compiles like 1 + n^2 / this many bodies.
 _MODES_PER_BODY = 24
 #: A hinge that n rows of closed loops pass compiles like n^2 / this many bodies.
@@ -166,6 +169,9 @@ class Fusion:
 
     def ready_linear(self, pays: bool) -> FusedLibrary | None:
         """The same for the slopes about a state, where the caller knows whether they pay."""
+        if not self.obstacle and self.structure.nu > _MOST_UNKNOWNS:
+            few = _pairs(self.structure) <= _MOST_PAIRS
+            return self._of_trees("linear", pays) if few else None
         return self._of_small("linear", pays)
 
     def ready_inverse(self, calls: float) -> FusedLibrary | None:
@@ -335,6 +341,17 @@ def _note(built: Built) -> str:
     if built.how == "cached":
         return f"its code was in the cache{more}"
     return f"its code was compiled in {built.seconds:.2f} s and kept{more}"
+
+
+def _pairs(structure: Structure) -> int:
+    """Pairs of speeds of which one is on the way from the other's hinge to the root; of all speeds
+    where bodies are flexible."""
+    if any(body.modal for body in structure.bodies):
+        return structure.nu**2
+    inboard: list[int] = []
+    for body in structure.bodies:
+        inboard.append(body.nu + (inboard[body.parent] if body.parent >= 0 else 0))
+    return sum(body.nu * above for body, above in zip(structure.bodies, inboard, strict=True))
 
 
 def _obstacle(packed: Packed, most: int) -> str:

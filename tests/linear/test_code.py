@@ -37,8 +37,9 @@ def of_both_engines(scene: mstmm.Scene) -> tuple[mstmm.Model, mstmm.Model]:
     return mstmm.compile(scene, engine="fused"), mstmm.compile(scene, engine="looped")
 
 
-#: Quaternions with laws, springs and loads; a drive with a signal; shapes of a beam.
-CASES = ("quaternions", "driven", "beam")
+#: Quaternions with laws, springs and loads; a drive with a signal; shapes of a beam; a body with
+#: more speeds than any two in a row have to do with each other.
+CASES = ("quaternions", "driven", "beam", "spider")
 
 
 def case_of(name: str) -> tuple[mstmm.Scene, ArrayLike, ArrayLike]:
@@ -46,8 +47,24 @@ def case_of(name: str) -> tuple[mstmm.Scene, ArrayLike, ArrayLike]:
         return DRIVEN, [0.1, 0.4, -0.3], [0.5, 1.0, -2.0]
     if name == "beam":
         return hanging_beam(1.0, 2), [0.3, 0.02, -0.01], [0.4, 0.1, 0.2]
+    if name == "spider":
+        return spider(), np.linspace(-1, 1, 22), np.linspace(2, -1, 22)
     data, q, u = drawn(33, types=("ball", "pin"), most=2)
     return mstmm.Scene(**data), q, u
+
+
+def spider() -> mstmm.Scene:
+    """Eleven legs of two pins each on the ground: 22 speeds."""
+    leg = {"mass": 0.5, "center_of_mass": [0.2, 0, 0], "inertia": [0.01, 0.02, 0.02],
+           "ends": {"knee": [0.4, 0, 0]}}  # fmt: skip
+    pin = {"type": "pin", "law": {"damping": 0.1}}
+    legs = range(11)
+    hips = [pin | {"name": f"hip{i}", "inboard": "ground", "outboard": f"thigh{i}",
+                   "axis": [0, 1, 0.1 * i]} for i in legs]  # fmt: skip
+    knees = [pin | {"name": f"knee{i}", "inboard": f"thigh{i}.knee", "outboard": f"shank{i}",
+                    "axis": [1, 0, 0.1 * i]} for i in legs]  # fmt: skip
+    bodies = [leg | {"name": f"{part}{i}"} for i in legs for part in ("thigh", "shank")]
+    return mstmm.Scene(gravity=(0, 0, -9.81), body=bodies, hinge=hips + knees)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -62,6 +79,16 @@ def test_code_finds_what_the_sweep_finds(name: str) -> None:
     np.testing.assert_allclose(found.state.a, wanted.state.a, rtol=1e-11, atol=1e-11)
     assert np.array_equal(found.M, found.M.T)
     assert (found.turning is None) == (wanted.turning is None)
+
+
+def test_long_chains_are_left_to_the_sweep() -> None:
+    """Text grows with the square of a chain's length."""
+    chain = {"name": "row", "count": 30, "inboard": "ground", "end": "tip",
+             "body": {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.01, 0.1, 0.1],
+                      "ends": {"tip": [1, 0, 0]}},
+             "hinge": {"type": "pin"}}  # fmt: skip
+    model = mstmm.compile(mstmm.Scene(gravity=(0, -9.81, 0), chain=[chain]), engine="looped")
+    assert not model.fusion.obstacle and model.fusion.ready_linear(True) is None
 
 
 @pytest.mark.parametrize("name", ["quaternions", "beam"])
