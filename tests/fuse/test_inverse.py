@@ -101,6 +101,6 @@ def test_driven_scenes_have_no_such_code() -> None:
         hinge=[{"name": "h", "type": "pin", "inboard": "ground", "outboard": "a",
                 "drive": "sin(t)"}],
     )  # fmt: skip
-    model = mstmm.compile(scene, engine="looped")
-    assert isinstance(model.fusion, Fusion)
+    model = mstmm.compile(scene)
+    assert isinstance(model.fusion, Fusion) and not model.fusion.obstacle
     assert model.fusion.ready_inverse(np.inf) is None

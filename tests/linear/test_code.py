@@ -87,7 +87,7 @@ def test_long_chains_are_left_to_the_sweep() -> None:
              "body": {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.01, 0.1, 0.1],
                       "ends": {"tip": [1, 0, 0]}},
              "hinge": {"type": "pin"}}  # fmt: skip
-    model = mstmm.compile(mstmm.Scene(gravity=(0, -9.81, 0), chain=[chain]), engine="looped")
+    model = mstmm.compile(mstmm.Scene(gravity=(0, -9.81, 0), chain=[chain]))
     assert not model.fusion.obstacle and model.fusion.ready_linear(True) is None
 
 
