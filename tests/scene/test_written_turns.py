@@ -53,7 +53,9 @@ def test_an_inertia_in_rows_and_in_axes_of_its_own() -> None:
         ({"orientation": [[1, 0, 0], [0, 1], [0, 0, 1]]}, "found a row of 2 entries"),
         ({"orientation": [[1, 0, 0], [0, "x", 0], [0, 0, 1]]}, "found 'x'"),
         ({"inertia": [[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]}, r"found 0.1 at \[1\]\[2\] and 0 at"),
-        ({"inertia": {"moments": [1, 1, 1]}}, "found the keys moments"),
+        ({"inertia": {"moments": [1, 1, 1]}}, r"found the keys \['moments'\]"),
+        ({"inertia": {"\0": 1}}, r"found the keys \['\\x00'\]"),
+        ({"inertia": {}}, "found an empty one"),
         ({"inertia": {"moments": [1, 1], "orientation": [0, 0, 0]}}, "found 2 entries"),
     ],
 )

@@ -69,9 +69,9 @@ def inertia() -> Rule:
         if not isinstance(value, dict):
             return entries(value)
         if set(value) != {"moments", "orientation"}:
+            keys = f"the keys {found(list(value))}" if value else "an empty one"
             raise refuse(
-                f"expected {expected}, or a table of moments and orientation, found the keys "
-                f"{', '.join(map(str, value)) or 'of an empty one'}"
+                f"expected {expected}, or a table of moments and orientation, found {keys}"
             )
         given, axes = (
             entries(value["moments"]),
