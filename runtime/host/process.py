@@ -8,16 +8,16 @@ import select
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 #: Bytes of a program's output that are kept; the rest is read and dropped.
 _KEPT = 20_000
 
-#: Reads the number of a process group, waits until nobody can write to its input any more (we are
-#: gone, whatever took us), and takes the group along.
-_WATCHDOG = 'read -r group && { read -r end; kill -s KILL -- "-$group"; }'
+#: Waits until nobody can write to its input any more (we are gone, whatever took us), and takes its
+#: process group along.
+_WATCHDOG = "read -r end; kill -s KILL 0"
 
 #: Where the system does not announce the end of a process: pause between two looks, s.
 _PAUSE = 0.01
@@ -43,31 +43,31 @@ class Ended:
 def run(command: Sequence[str], folder: Path, timeout: float, **environment: str) -> Ended:
     """Run `command` in `folder` for at most `timeout` s, with changes to the environment.
 
-    The program gets a process group of its own; whenever it does not end by itself and well (time,
-    Ctrl-C, a failure), the whole group is killed, so that no compiler pass goes on writing; so it
-    is when this process is killed.  Raises Hanging, and OSError if the program cannot be started.
+    The program gets a process group with a watchdog; whenever it does not end by itself and well
+    (time, Ctrl-C, a failure), the whole group is killed, so that no compiler pass goes on writing;
+    so it is when this process is killed.  Raises Hanging, and OSError if the program cannot be
+    started.
     """
     # A pipe, for the disk may be full; we stop reading when the program itself has ended, for a
     # grandchild could keep the pipe open for ever.
     reader, writer = os.pipe()
     try:
         os.set_blocking(reader, False)
-        with _watchdog() as watch:
+        with _watched_group() as group:
             try:
                 process = subprocess.Popen(
                     command, stdin=subprocess.DEVNULL, stdout=writer, stderr=subprocess.STDOUT,
                     cwd=folder, env={**os.environ, "LC_ALL": "C", **environment},
-                    start_new_session=True,
+                    process_group=group,
                 )  # fmt: skip
             finally:
                 os.close(writer)
             try:
-                watch(process.pid)
                 said = _said_until_the_end(process, reader, timeout)
             finally:
                 if process.returncode != 0:
                     with contextlib.suppress(ProcessLookupError, PermissionError):
-                        os.killpg(process.pid, signal.SIGKILL)
+                        os.killpg(group or process.pid, signal.SIGKILL)
                     process.wait()
     finally:
         os.close(reader)
@@ -75,29 +75,25 @@ def run(command: Sequence[str], folder: Path, timeout: float, **environment: str
 
 
 @contextlib.contextmanager
-def _watchdog() -> Iterator[Callable[[int], None]]:
-    """A process that kills the group it is told of if this one ends inside the block."""
+def _watched_group() -> Iterator[int]:
+    """Number of a process group that is killed if this process ends inside the block, whenever that
+    is: the watchdog is in it before anybody else.  0, a group of one's own, without a watchdog."""
     reader, writer = os.pipe()
     with contextlib.ExitStack() as ends:
         ends.callback(os.close, writer)
         try:
             dog = subprocess.Popen(
                 ["sh", "-c", _WATCHDOG], stdin=reader, stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL, start_new_session=True,
+                stderr=subprocess.DEVNULL, process_group=0,
             )  # fmt: skip
         except OSError:  # no shell
-            yield lambda group: None
+            yield 0
             return
         finally:
             os.close(reader)
         ends.callback(dog.wait)
         ends.callback(dog.kill)  # before it can see the end of its input
-
-        def watch(group: int) -> None:
-            with contextlib.suppress(OSError):
-                os.write(writer, f"{group}\n".encode())
-
-        yield watch
+        yield dog.pid
 
 
 def _said_until_the_end(process: subprocess.Popen[bytes], reader: int, timeout: float) -> bytes:

@@ -237,3 +237,31 @@ def test_removed_while_others_use_it(cache_folder: Path) -> None:
     value, again = cache.opened(Kernel().recipe, opener)
     assert value == 21.0 and removed == [1] and again.path == built.path
     assert_tidy(cache_folder, 1)
+
+
+#: An owner that is killed as soon as its program runs, before it has learned of that.
+KILLED_AT_ONCE = """\
+import os, signal, subprocess, sys
+from pathlib import Path
+from mstmm.runtime.host import process
+
+start, note = subprocess.Popen, Path(sys.argv[1])
+
+def started(command, **kept):
+    made = start(command, **kept)
+    if command[0] == sys.argv[2]:
+        while not (note.exists() and note.read_text().endswith("\\n")): pass
+        os.kill(os.getpid(), signal.SIGKILL)
+    return made
+
+subprocess.Popen = started
+process.run([sys.argv[2], "version"], note.parent, 600.0)
+"""
+
+
+def test_a_program_ends_with_an_owner_that_is_killed_as_it_starts(tmp_path: Path) -> None:
+    note = tmp_path / "pass"
+    program = false_compiler(tmp_path, ENDLESS.replace("pass", str(note)))
+    given = [sys.executable, "-c", KILLED_AT_ONCE, str(note), str(program)]
+    assert subprocess.run(given, check=False).returncode == -signal.SIGKILL
+    _until(lambda: not alive(int(note.read_text())))
