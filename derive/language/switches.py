@@ -26,7 +26,11 @@ def slope(expression: sp.Basic, symbol: sp.Symbol) -> sp.Basic:
 
 
 def _in_branches(expression: sp.Basic, held: dict[sp.Basic, sp.Dummy]) -> sp.Basic:
-    """The expression with constants for what steps, and Piecewise for Min and Max."""
+    """The expression with constants for what steps, and Piecewise for Min and Max.
+
+    Where one extreme is compared with another, SymPy writes the condition as ITE, which no stage
+    behind knows.
+    """
 
     def constant(kind: type, a: sp.Expr) -> sp.Dummy:
         return held.setdefault(kind(a), sp.Dummy(real=True))
@@ -43,7 +47,7 @@ def _in_branches(expression: sp.Basic, held: dict[sp.Basic, sp.Dummy]) -> sp.Bas
     found = found.replace(sp.floor, lambda a: constant(sp.floor, a))
     for kind in (sp.Min, sp.Max):
         found = found.replace(kind, lambda *a, kind=kind: extreme(kind, *a))
-    return found
+    return found.replace(sp.ITE, lambda when, a, b: (when & a) | (~when & b))
 
 
 def _restored(expression: sp.Basic, held: dict[sp.Basic, sp.Dummy]) -> sp.Basic:

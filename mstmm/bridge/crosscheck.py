@@ -154,7 +154,7 @@ class _Subject:
 
     def report(self, points: int, remarks: tuple[str, ...]) -> Report:
         checks = tuple(self._kernel(kernel, points) for kernel in self.irs.values())
-        statements = tuple(Statement(*found) for found in self.statements())
+        statements = tuple(Statement(*found) for found in self._judged())
         return Report(self.kind, self.name, checks, statements, remarks)
 
     # --- one kernel -----------------------------------------------------------------------------
@@ -262,6 +262,22 @@ class _Subject:
         if self.stated:
             return evaluate_equations(self.stated[name].derivation, inputs, (), DIGITS).outputs
         return evaluate(self.irs[name], inputs, DIGITS)
+
+    def _judged(self) -> list[tuple[str, float, float]]:
+        """All statements; ElementError where the equations have no value at numbers within the
+        bounds that the definition gives."""
+        from ..derive.audit.evaluate_equations import Undefined
+
+        try:
+            return list(self.statements())
+        except Undefined as undefined:
+            what = str(undefined)
+            for k, parameter in enumerate(self.source.parameters):
+                what = what.replace(f"p[{k}, 0]", f"p.{parameter.name}")
+            raise ElementError(
+                f"{self.kind} {self.name}: {what} at some numbers that its definition allows; give "
+                'parameters and coordinates their bounds, such as Param("width", "m", minimum=0)'
+            ) from None
 
     def statements(self) -> Iterator[tuple[str, float, float]]:
         from ..derive.audit import law_properties, properties

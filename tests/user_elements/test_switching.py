@@ -23,6 +23,7 @@ LIFTS = {
     "parabolic_dwell": r * sp.Max(0, a) ** 2,
     "cubed": r * sp.Abs(a) ** 3,
     "signed": r * sp.sign(a) * a**2,
+    "nested": r * sp.Max(0, sp.Min(a, 2 * a), a - 1) ** 2,
     "off_centre": r * sp.Min(0, a - sp.Rational(1, 3)) ** 2,
 }
 JUMPS = {
@@ -73,6 +74,16 @@ class Broken(Floor):
         return p.stiffness * x[2] ** 2 * sp.floor(x[2]) / 2
 
 
+class Root(Floor):
+    """Has no value where a width without bounds is below zero."""
+
+    name = "rooted_floor"
+    parameters = (*Floor.parameters, Param("width", "m"))
+
+    def potential(self, x, p):  # type: ignore[no-untyped-def]
+        return p.stiffness * sp.sqrt(p.width) ** 3 * sp.sqrt(x.dot(x)) ** sp.Rational(1, 2)
+
+
 @pytest.mark.parametrize("name", LIFTS)
 def test_branches_that_meet_agree(name: str) -> None:
     element = cam(name, LIFTS[name])
@@ -92,6 +103,11 @@ def test_forces_may_kink_and_energies_may_not_jump() -> None:
     assert crosscheck_definition(Floor()).passed
     with pytest.raises(ElementError, match=r"potential\(x, p\) jumps at x_3 = -1.0, where floor"):
         check(Broken())
+
+
+def test_numbers_without_a_value_are_told_by_their_names() -> None:
+    with pytest.raises(ElementError, match=r"p\.width.* no finite real value .* minimum=0"):
+        crosscheck_definition(Root(), points=1)
 
 
 @pytest.mark.parametrize("name", LIFTS)
