@@ -180,6 +180,8 @@ def test_an_inertia_that_no_body_has_is_taken_and_told(tmp_path: Path) -> None:
         (robot("a b", joint("fixed", "a", "b", '<origin rpy="1 2 nan"/>')), "found '1 2 nan'"),
         (robot("a"), 'nothing in it moves or has mass; try base = "free"'),
         ('<!DOCTYPE robot [<!ENTITY a "b">]><robot/>', "a document type or an entity is not read"),
+        ('<?xml version="1.0" encoding="nobody\'s"?><robot/>', "not valid XML: "),
+        ('<?xml version="1.0" encoding="klingon"?><robot/>', "unknown encoding: klingon"),
         ("<robot>" + "<a>" * 200, "nested more than 100 deep"),
         ('<robot><link name="a"><inertial><mass value="-1"/></inertial></link></robot>',
          "link 'a': a mass of -1 kg; expected 0 or more"),
@@ -198,20 +200,10 @@ def test_choices_that_are_none(tmp_path: Path) -> None:
         mstmm.import_robot(path, base="flying")
     with pytest.raises(mstmm.SceneError, match="stops: expected a stiffness above 0"):
         mstmm.import_robot(path, stops=-1.0)
+    with pytest.raises(mstmm.SceneError, match="stops: expected a stiffness above 0"):
+        mstmm.import_robot(path, stops="1e4")  # type: ignore[arg-type]
     with pytest.raises(mstmm.SceneError, match="expected a robot's file ending in"):
         mstmm.import_robot(tmp_path / "arm.toml")
-
-
-def test_a_joint_that_mimics_may_be_held(tmp_path: Path) -> None:
-    path = written(tmp_path, ARM)
-    found = mstmm.import_robot(path, mimics="held")
-    assert not found.scene.coupling
-    assert "held at 0.01; it mimics another" in [note.text for note in found.notes]
-    run = mstmm.compile(found.scene).simulate(0.2)
-    held = run.model.layout.hinges["other_jaw"].q
-    assert run.success and np.ptp(run.q[:, held]) == 0 and run.q[0, held] == 0.01
-    with pytest.raises(mstmm.SceneError, match='expected "coupled" or "held", found'):
-        mstmm.import_robot(path, mimics="frozen")
 
 
 def test_meshes_lie_in_packages_above_and_collision_shapes_stand_in(tmp_path: Path) -> None:

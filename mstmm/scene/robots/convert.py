@@ -24,6 +24,8 @@ from .tree import Tree
 
 BASES = (FIXED, "free")
 COUPLED, HELD = MIMICS = ("coupled", "held")
+#: Types of joints with one coordinate.
+_OF_ONE = ("pin", "prismatic")
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ class _Writer:
     def __init__(self, robot: Robot, tree: Tree, choices: Choices) -> None:
         self.robot, self.tree, self.choices = robot, tree, choices
         self.notes = list(robot.notes)
-        self.mimics = list(self._known_mimics())
+        mimics = list(self._known_mimics())
         self.held = {joint.name for joint in tree.weightless()}
         for name in sorted(self.held, key=list(tree.joints).index):
             what = "nothing that it carries has mass, so it is held fixed"
@@ -101,6 +103,8 @@ class _Writer:
             joint.name: hinges.take(joint.name, "joint") for joint in robot.joints
             if self.place[joint.child][0] == joint.child
         }  # fmt: skip
+        #: What the joints that move go with.
+        self.mimics = {mimic.of: mimic for mimic in mimics if self._moves(mimic.of)}
         self._roots = {name: hinges.take(f"{name}_base", "link")
                        for name in tree.roots if name in self._bodies}  # fmt: skip
         self._ends: defaultdict[str, dict[str, Any]] = defaultdict(dict)
@@ -206,53 +210,65 @@ class _Writer:
                 law["limits"] = {**limits, "stiffness": self.choices.stops}
         if law:
             keys["law"] = law
-        if start is not None and self.choices.mimics == HELD:
+        if start is not None and not self._is_coupled(joint.name):
             keys["drive"] = [start]
+            keys.pop("initial", None)
             self._tell(joint, f"joint {joint.name!r}", f"held at {start:g}; it mimics another")
-        elif start:
+        elif start is not None and (start or "initial" in keys):
             keys["initial"] = {"q": [start]}
         return keys
 
     def _known_mimics(self) -> Iterator[Mimic]:
         for mimic in self.robot.mimics:
-            if mimic.other in self.tree.joints:
+            other = self.tree.joints.get(mimic.other)
+            if other is not None and other.type in (*_OF_ONE, FIXED):
                 yield mimic
                 continue
-            what = f"left free: it mimics {mimic.other!r}, which is not there"
-            what += near(mimic.other, self.tree.joints)
+            what = f"left free: it mimics {mimic.other!r}, which "
+            if other is None:
+                what += f"is not there{near(mimic.other, self.tree.joints)}"
+            else:
+                what += "has more coordinates than one"
             self._tell(self.tree.joints[mimic.of], f"joint {mimic.of!r}", what)
 
     def _couplings(self) -> Iterator[dict[str, Any]]:
-        for mimic, joint in self._mimics() if self.choices.mimics == COUPLED else ():
-            own, other = self.joints[mimic.of], self.joints.get(mimic.other)
-            moves = other is not None and mimic.other not in self.held
-            row = f"{own}.q - {mimic.multiplier!r}*{other}.q" if moves else f"{own}.q"
-            row = row.replace("- -", "+ ")
+        for name, mimic in self.mimics.items():
+            if not self._is_coupled(name):
+                continue
+            own, other = self.joints[name], self.joints[mimic.other]
+            row = f"{own}.q - {mimic.multiplier!r}*{other}.q".replace("- -", "+ ")
             yield {"name": f"{own}_mimics", "expression": row, "equals": mimic.offset}
             what = f"goes with {mimic.other!r}, by a coupling"
-            self._tell(joint, f"joint {mimic.of!r}", what)
+            self._tell(self.tree.joints[name], f"joint {name!r}", what)
 
-    def _mimics(self) -> Iterator[tuple[Mimic, Joint]]:
-        """Those of joints that move."""
-        for mimic in self.mimics:
-            joint = self.tree.joints[mimic.of]
-            if mimic.of in self.joints and mimic.of not in self.held:
-                yield mimic, joint
+    def _moves(self, name: str) -> bool:
+        fixed = self.tree.joints[name].type == FIXED
+        return not fixed and name in self.joints and name not in self.held
+
+    def _is_coupled(self, name: str) -> bool:
+        """Whether a joint that mimics another one goes with it; else it is held."""
+        return self.choices.mimics == COUPLED and self._moves(self.mimics[name].other)
 
     def _starts(self) -> dict[str, float]:
-        """Start values of the joints that go with others, which start at 0."""
-        mimics = {mimic.of: mimic for mimic, _ in self._mimics()}
+        """Start values of the joints that go with others."""
+        mimics, found = self.mimics, dict[str, float]()
+        for name in mimics:
+            way = dict[str, Mimic]()
+            while name in mimics and name not in found:
+                if name in way:
+                    joint = self.tree.joints[name]
+                    raise SceneError(f"{joint.where}: joint {name!r} mimics itself in the end")
+                way[name] = mimics[name]
+                name = mimics[name].other
+            at = found[name] if name in found else self._start(name)
+            for one, mimic in reversed(way.items()):
+                at = found[one] = mimic.multiplier * at + mimic.offset
+        return found
 
-        def start(name: str, asked: frozenset[str]) -> float:
-            mimic = mimics.get(name)
-            if mimic is None:
-                return 0.0
-            if name in asked:
-                joint = self.tree.joints[name]
-                raise SceneError(f"{joint.where}: joint {name!r} mimics itself in the end")
-            return mimic.multiplier * start(mimic.other, asked | {name}) + mimic.offset
-
-        return {name: start(name, frozenset()) for name in mimics}
+    def _start(self, name: str) -> float:
+        """Where a joint starts that goes with none."""
+        given = self.tree.joints[name].keys.get("initial") if self._moves(name) else None
+        return float(given["q"][0]) if given else 0.0
 
     def _shapes(self, folder: Path | None) -> Iterator[dict[str, Any]]:
         meshes = None if folder is None else Meshes(folder)

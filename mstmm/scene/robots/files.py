@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 from ...errors import SceneError
 from ..files.read import content_of
@@ -38,7 +39,7 @@ def import_robot(
         raise SceneError(f'base: expected "fixed" or "free", found {base!r:.40}')
     if mimics not in MIMICS:
         raise SceneError(f'mimics: expected "coupled" or "held", found {mimics!r:.40}')
-    if stops is not None and not 0 < stops < float("inf"):
+    if stops is not None and not _is_stiffness(stops):
         raise SceneError(f"stops: expected a stiffness above 0 in N m/rad or N/m, found {stops!r}")
     where, content = content_of(path, ENDINGS, "a robot's file")
     full = Path(os.fsdecode(path)).absolute()
@@ -49,3 +50,8 @@ def import_robot(
     else:
         robot = read_mjcf(str(full), where)
     return converted(robot, Choices(base, merge, stops, mimics), full.parent)
+
+
+def _is_stiffness(value: Any) -> bool:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and 0 < value < float("inf")

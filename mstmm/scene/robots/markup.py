@@ -91,6 +91,6 @@ def parsed(content: bytes, where: str) -> Element:
     except expat.ExpatError as error:
         what = expat.ErrorString(error.code)
         raise SceneError(f"{where}: line {above + error.lineno}: not valid XML: {what}") from None
-    except ValueError as error:
+    except (ValueError, LookupError) as error:  # of an encoding that nobody knows, too
         raise SceneError(f"{where}: not valid XML: {error}") from None
     return outside.children[0]
