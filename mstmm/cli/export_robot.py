@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from .import_robot import together
-from .options import Json, output_file
+from .options import Json, new_file
 
 
 def export_robot(
@@ -25,7 +24,7 @@ def export_robot(
 
     from .output import emit_json, say
 
-    target = output_file(output or f"{Path(scene).stem}.urdf", (".urdf",))
+    target = new_file(output, scene, ".urdf")
     found = mstmm.export_robot(mstmm.load_scene(scene), target.stem)
     target.write_text(found.text, encoding="utf-8")
     if json:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import Json, output_file, positive
+from .options import Json, new_file, positive
 
 if TYPE_CHECKING:
     from mstmm.scene.robots.robot import Note
@@ -53,7 +52,7 @@ def import_robot(
 
     from .output import emit_json, say
 
-    target = output_file(output or f"{Path(robot).stem}.toml", (".toml",))
+    target = new_file(output, robot, ".toml")
     found = mstmm.import_robot(
         robot, base=base, merge=not keep_fixed, stops=stops,
         mimics="held" if hold_mimics else "coupled",

@@ -148,6 +148,19 @@ def _number_or_name(text: str) -> float | str:
         return text
 
 
+def new_file(given: str | None, beside: str, ending: str) -> Path:
+    """What `output_file` makes of a name; where none is given, that of the file `beside` with the
+    ending, here, which nothing is written over: it may be somebody's work."""
+    if given is not None:
+        return output_file(given, (ending,))
+    path = output_file(Path(beside).stem + ending, (ending,))
+    if path.exists():
+        raise MstmmError(
+            f"{path} is there already; name another with --output, or this one to write it anew"
+        )
+    return path
+
+
 def output_file(text: str, endings: Sequence[str], option: str = "--output") -> Path:
     """A file that can be written, checked before anything is computed.
 

@@ -43,7 +43,22 @@ def test_a_scene_becomes_a_robot_again(mstmm: Command) -> None:
     done = mstmm("export", "arm.toml", "-o", "again.urdf")
     assert done.code == 0 and done.out.splitlines()[-1].startswith("again.urdf: 5 links")
     assert mstmm("check", "again.urdf").code == 0
-    told = json.loads(mstmm("export", "arm.toml", "--json").out)
+    told = json.loads(mstmm("export", "arm.toml", "-o", "arm.urdf", "--json").out)
     assert told["robot"] == "arm.urdf" and isinstance(told["notes"], list)
     done = mstmm("export", "arm.toml", "-o", "arm.xml")
     assert done.code == 2 and ".urdf" in done.err
+
+
+def test_nothing_is_written_over_without_being_named(mstmm: Command) -> None:
+    Path("arm.urdf").write_text(ARM)
+    assert mstmm("import", "arm.urdf").code == 0
+    scene = Path("arm.toml").read_text() + "# by hand\n"
+    Path("arm.toml").write_text(scene)
+    for command, source, target in (
+        ("import", "arm.urdf", "arm.toml"), ("export", "arm.toml", "arm.urdf")
+    ):  # fmt: skip
+        done = mstmm(command, source)
+        assert done.code == 2 and f"{target} is there already; name another" in done.err
+    assert Path("arm.toml").read_text() == scene and Path("arm.urdf").read_text() == ARM
+    assert mstmm("import", "arm.urdf", "--output", "arm.toml").code == 0
+    assert Path("arm.toml").read_text() != scene
