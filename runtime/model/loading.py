@@ -20,6 +20,7 @@ from ..kernels.identity import kernels_hash
 from ..result import meshes
 from ..result.output import provenance
 from ..result.output.columns import READERS, Columns
+from ..result.record import Record
 from ..result.result import Result
 from ..run.trajectory import Trajectory
 from .model import Model
@@ -40,7 +41,7 @@ def load_result(path: str | Path) -> Result | Columns:
     if not path.is_file():
         raise SceneError(f'result file "{path}": there is no such file')
     found = reader(path)
-    found.lost = frozenset(dir(Result)) - frozenset(dir(found))
+    found.lost = frozenset({*dir(Result), *Record.__annotations__}) - frozenset(dir(found))
     return found
 
 

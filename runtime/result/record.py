@@ -14,7 +14,7 @@ from mstmm.risk import Risk
 from mstmm.scene.checks.flexible import short_beams
 
 from ..engine.compiled import Compiled
-from ..integrate.loop import Statistics
+from ..integrate.loop import Statistics, Status
 from ..integrate.reached import ReachedError
 from ..integrate.settings import Settings
 from ..pack.layout import HingeSlots
@@ -40,16 +40,25 @@ class Record(FlexibleResults, ABC):
     `Result` says what its attributes are; it adds what vouches for them, and the ways out.
     """
 
+    model: Compiled
+    trajectory: Trajectory
+    q: Array
+    u: Array
+    meshes: Mapping[str, bytes]
+    checkpoint: Checkpoint | None
+    status: Status | None
+    statistics: Statistics | None
+    settings: Settings
+
     def __init__(
         self, model: Compiled, run: Trajectory, error: ErrorEstimate | None = None
     ) -> None:
         self.model, self.trajectory, self._error = model, run, error
-        self.meshes: Mapping[str, bytes] = {}
-        self.checkpoint: Checkpoint | None = None
+        self.meshes = {}
+        self.checkpoint = None
         self.t, self.q, self.u, self.event = run.t, run.q, run.u, run.event
         self.status = run.status
-        self.statistics: Statistics | None = run.statistics
-        self.settings: Settings = run.settings
+        self.statistics, self.settings = run.statistics, run.settings
         self._observed = Observed(model, run)
         self._quantities = Quantities(self._observed, self)
 

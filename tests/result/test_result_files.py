@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from scipy.io import loadmat
+from scipy.io import loadmat, savemat
 from support.result_scenes import motor, pins, tree
 
 import mstmm
@@ -125,8 +125,9 @@ def test_columns_come_back_from_tables(run: Result, tmp_path: Path, ending: str)
     second = mstmm.load_result(again.save(tmp_path / "again.csv"))
     assert second.names() == again.names()
     assert "elbow.angle1" in again.table(rows=3)
-    with pytest.raises(mstmm.SceneError, match=r'"certificate" needs the scene of the run'):
-        again.certificate  # noqa: B018
+    for gone in ("certificate", "q", "u", "model", "success", "statistics", "trajectory"):
+        with pytest.raises(mstmm.SceneError, match=rf'"{gone}" needs the scene of the run'):
+            getattr(again, gone)
     for name in (
         "arm.tip.orientation",
         "arm.tip.velocity",
@@ -139,6 +140,30 @@ def test_columns_come_back_from_tables(run: Result, tmp_path: Path, ending: str)
     with pytest.raises(mstmm.SceneError, match=r'did you mean "elbow\.angle1"'):
         again.quantity("elbow.angel1")
     assert not hasattr(again, "model") and not hasattr(again, "nothing")
+
+
+def test_matrices_of_others_are_refused(tmp_path: Path) -> None:
+    path, zeros = tmp_path / "a.mat", np.zeros((3, 1))
+    names = np.array([["x", "x", "m"]], dtype=object)
+    for x, message in (
+        (np.array([["abc"], ["abc"], ["abc"]]), "not all of real numbers"),
+        (1j * np.ones((3, 1)), "not all of real numbers"),
+        (np.zeros((2, 1)), "not equally long"),
+    ):
+        savemat(path, {"t": zeros, "event": zeros, "names": names, "x": x})
+        with pytest.raises(mstmm.SceneError, match=rf"a\.mat.*{message}"):
+            mstmm.load_result(path)
+
+
+def test_tables_of_few_columns_are_shown_and_written(tmp_path: Path) -> None:
+    path = tmp_path / "few.csv"
+    path.write_text("time [s],event,x [m]\n0,0,1\n1,0,2\n")
+    few = mstmm.load_result(path)
+    assert few.table().splitlines()[-1].split() == ["1", "2"]
+    path.write_text("time [s],event\n0,0\n1,0\n")
+    none = mstmm.load_result(path)
+    assert none.table().splitlines()[-1].split() == ["1"]
+    assert mstmm.load_result(none.save(tmp_path / "none.mat")).names() == ()
 
 
 def test_matlab_finds_names_units_and_the_scene(run: Result, tmp_path: Path) -> None:
@@ -162,6 +187,10 @@ def test_matlab_finds_names_units_and_the_scene(run: Result, tmp_path: Path) -> 
         ("a,b\n1,2\n", "first columns"),
         ("time [s],event,x\n0,0\n", "line 2 has 2 entries, expected 3"),
         ("time [s],event,x\n0,0,1\n1,0,one\n", "line 3.*'one'"),
+        ("time [s],event,x\n0,0,1\nnan,0,1\n", "its times are not finite numbers, none before"),
+        ("time [s],event,x\n0,0,1\n2,0,1\n1,0,1\n", "its times are not .* none before another"),
+        ("time [s],event,x\n0,nan,1\n", "its events are not whole numbers"),
+        ("time [s],event,x\n0,1e300,1\n", "its events are not whole numbers"),
     ],
 )
 def test_tables_of_others_are_refused(tmp_path: Path, text: str, message: str) -> None:

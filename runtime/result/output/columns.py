@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.arrays import Array, Integers
 from mstmm.errors import SceneError
 from mstmm.scene.rules.messages import near
 
@@ -25,6 +25,8 @@ from .tabled import TABLES, write
 #: "shoulder.angle [rad]", "rod.qw".
 _HEADING = re.compile(r"(.*?)(?: \[(.*)\])?")
 
+#: No scene has so many events.
+_EVENTS = 2**53
 #: Columns whose time derivative is another one, by the ends of their names.
 _RATES = {"x": "vx", "y": "vy", "z": "vz", "vx": "ax", "vy": "ay", "vz": "az"}
 
@@ -46,9 +48,9 @@ class Columns:
     """
 
     def __init__(
-        self, path: Path, t: Array, event: Array, columns: Mapping[str, tuple[str, Array]]
+        self, path: Path, t: Array, event: Integers, columns: Mapping[str, tuple[str, Array]]
     ) -> None:
-        self.path, self.t, self.event = path, t, event.astype(np.int64)
+        self.path, self.t, self.event = path, t, event
         self._columns = dict(columns)
         #: What a `Result` has besides.
         self.lost: frozenset[str] = frozenset()
@@ -95,7 +97,7 @@ class Columns:
         """As `Result.table`."""
         from .table import table
 
-        return table(self, names, rows)
+        return table(self, names, rows, sorted({"energy"} & self._columns.keys()))
 
     def plot(self, *names: str, **options: Any) -> Any:
         """As `Result.plot`."""
@@ -153,7 +155,7 @@ def read_csv(path: Path) -> Columns:
             raise _refused(path, f"line {k + 2}: {error}; expected numbers") from None
     known = [_heading(text) for text in header]
     found = {name: (unit, numbers[:, k]) for k, (name, unit) in enumerate(known) if k > 1}
-    return Columns(path, numbers[:, 0], numbers[:, 1], found)
+    return _read(path, numbers[:, 0], numbers[:, 1], found)
 
 
 def _heading(text: str) -> tuple[str, str]:
@@ -173,9 +175,21 @@ def read_mat(path: Path) -> Columns:
         found = {name: (unit, np.ravel(data[key])) for key, name, unit in names}
     except Exception as error:  # whatever SciPy makes of files that are none
         raise _refused(path, f"not a result of mstmm ({type(error).__name__}: {error})") from None
-    if any(len(values) != len(t) for _, values in found.values()) or len(event) != len(t):
+    return _read(path, t, event, found)
+
+
+def _read(path: Path, t: Array, event: Array, found: Mapping[str, tuple[str, Array]]) -> Columns:
+    """What a file holds, where it can be that of a run."""
+    columns = [t, event, *(values for _, values in found.values())]
+    if any(len(one) != len(t) for one in columns):
         raise _refused(path, "its columns are not equally long")
-    return Columns(path, t, event, found)
+    if any(one.dtype.kind not in "buif" for one in columns):
+        raise _refused(path, "its columns are not all of real numbers")
+    if not np.isfinite(t).all() or (np.diff(t) < 0).any():
+        raise _refused(path, "its times are not finite numbers, none before another")
+    if not (np.isfinite(event) & (np.abs(event) < _EVENTS) & (event == np.round(event))).all():
+        raise _refused(path, "its events are not whole numbers")
+    return Columns(path, t, event.astype(np.int64), found)
 
 
 def _refused(path: Path, why: str) -> SceneError:

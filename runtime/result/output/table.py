@@ -34,9 +34,12 @@ def flat(quantities: Sequence[Quantity]) -> list[tuple[str, str, np.ndarray]]:
     return columns
 
 
-def table(result: Shown, names: Sequence[str], rows: int) -> str:
-    """Aligned columns with a line of units; `rows` samples spread evenly over time."""
-    chosen = list(names) or [*default_names(result), "energy"]
+def table(
+    result: Shown, names: Sequence[str], rows: int, beside: Sequence[str] = ("energy",)
+) -> str:
+    """Aligned columns with a line of units; `rows` samples spread evenly over time.  Where nobody
+    chose names, some are chosen, and `beside` stands beside them."""
+    chosen = list(names) or [*default_names(result), *beside]
     columns = [("t", "s", result.t), *flat([result.quantity(name) for name in chosen])]
     picked = _spread(result.t, rows)
     texts = [

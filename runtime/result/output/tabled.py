@@ -62,8 +62,7 @@ def _mat(t: Array, event: Integers, quantities: Sequence[Quantity], path: Path, 
 
     keys = matlab_names([one.name for one in quantities])
     rows = [(key, one.name, one.unit) for key, one in zip(keys, quantities, strict=True)]
-    names = np.empty((len(rows), 3), dtype=object)
-    names[:] = rows
+    names = np.array(rows, dtype=object).reshape(-1, 3)
     data: dict[str, Any] = {
         key: one.values[:, None] for key, one in zip(keys, quantities, strict=True)
     }
