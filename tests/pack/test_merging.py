@@ -153,6 +153,9 @@ def test_words_that_are_none_are_refused() -> None:
     with pytest.raises(mstmm.SceneError, match="simplify: 'weld' is not known; expected True"):
         mstmm.compile(arm(), simplify=["weld"])
     assert len(mstmm.compile(arm(), simplify=["welds"]).simplifications) == 2
+    for wrong in (None, 1, [["welds"]]):
+        with pytest.raises(mstmm.SceneError, match=r"simplify: .* is not known; expected True"):
+            mstmm.compile(arm(), simplify=wrong)  # type: ignore[arg-type]
 
 
 def test_where_loops_are_closed_nothing_is_merged_but_couplings_couple_parts() -> None:

@@ -132,6 +132,15 @@ def test_runs_over_each_other_and_axes_of_others(run: Result, tmp_path: Path) ->
         run.plot("energy", beside={"a": loose}, label="a")
 
 
+def test_names_and_runs_that_are_none(run: Result) -> None:
+    for names, against in ((["elbow.angle1", "energy"], None), (5, None), ("energy", 3)):
+        with pytest.raises(mstmm.SceneError, match=r"expected the name of a quantity, .*found"):
+            run.plot(names, against=against)  # type: ignore[arg-type]
+    for beside in (run, "run.nc", {"other": "run.nc"}):
+        with pytest.raises(mstmm.SceneError, match=r"beside: expected results by their labels"):
+            run.plot("energy", beside=beside)  # type: ignore[arg-type]
+
+
 def test_what_one_of_several_runs_lacks_is_said(run: Result) -> None:
     other = mstmm.compile(motor("1")).simulate(1.0)
     panel = run.plot("elbow.angle1", "motor.angle", beside={"other": other}).axes[0]

@@ -130,6 +130,19 @@ def test_what_urdf_cannot_say_is_refused(tables: dict[str, Any], message: str) -
         mstmm.export_robot(mstmm.Scene(**{"gravity": [0, 0, -9.81], "body": [BAR]} | tables))
 
 
+def test_arguments_that_are_none(tmp_path: Path) -> None:
+    scene = mstmm.Scene(gravity=[0, 0, -9.81], body=[BAR], hinge=[PIN])
+    for wrong in ("arm.toml", None):
+        with pytest.raises(mstmm.SceneError, match=r"expected a scene, found .*see load_scene"):
+            mstmm.export_robot(wrong)  # type: ignore[arg-type]
+    for name in ("a\x01b", 5):
+        with pytest.raises(mstmm.SceneError, match="expected a name of letters and signs, found"):
+            mstmm.export_robot(scene, name)  # type: ignore[arg-type]
+    path = tmp_path / "odd.urdf"
+    path.write_text(mstmm.export_robot(scene, 'Ü "<&').text, "utf-8")
+    assert mstmm.import_robot(path).scene.body[0].mass == BAR["mass"]
+
+
 def test_three_angles_give_the_rotation_again(rng: np.random.Generator) -> None:
     quarter = np.pi / 2
     near = [[a, quarter + 10.0**-k, b] for a in (0.3, -2.0) for b in (1.0, 3.0) for k in range(17)]

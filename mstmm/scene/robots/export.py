@@ -11,12 +11,12 @@ from ...errors import SceneError
 from ...numbers.pose import IN_PLACE, Pose
 from ...numbers.rotations import perpendicular, product, transpose
 from ..rules.values import GROUND
+from ..scene import Scene
 from .robot import FIXED, Joint, Link, Look, Mimic, Note, Robot
 from .urdf import BY_HINGE
 from .urdf_text import as_urdf
 
 if TYPE_CHECKING:
-    from ..scene import Scene
     from ..tables.body import Body
     from ..tables.closures import Coupling
     from ..tables.hinge import Hinge
@@ -54,9 +54,15 @@ def export_robot(scene: Scene, name: str = "robot") -> Exported:
     fixed joint; damping, Coulomb's friction, stops (without their stiffness), couplings of two
     joints and shapes go along.  What else acts in the scene is left out, with a note.
 
+    `name` is that of the robot in its file.
+
     Raises SceneError for closed loops, flexible bodies, bodies of users' types and hinges that URDF
     does not have.
     """
+    if not isinstance(scene, Scene):
+        raise SceneError(f"export_robot: expected a scene, found {scene!r:.60}; see load_scene")
+    if not isinstance(name, str) or not name.isprintable():
+        raise SceneError(f"export_robot: expected a name of letters and signs, found {name!r:.60}")
     found = _Reader(scene).robot(name)
     return Exported(as_urdf(found), found.notes, len(found.links), len(found.joints))
 

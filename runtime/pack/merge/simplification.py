@@ -51,11 +51,13 @@ def asked_for(simplify: bool | Collection[str] | Words) -> Words:
     """The words that an option means; SceneError for others."""
     if isinstance(simplify, bool):
         return USUAL if simplify else NOTHING
-    words = [simplify] if isinstance(simplify, str) else list(simplify)
+    if isinstance(simplify, str) or not isinstance(simplify, Collection):
+        simplify = [simplify]
+    words = list(simplify)
     for word in words:
-        if word not in _ALONE:
+        if not isinstance(word, str) or word not in _ALONE:
             raise SceneError(
-                f"simplify: {word!r} is not known; expected True, False, or some of: "
+                f"simplify: {word!r:.60} is not known; expected True, False, or some of: "
                 + ", ".join(_ALONE)
             )
     if not isinstance(simplify, Mapping):

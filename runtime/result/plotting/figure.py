@@ -127,7 +127,13 @@ def plot_of(
 ) -> Any:  # fmt: skip
     """One run, and others beside it; see `Result.plot`."""
     runs: dict[str, Shown] = {label: run}
-    for other, one in (beside or {}).items():
+    others = {} if beside is None else beside
+    if not isinstance(others, Mapping) or not all(hasattr(x, "quantity") for x in others.values()):
+        raise SceneError(
+            f'beside: expected results by their labels, such as {{"before": other}}, found '
+            f"{beside!r:.60}"
+        )
+    for other, one in others.items():
         if other in runs:
             raise SceneError(f'beside: "{other}" is the label of another run; give each its own')
         runs[other] = one

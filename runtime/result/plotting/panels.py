@@ -68,6 +68,12 @@ class Wanted:
     kind: str = "time"
 
     def __post_init__(self) -> None:
+        for name in (*self.names, *(() if self.against is None else (self.against,))):
+            if not isinstance(name, str):
+                raise SceneError(
+                    f'plot: expected the name of a quantity, such as "energy", found {name!r:.60}; '
+                    "of several names each is an argument of its own"
+                )
         if self.kind not in KINDS:
             raise SceneError(f"kind = {self.kind!r}: expected one of {', '.join(KINDS)}")
         if self.against is not None and self.kind != "time":
