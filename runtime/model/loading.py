@@ -18,6 +18,7 @@ from ..host.files import refuse_special, seal_is_broken
 from ..kernels import store
 from ..kernels.identity import kernels_hash
 from ..result import meshes
+from ..result.batch import BATCH
 from ..result.output import provenance
 from ..result.output.columns import READERS, Columns
 from ..result.record import Record
@@ -61,6 +62,11 @@ def load_netcdf(path: Path) -> Result:
             "again, or write what you changed to another file"
         )
     data = _read(xarray, path)
+    if data.attrs.get("format") == BATCH:
+        raise SceneError(
+            f'result file "{path}": this is a batch of runs; open it as a Dataset: '
+            'xarray.open_dataset(path, engine="h5netcdf")'
+        )
     if data.attrs.get("format") != "mstmm result" or "scene" not in data:
         raise SceneError(f'result file "{path}": not a result of mstmm')
     try:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.arrays import Array, whole
 from mstmm.errors import SceneError
 from mstmm.extras import missing
 
@@ -28,6 +28,8 @@ from .record import Record
 if TYPE_CHECKING:
     from .certificate import Certificate
 
+#: What their files say that they hold.
+BATCH = "mstmm batch"
 #: What batches do not integrate.
 _NOT_THERE = ("work",)
 #: Runs up to which each is a line; and the edges of the band that stands for more.
@@ -58,9 +60,12 @@ class Batch(BatchResult):
 
         Raises SceneError for a number that is none, and for models with one-way bodies.
         """
-        if not -len(self.q) <= k < len(self.q):
-            raise SceneError(f"run {k}: there are {len(self.q)} runs, from 0 on")
-        k %= len(self.q)
+        count = len(self.q)
+        expected = f"the number of one of {count} runs, from 0 on"
+        k = whole("run", k, -count, expected)
+        if k >= count:
+            raise SceneError(f"run = {k}: expected {expected}")
+        k %= count
         model, there = self.models.of(k), self._reached(k)
         expanded = model.packed.expanded
         rigid = None if expanded is None else expanded.rigidified
@@ -117,7 +122,7 @@ class Batch(BatchResult):
             "message": (("run",), np.array(self.messages, dtype=object), {"long_name": "its end"}),
             "scene": ((), first.model.scene.to_toml(), {"long_name": "scene as TOML"}),
         }
-        about = {"format": "mstmm batch", "engine": self.engine, "method": self.settings.method,
+        about = {"format": BATCH, "engine": self.engine, "method": self.settings.method,
                  "tolerances": json.dumps([self.settings.rtol, self.settings.atol])}  # fmt: skip
         return xarray.Dataset(fixed | made | told, labels, about)
 
@@ -141,18 +146,21 @@ class Batch(BatchResult):
         """
         from .plotting.figure import compose, drawn
 
+        wanted, there = Wanted(names), [k for k in range(len(self.q)) if self._reached(k).any()]
+        _refuse_absent(names)
+        if not there:
+            raise SceneError("there is nothing to plot: no run has a state; see messages")
         if band if band is not None else len(self.q) > _LINES:
-            made = compose(self._bands(Wanted(names)), title, ax)
+            made = compose(self._bands(wanted, there), title, ax)
         else:
-            runs = {f"run {k}": self.run(k) for k in range(len(self.q)) if self._reached(k).any()}
-            made = drawn(runs, Wanted(names), title, ax)
+            made = drawn({f"run {k}": self.run(k) for k in there}, wanted, title, ax)
         if path is not None:
             made.write(Path(path))
         return made.figure
 
-    def _bands(self, wanted: Wanted) -> list[Panel]:
-        first = self.run(int(np.argmax(self.success)))
-        found = panels({"run": first}, wanted)
+    def _bands(self, wanted: Wanted, there: Sequence[int]) -> list[Panel]:
+        longest = max(there, key=lambda k: self._reached(k).sum())
+        found = panels({"run": self.run(longest)}, wanted)
         quantities = iter(self._quantities([name for panel in found for name in panel.names]))
         told = f"median and {_BAND[0]:g} to {_BAND[1]:g} % of {len(self.q)} runs"
         return [
@@ -169,9 +177,9 @@ class Batch(BatchResult):
 
     def _quantities(self, names: Sequence[str]) -> list[Quantity]:
         """Of all runs, run by run, so that no more than one is kept beside the values."""
-        refused = [name for name in names if name in _NOT_THERE]
-        if refused:
-            raise SceneError(f'"{refused[0]}": batches do not integrate it; simulate one alone')
+        _refuse_absent(names)
+        if not len(self.q):
+            raise SceneError("a batch of no runs has no quantities")
         abouts: list[Quantity] = []
         values: list[Array] = []
         for k in range(len(self.q)):
@@ -187,6 +195,12 @@ class Batch(BatchResult):
             replace(about, values=array, rates=None)
             for about, array in zip(abouts, values, strict=True)
         ]
+
+
+def _refuse_absent(names: Sequence[str]) -> None:
+    for name in names:
+        if name in _NOT_THERE:
+            raise SceneError(f'"{name}": batches do not integrate it; simulate one alone')
 
 
 def _bands(t: Array, quantities: Sequence[Quantity]) -> Iterator[Trace]:

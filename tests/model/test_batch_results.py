@@ -58,7 +58,10 @@ def test_each_run_has_the_quantities_of_a_single_one(model: Model, batch: Batch)
         batch.quantity("work")
     with pytest.raises(mstmm.SceneError, match='did you mean "energy"'):
         batch.quantity("enegry")
-    with pytest.raises(mstmm.SceneError, match="there are 3 runs"):
+    for wrong in (-4, "0", 0.0, None):
+        with pytest.raises(mstmm.SceneError, match="expected the number of one of 3 runs"):
+            batch.run(wrong)  # type: ignore[arg-type]
+    with pytest.raises(mstmm.SceneError, match="run = 3: expected the number of one of 3 runs"):
         batch.run(3)
     with pytest.raises(mstmm.SceneError, match="no certificate"):
         batch.run(1).certificate  # noqa: B018
@@ -75,6 +78,8 @@ def test_as_a_dataset_and_in_a_file(batch: Batch, tmp_path: Path) -> None:
     with xarray.open_dataset(batch.save(tmp_path / "many.nc"), engine="h5netcdf") as file:
         np.testing.assert_array_equal(file["energy"], batch.quantity("energy").values)
         assert file.attrs["format"] == "mstmm batch"
+    with pytest.raises(mstmm.SceneError, match="this is a batch of runs; open it as a Dataset"):
+        mstmm.load_result(tmp_path / "many.nc")
     with pytest.raises(mstmm.SceneError, match=r"ends in \.nc"):
         batch.save(tmp_path / "many.csv")
 
@@ -102,3 +107,33 @@ def test_what_a_run_did_not_reach_is_nan() -> None:
     speeds = batch.quantity("a.tip.velocity").values
     assert np.isfinite(speeds[0]).all() and np.isfinite(speeds[1, 0]).all()
     assert np.isnan(speeds[1, -1]).all()
+
+
+def test_batches_without_states_say_so() -> None:
+    hinges = [
+        {"name": name, "type": "pin", "inboard": on, "outboard": name, "axis": (0, 0, 1),
+         "initial": {"q": [0.5]}}
+        for name, on in (("a", "ground"), ("b", "a.tip"))
+    ]  # fmt: skip
+    wire = {"name": "wire", "type": "distance", "from": "ground", "to": "b.tip", "length": 1.8}
+    scene = mstmm.Scene(
+        gravity=(0, 0, 0), body=[rod("a"), rod("b")], hinge=hinges, constraint=[wire]
+    )
+    model = mstmm.compile(scene, engine="looped")
+    lost = model.simulate_batch(
+        model.initial_state(), parameters={"wire.length": [9.0, 9.5]}, **RUN
+    )
+    assert not lost.success.any() and lost.messages[0]
+    none = model.simulate_batch((np.zeros((0, 2)), np.zeros((0, 2))), **RUN)
+    for batch in (lost, none):
+        for band in (False, True):
+            with pytest.raises(mstmm.SceneError, match="nothing to plot: no run has a state"):
+                batch.plot("a.angle", band=band)
+    with pytest.raises(mstmm.SceneError, match="a batch of no runs has no quantities"):
+        none.quantity("a.angle")
+
+
+@pytest.mark.parametrize("band", [False, True])
+def test_what_batches_do_not_integrate_is_refused(batch: Batch, band: bool) -> None:
+    with pytest.raises(mstmm.SceneError, match='"work": batches do not integrate it'):
+        batch.plot("work", band=band)
