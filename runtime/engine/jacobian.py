@@ -72,10 +72,12 @@ class Jacobian:
             directions = {PREFIX + "q": unit[:nq], PREFIX + "u": unit[nq:]}
             _, outputs = tape.run({**given, **directions})
             given = {}  # the state stays
-            found[:, j] = np.concatenate(
+            column = np.concatenate(
                 [outputs[PREFIX + name][:length]
-                 for name, length in zip(self._outputs, (nq, nu, 1), strict=False)]
+                 for name, length in zip(self._outputs, (nq, nu, 1), strict=False)
+                 if PREFIX + name in outputs]
             )  # fmt: skip
+            found[: len(column), j] = column
         return found
 
     def _differenced(self, t: float, y: Array) -> Array:
@@ -100,8 +102,11 @@ def _tape(
         kernels = model.fusion.fused(structure).kernels
     except (ElementError, EnvironmentFailure):
         return None, _nothing
-    kernel = kernels["accelerations_power" if "power" in outputs else "accelerations"]
-    tape = TapeKernel(tangent(kernel, ["q", "u"], outputs, values=False, guards=False))
+    kernel = kernels["accelerations"]
+    if "power" in outputs:  # of a scene without that kernel it is zero: only blows do work in it
+        kernel = kernels.get("accelerations_power", kernel)
+    there = [port.name for port in kernel.outputs if port.name in outputs]
+    tape = TapeKernel(tangent(kernel, ["q", "u"], there, values=False, guards=False))
     live = LiveInputs(packed.system, structure.inputs)
     return tape, lambda t: live.at(numbers, np.array([t])).ravel()
 

@@ -44,6 +44,18 @@ def test_a_ball_loses_its_height_by_squares(when: str, method: str) -> None:
     assert np.abs(heights / 0.64 ** np.arange(1, 21) - 1).max() < 1e-9
 
 
+@pytest.mark.parametrize("method", ["dop853", "rodas4p2", "scipy-Radau", "scipy-DOP853"])
+@pytest.mark.parametrize("engine", ["looped", "fused"])
+def test_blows_alone_do_work(engine: str, method: str) -> None:
+    """Where no law and no load does, so that the scene's code has nothing to say of power: the
+    first blow takes 1 - e^2 of m g h."""
+    run = mstmm.compile(mstmm.Scene(**ball()), engine=engine).simulate(0.7, method)
+    assert run.success, run.message
+    lost = (1 - 0.8**2) * 2.0 * G
+    assert run.quantity("work").values[-1] == pytest.approx(-lost, rel=1e-6)
+    assert run.energy()[0] - run.energy()[-1] == pytest.approx(lost, rel=1e-6)
+
+
 def test_a_wall_that_comes_to_meet() -> None:
     """A floor that rises by 0.5 m/s throws the ball up by e times the speed that they meet with."""
     result = model(ball(when="ball.y <= 0.5*t", restitution=1.0)).simulate(0.6, rtol=1e-10)

@@ -75,6 +75,10 @@ static int accelerations_and_power(void *context, double t, const double *y, dou
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused;
     real power = 0, potential;
+    if (!fused->accelerations_power) { /* nothing but blows does work */
+        dy[fused->nq + fused->nu] = 0;
+        return accelerations(context, t, y, dy);
+    }
     mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
     const int code = fused->accelerations_power(run->fused_p, &t, y, y + fused->nq, run->memory,
                                                 run->fused_numbers, dy, dy + fused->nq, &power,
