@@ -19,7 +19,8 @@ from ..language.element import Body, ForceElement, Hinge
 
 Element = Hinge | Body | ForceElement
 KINDS: tuple[tuple[str, type], ...] = (("hinge", Hinge), ("body", Body), ("force", ForceElement))
-_BASES = (Hinge, Body, ForceElement)
+#: What an element is one of.
+BASES = (Hinge, Body, ForceElement)
 
 
 def kind_of(element: Element) -> str:
@@ -36,7 +37,7 @@ def elements_in(module: ModuleType) -> list[Element]:
         value
         for value in vars(module).values()
         if isinstance(value, type)
-        and issubclass(value, _BASES)
+        and issubclass(value, BASES)
         and value.__module__ == module.__name__
         and "name" in vars(value)
     ]
@@ -45,7 +46,7 @@ def elements_in(module: ModuleType) -> list[Element]:
 
 def instance(element: type[Element]) -> Element:
     """An element of its class.  ElementError if the class is none, or cannot be made."""
-    if not (isinstance(element, type) and issubclass(element, _BASES)):
+    if not (isinstance(element, type) and issubclass(element, BASES)):
         raise ElementError(
             f"{element!r:.80} is no element; expected a subclass of mstmm.derive.Hinge, Body or "
             "ForceElement"

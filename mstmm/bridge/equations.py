@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import sympy as sp
 
+from ..derive.catalogue.registry import BASES
 from ..derive.show.document import (
     Code,
     Formula,
@@ -28,6 +29,7 @@ from ..derive.show.subjects import of_element, view
 from ..errors import ElementError, SceneError
 from ..scene import Scene
 from ..scene.checks.types import types
+from ..scene.load import is_scene_file
 from .closed import ClosedEquations, Motion, closed
 from .drawing import path, tree
 
@@ -92,7 +94,7 @@ def equations(
     Raises ElementError for a name that is none, SceneError for what is wrong with a scene, and for
     names in `keep` that it does not have.
     """
-    if isinstance(of, str) and not of.endswith(".toml"):
+    if isinstance(of, str) and not is_scene_file(of):
         return _of_element(of, keep)
     if isinstance(of, str | os.PathLike | Scene):
         from .compilation import compile_scene
@@ -102,13 +104,19 @@ def equations(
 
     if isinstance(of, Model):
         return _of_model(of, keep)
-    return _of_element(of, keep)
+    made = of() if isinstance(of, type) and issubclass(of, BASES) else of
+    if not isinstance(made, BASES):
+        raise ElementError(
+            f"equations: expected the name of an element, an element, a scene, its file or its "
+            f"model, found {of!r:.60}"
+        )
+    return _of_element(made, keep)
 
 
 def _of_element(of: str | Element, keep: Sequence[str]) -> Equations:
     if keep:
         raise ElementError("keep names numbers of a scene; those of elements are symbols already")
-    shown = view(of) if isinstance(of, str) else of_element(of() if isinstance(of, type) else of)
+    shown = view(of) if isinstance(of, str) else of_element(of)
     return Equations(shown.title, lambda measure: document(shown, "equations", measure))
 
 

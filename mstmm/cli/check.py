@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from mstmm.scene import Scene
     from mstmm.scene.checks.topology import Topology
 
-SCENE_ENDINGS = (".toml", ".json")
-
 Report = dict[str, Any]
 
 
@@ -72,10 +70,10 @@ def check(
 
 
 def _checker(what: str) -> Callable[[str], Report]:
-    from mstmm.scene.robots.files import is_robot
+    from mstmm.scene.load import is_scene_file
 
     ending = os.path.splitext(what)[1].lower()
-    if ending in SCENE_ENDINGS or is_robot(what):
+    if is_scene_file(what):
         return _scene
     if ending == ".py":
         return _file

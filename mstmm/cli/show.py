@@ -35,7 +35,7 @@ def show(
         typer.Argument(
             metavar="ELEMENT",
             help="Name of an element (mstmm list), the Python file that defines your own, a scene "
-            "(.toml), or sweep: the schedule of the sweep.",
+            "(.toml, .json, or a robot), or sweep: the schedule of the sweep.",
         ),
     ],
     at: Annotated[
@@ -67,12 +67,14 @@ def show(
     json: Json = False,
 ) -> None:  # fmt: skip
     """Show an element's equations, matrix, intermediate form or C, with units and sources."""
+    from mstmm.scene.load import is_scene_file
+
     from .output import emit_json, note, put
 
     target = None if output is None else output_file(output, ())
     if beside:
         pages = {element: _beside(element, format)}
-    elif element.endswith(".toml"):
+    elif is_scene_file(element):
         pages = {element: _scene(element, at, format, keep or [])}
     elif keep:
         raise ElementError("--keep names numbers of a scene: mstmm show SCENE.toml --keep NAME")

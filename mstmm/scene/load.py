@@ -7,10 +7,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ..ir.spec import ElementSpec
-from .files.read import read
+from .files.read import MAX_SIZE, read
 from .robots.files import import_robot, is_robot
 from .scene import Scene
 from .tables.elastic_keys import FOLDER
+
+
+def is_scene_file(name: str) -> bool:
+    """Whether a name ends as that of a file that `load_scene` reads."""
+    return os.path.splitext(name)[1].lower() in MAX_SIZE or is_robot(name)
 
 
 def load_scene(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
+import tomllib
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -142,12 +144,23 @@ def test_loops_and_large_scenes_say_why_there_are_no_closed_equations() -> None:
 @pytest.mark.parametrize(
     ("of", "keep", "said"),
     [("pni", [], "did you mean"), ("pin", ["rod1.mass"], "keep names numbers of a scene"),
-     (rods({}), ["rod1.mas"], "there is no such number"), (rods({}), "rod1.mass", "a list of")],
-    ids=["name", "element", "number", "text"],
+     (rods({}), ["rod1.mas"], "there is no such number"), (rods({}), "rod1.mass", "a list of"),
+     (None, [], "expected the name of an element"), (object, [], "expected the name of"),
+     ("none.json", [], "there is no such file"), ("none.urdf", [], "there is no such file")],
+    ids=["name", "element", "number", "text", "nothing", "class", "scene", "robot"],
 )  # fmt: skip
 def test_refused(of: Any, keep: Any, said: str) -> None:
     with pytest.raises((ElementError, SceneError), match=said):
         mstmm.equations(of, keep)
+
+
+def test_every_file_of_a_scene_is_one(tmp_path: Path) -> None:
+    scene = rods({}, {})
+    told = mstmm.equations(scene).text
+    (tmp_path / "two.json").write_text(json.dumps(tomllib.loads(scene.to_toml())))
+    assert mstmm.equations(str(tmp_path / "two.json")).text == told
+    (tmp_path / "two.urdf").write_text(mstmm.export_robot(scene).text)
+    assert mstmm.equations(str(tmp_path / "two.urdf")).closed is not None
 
 
 @pytest.mark.parametrize("of", ["pin", rods({}, {"type": "ball"})], ids=["element", "scene"])
