@@ -57,7 +57,7 @@ def _refuse_loads(packed: Packed) -> None:
     for table, elements, why in (
         ("load", scene.load, _LOADS), ("spring", scene.spring, _LOADS),
         ("bushing", scene.bushing, _LOADS),
-        ("event", scene.event, "its steps neither find events nor act on them"),
+        ("event", scene.events, "its steps neither find events nor act on them"),
     ):  # fmt: skip
         for element in elements:
             raise refused(f'{table} "{element.name}"', why)

@@ -146,7 +146,7 @@ def _flat(engine: Naming, element: int, at: str, code: int) -> str:
 
 def _bounce(engine: Naming, element: int, at: str, code: int) -> str:
     return (
-        f'event "{engine.packed.described.event[element].name}" {at}: nothing can give way to its '
+        f"{engine.packed.described.happening(element)} {at}: nothing can give way to its "
         "strike, because what it strikes is driven or held; let another place bounce, or release "
         "the hinge"
     )

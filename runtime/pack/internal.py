@@ -94,7 +94,7 @@ def system_of(
     )  # fmt: skip
     ports = [Port(MOVING, (1 + max(moving),))] if moving else []
     driven, values = list(_driven(nodes, tree)), Values(layout, ports)
-    remembered = len(releases) + sum(event.do == "bounce" for event in scene.event)
+    remembered = len(releases) + sum(event.do == "bounce" for event in scene.events)
     laws = tuple(laws_of(nodes, tree, layout, values, remembered))
     loads = tuple(_load(frames, load, values) for load in nodes.load)
     held = _held(scene, laws[-1].next_twist if laws else remembered)

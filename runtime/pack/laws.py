@@ -99,7 +99,7 @@ def _coordinates(hinge: Hinge, slots: HingeSlots, member: int) -> list[Draft]:
     made = []
     for k in range(slots.nu):
         entry = hinge.law.entry(k)
-        full = entry.friction.acts or entry.limits.acts
+        full = entry.friction.acts or entry.limits.yields
         if not (_acts(entry) or full):
             continue
         p = (entry.stiffness, entry.rest, entry.damping, *(_full(entry) if full else ()))
@@ -112,8 +112,8 @@ def _full(entry: LawEntry) -> Numbers:
     return (
         friction.coulomb, friction.static, friction.stribeck_velocity,
         friction.regularisation_velocity,
-        -_FAR if limits.lower is None else limits.lower,
-        _FAR if limits.upper is None else limits.upper,
+        -_FAR if limits.lower is None or not limits.yields else limits.lower,
+        _FAR if limits.upper is None or not limits.yields else limits.upper,
         limits.stiffness, limits.damping,
     )  # fmt: skip
 

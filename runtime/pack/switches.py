@@ -50,11 +50,11 @@ class Watched:
 
 
 def watched(scene: Scene, layout: Layout, held: Collection[str] = ()) -> Watched:
-    """Events in the order of the file, then releases, then switches; `held` are inputs that are set
-    during the run."""
+    """Events in the order of the file, hard stops, releases, then switches; `held` are inputs that
+    are set during the run."""
     graph, probes = Graph(), Probes()
     found = switches(scene, layout, graph, probes, held)
-    conditions: list[tuple[Expression, Hinge | None]] = [(e.when, None) for e in scene.event]
+    conditions: list[tuple[Expression, Hinge | None]] = [(e.when, None) for e in scene.events]
     conditions += [(h.release, h) for h in scene.hinge if h.release is not None]
     if not conditions and not found:
         return Watched(None, (), ())

@@ -72,7 +72,7 @@ def rest_of(system: SceneSystem, event: int) -> str:
         return ""
     return (
         ": its bounces follow ever faster, what bounces has come to rest there; what lies still "
-        "needs a stop that carries it (law.limits)"
+        "needs a stop that carries it (law.limits with a stiffness)"
     )
 
 

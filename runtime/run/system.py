@@ -24,7 +24,7 @@ from ..kernels.tape import c_tape
 from ..pack.layout import StateNames
 from ..pack.packed import resize
 from ..pack.qr import refuse_steps
-from ..pack.records.bounces import Bounce
+from ..pack.records.bounces import Bounce, refuse_beyond_stops
 from ..pack.switches import MOST
 from .controllers import Controllers
 
@@ -169,8 +169,10 @@ class SceneSystem:
         return bool(self.run.with_power)
 
     def begin(self, t: float, q: ArrayLike, u: ArrayLike) -> Array:
-        """`start` of a run: controllers that act at t have done so."""
+        """`start` of a run between hard stops: controllers that act at t have done so."""
         y = self.start(t, q, u)
+        packed = self.engine.packed
+        refuse_beyond_stops(packed.scene, packed.layout, packed.watched.bounces, y)
         lib = self.engine.lib
         if lib.mstmm_controllers_act(self.run, t, self.engine.pointer(y)) > 0:
             raise NumericalFailure(self.engine.failure_text(self.run.failure, t))
@@ -198,7 +200,7 @@ class SceneSystem:
 
 def _read_states(scene: Scene) -> bool:
     """Whether events or releases go by more than time."""
-    conditions = [one.when for one in scene.event]
+    conditions = [one.when for one in scene.events]
     conditions += [one.release for one in scene.hinge if one.release is not None]
     return any(name.text != "t" for one in conditions for name in one.names)
 
@@ -209,13 +211,13 @@ def _actions(engine: Engine) -> tuple[list[tuple[int, int]], list[str]]:
     actions: list[tuple[int, int]] = []
     names: list[str] = []
     bounces = len(packed.releases)
-    for event in packed.scene.event:
+    for number, event in enumerate(packed.scene.events):
         action = lib.MSTMM_FIRE_STOP if event.do == "stop" else lib.MSTMM_FIRE_RESTART
         place = packed.releases[str(event.hinge)] if event.do == "release" else -1
         if event.do == "bounce":
             place, bounces = bounces, bounces + 1
         actions.append((action, place))
-        names.append(f'event "{event.name}"')
+        names.append(packed.scene.happening(number))
     for hinge in packed.scene.hinge:
         if hinge.release is not None:
             actions.append((lib.MSTMM_FIRE_RESTART, packed.releases[hinge.name]))

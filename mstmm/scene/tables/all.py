@@ -21,7 +21,7 @@ from .closures import Constraint, Coupling
 from .constants import constants as named_numbers
 from .elastic import Elastic
 from .hinge import Hinge
-from .loads import Event, Load, Spring
+from .loads import Event, Load, Spring, stops_of
 from .members import Bodies, Hinges
 from .outside.controller import Controller
 from .outside.inputs import Input, Output, Signal
@@ -79,6 +79,16 @@ class SceneTables(Table):
             for one in self.input
         }  # fmt: skip
         return inputs | signals
+
+    @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """Everything that happens: `event`, then the hard stops of hinges."""
+        return (*self.event, *stops_of(self.hinges))
+
+    def happening(self, number: int) -> str:
+        """What a message calls number `number` of `events`."""
+        what = "event" if number < len(self.event) else "stop"
+        return f'{what} "{self.events[number].name}"'
 
     @property
     def forces(self) -> tuple[Spring | Bushing, ...]:

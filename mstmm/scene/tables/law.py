@@ -43,17 +43,24 @@ class Friction(Table):
 
 
 class Limits(Table):
-    """Stops of one coordinate: one-sided springs and dampers below `lower`, above `upper`."""
+    """Stops of one coordinate, below `lower` and above `upper`: one-sided springs and dampers, or
+    hard ones that throw it back by `restitution`, speed of parting over speed of meeting."""
 
     lower: Annotated[float | None, rules.number("m or rad")] = None
     upper: Annotated[float | None, rules.number("m or rad")] = None
     stiffness: Annotated[float, rules.number("N/m or N m/rad", minimum=0)] = 0.0
     damping: Annotated[float, rules.number("N s/m or N m s/rad", minimum=0)] = 0.0
+    restitution: Annotated[float | None, rules.number(above=0.0)] = None
 
     @property
     def acts(self) -> bool:
         """True when there is a stop."""
         return self.lower is not None or self.upper is not None
+
+    @property
+    def yields(self) -> bool:
+        """True when there is a stop that pushes back by a spring and a damper."""
+        return self.acts and self.restitution is None
 
     @model_validator(mode="after")
     def _check(self) -> Limits:
@@ -61,13 +68,30 @@ class Limits(Table):
             raise rules.refuse(
                 f"lower ({self.lower:g}) must be below upper ({self.upper:g}); swap them", "lower"
             )
-        if self.acts and self.stiffness == 0:
+        if not self.acts and (self.stiffness > 0 or self.damping > 0 or self.restitution):
+            raise rules.refuse("limits need lower, upper or both", "lower")
+        return self if self.restitution is None else self._hard(self.restitution)
+
+    @model_validator(mode="after")
+    def _pushes(self) -> Limits:
+        if self.yields and self.stiffness == 0:
             raise rules.refuse(
-                "a stop needs a stiffness above 0 (N/m or N m/rad); "
+                "a stop needs a stiffness above 0 (N/m or N m/rad) or a restitution; "
                 "write for example stiffness = 1e5", "stiffness",
             )  # fmt: skip
-        if not self.acts and (self.stiffness > 0 or self.damping > 0):
-            raise rules.refuse("limits need lower, upper or both", "lower")
+        return self
+
+    def _hard(self, restitution: float) -> Limits:
+        if restitution > 1:
+            raise rules.refuse(
+                f"expected at most 1, which loses nothing, found {rules.found(restitution)}",
+                "restitution",
+            )
+        if self.stiffness > 0 or self.damping > 0:
+            raise rules.refuse(
+                "a stop throws back by restitution or pushes back by stiffness; give one",
+                "restitution",
+            )
         return self
 
 

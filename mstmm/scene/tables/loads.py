@@ -1,17 +1,21 @@
-"""[[load]], [[event]] and [[spring]]: what acts on the bodies, and what happens to them."""
+"""[[load]], [[event]] and [[spring]]: what acts on the bodies, and what happens to them, hard stops
+of hinges among it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from ...expression.expression import Expression, number
+from ...expression.expression import Expression, number, parse
 from ...numbers.rotations import Vector
 from ..rules import text as texts
 from ..rules import values as rules
 from ..rules.values import GROUND, Table, found, refuse, split
+from .hinge import Hinge
 from .law import SpringLaw
+from .members import Hinges
 
 _ZERO = (number(0), number(0), number(0))
 
@@ -98,6 +102,39 @@ class Event(Table):
         if self.do != "release" and self.hinge is not None:
             raise refuse('only do = "release" takes a hinge; leave it out', "hinge")
         return self
+
+
+def stops_of(hinges: Hinges) -> tuple[Event, ...]:
+    """Events of all hard stops, `knee.upper` or `planar.lower[1]` by name, in the order of the
+    hinges."""
+    return tuple(
+        stop for number in _stopped(hinges) for stop in _of(hinges.name(number), hinges[number])
+    )
+
+
+def _stopped(hinges: Hinges) -> Iterator[int]:
+    """Numbers of hinges that have hard stops."""
+    for k, hinge in enumerate(hinges.tables):
+        if any(limits.restitution for limits in hinge.law.limits):
+            yield k
+    for chain, first in zip(hinges.chains, hinges.starts, strict=False):
+        for k, pattern in enumerate(chain.hinge):
+            if any(limits.restitution for limits in pattern.law.limits):
+                yield from range(first + k, first + chain.count, len(chain.hinge))
+
+
+def _of(name: str, hinge: Hinge) -> Iterator[Event]:
+    count = len(hinge.law.limits) if hinge.facts is None else len(hinge.facts.speeds)
+    for k in range(count):
+        limits = hinge.law.entry(k).limits
+        for key, sign in (("lower", "<"), ("upper", ">")):
+            place = getattr(limits, key)
+            if limits.restitution is not None and place is not None:
+                yield Event.model_construct(
+                    name=f"{name}.{key}" + (f"[{k}]" if count > 1 else ""),
+                    when=parse(f"{name}.q[{k}] {sign} {place!r}"), do="bounce", hinge=None,
+                    restitution=limits.restitution,
+                )  # fmt: skip
 
 
 class Spring(Table):

@@ -100,7 +100,7 @@ def has_stops(model: Compiled) -> bool:
     """Whether hinges of a scene may meet stops."""
     scene = model.scene
     hinges = (*scene.hinge, *(x for chain in scene.chain for x in chain.hinge))
-    return any(stop.acts for table in hinges for stop in table.law.limits)
+    return any(stop.yields for table in hinges for stop in table.law.limits)
 
 
 def _fastest_possible(model: Compiled) -> float:
