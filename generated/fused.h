@@ -25,7 +25,7 @@ typedef struct {
     int (*accelerations_power)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *qdot, double *udot, double *power, double *potential);
     /* Where loops are closed; see derive/fuse/closing.py. */
     int (*gaps)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *dq, double *gap, double *apart);
-    int (*slips)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *du);
+    int (*slips)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *du, double *strain);
     int (*accelerations_lanes)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *qdot, double *udot, int *codes);
     /* Fills codes (n); returns the number of states that failed. */
     long long (*accelerations_many)(const mstmm_batch *batch);

@@ -24,11 +24,17 @@ _MOVED = Sweep("moved", "Change of the coordinates.", (Run(whole=HINGE_MOTION),)
 
 
 def slips(state: FusionState, inputs: list[Port]) -> KernelIR:
-    """Kernel "slips": the change of the speeds, du (nu), that stops the slip of closed loops."""
-    replay = Replay(state, level="slipping")
+    """Kernel "slips": the change of the speeds, du (nu), that stops the slip of closed loops, and
+    the strain (1): the largest of what is rounding for a row in parts of its pivot."""
+    replay, strain = Replay(state, level="slipping"), state.zero
     replay.sweep(CORRECTION)
-    outputs, values = [Port("du", (state.structure.nu,))], {"du": replay.gathered("udot")}
-    return state.graph.kernel("slips", inputs, outputs, dict(values), as_made=True)
+    for row in range(len(state.structure.rows)):
+        replay.enter(row_subject(state.structure.rows, row))
+        share = replay.get("row.floor", 1)[0] * replay.get("row.inverse", 1)[0]
+        strain = state.graph.call("max", strain, share)
+    outputs = [Port("du", (state.structure.nu,)), Port("strain", (1,))]
+    values: dict[str, object] = {"du": replay.gathered("udot"), "strain": [strain]}
+    return state.graph.kernel("slips", inputs, outputs, values, as_made=True)
 
 
 def gaps(state: FusionState, inputs: list[Port]) -> KernelIR:

@@ -6,7 +6,7 @@ Both the printer of the C text and the opener of the library read it; no other m
 from __future__ import annotations
 
 #: Number of the layout below; changed with every change of it, and checked when a library opens.
-ABI = 8
+ABI = 9
 
 #: Name of the one variable that a library exports.
 SYMBOL = "mstmm_fused_library"
@@ -50,7 +50,7 @@ typedef struct {{
     int (*accelerations_power)({_STATE}, double *power, double *potential);
     /* Where loops are closed; see derive/fuse/closing.py. */
     int (*gaps)({_AT}const double *efforts, double *dq, double *gap, double *apart);
-    int (*slips)({_AT}const double *efforts, double *du);
+    int (*slips)({_AT}const double *efforts, double *du, double *strain);
     int (*accelerations_lanes)({_STATE}, int *codes);
     /* Fills codes (n); returns the number of states that failed. */
     long long (*accelerations_many)(const mstmm_batch *batch);

@@ -89,7 +89,7 @@ def held_back(model: Compiled, run: Trajectory) -> Iterator[Risk]:
     settings, counted = run.settings, run.statistics
     if not (_chooses_explicit_steps(settings) and counted.stability_limited):
         return
-    if model.packed.system.n_memory or len(run.t) <= _PARTS or not np.isfinite(run.q).all():
+    if model.packed.system.remembers or len(run.t) <= _PARTS or not np.isfinite(run.q).all():
         return
     places = np.unique(np.searchsorted(run.t, np.linspace(run.t[0], run.t[-1], _PARTS + 1)))
     states = [(float(run.t[k]), run.q[k], run.u[k]) for k in places]

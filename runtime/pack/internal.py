@@ -29,7 +29,7 @@ from .loops.closures import closures_of
 from .loops.couplings import couplings_of
 from .loops.curves import elements_of
 from .loops.opened import opened
-from .loops.unknown import refuse_beside_bending
+from .loops.unknown import may_close, refuse_beside_bending
 from .merge.carried import Carried, carried_in, contracted
 from .merge.simplification import NOTHING, TURNS, WELDS, Simplification, Words
 from .merge.turns import with_exact_turns
@@ -95,12 +95,14 @@ def system_of(
     ports = [Port(MOVING, (1 + max(moving),))] if moving else []
     driven, values = list(_driven(nodes, tree)), Values(layout, ports)
     remembered = len(releases) + sum(event.do == "bounce" for event in scene.events)
+    strained = remembered if may_close(scene) else -1
+    remembered += strained >= 0
     laws = tuple(laws_of(nodes, tree, layout, values, remembered))
     loads = tuple(_load(frames, load, values) for load in nodes.load)
     held = _held(scene, laws[-1].next_twist if laws else remembered)
     couplings, coupled = couplings_of(frames, runs)
     system = System(
-        layout.nq, layout.nu, held.first + len(held.start), nodes.gravity, runs,
+        layout.nq, layout.nu, held.first + len(held.start), strained, nodes.gravity, runs,
         laws, loads, forces_of(frames, nodes, ports),
         values.kernel() if len(values) else None,
         drive_kernel([drive for _, _, drive in driven], layout, ports) if driven else None,

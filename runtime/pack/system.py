@@ -278,11 +278,14 @@ class System:
     effort or load names the time, or an input that does not stand still.  `moving` are the numbers
     in expressions that carry derivatives, by their places in the port "moving".  `closures` are
     what closes loops; `coupled` gives the numbers of the `couplings` (pack/loops/couplings).
+    `strained` is the place in memory that tells whether the last step ended near a singular pose,
+    -1 where nothing can close.
     """
 
     nq: int
     nu: int
     n_memory: int
+    strained: int
     gravity: Numbers
     bodies: tuple[BodyRun, ...]
     laws: tuple[LawRun, ...]
@@ -298,6 +301,11 @@ class System:
     closures: tuple[ClosureNumbers, ...] = ()
     couplings: tuple[CouplingNumbers, ...] = ()
     coupled: KernelIR | None = None
+
+    @property
+    def remembers(self) -> bool:
+        """Whether a state alone does not say how it goes on."""
+        return self.n_memory > (self.strained >= 0)
 
     @property
     def closes(self) -> bool:

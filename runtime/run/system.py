@@ -76,6 +76,10 @@ class SceneSystem:
             controllers = Controllers(engine)
             run.n_controllers, run.controllers = controllers.count, controllers.records
             self.kept.append(controllers)
+        if system.closes and system.strained >= 0:
+            speeds = np.zeros(engine.nu)
+            run.speeds = engine.pointer(speeds)
+            self.kept.append(speeds)
         self.workspace = np.zeros(packed.workspace)
         run.workspace = engine.pointer(self.workspace)
         self._code = compiled
@@ -170,8 +174,10 @@ class SceneSystem:
 
     def begin(self, t: float, q: ArrayLike, u: ArrayLike) -> Array:
         """`start` of a run between hard stops: controllers that act at t have done so."""
-        y = self.start(t, q, u)
-        packed = self.engine.packed
+        y, packed = self.start(t, q, u), self.engine.packed
+        if packed.system.strained >= 0:
+            near = self.run.strain > packed.model.loops_strain
+            self.memory[packed.system.strained] = near
         refuse_beyond_stops(packed.scene, packed.layout, packed.watched.bounces, y)
         lib = self.engine.lib
         if lib.mstmm_controllers_act(self.run, t, self.engine.pointer(y)) > 0:

@@ -65,7 +65,10 @@ static int accelerations(void *context, double t, const double *y, double *dy)
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused;
     mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
-    const int code = fused->accelerations(run->fused_p, &t, y, y + fused->nq, run->memory,
+    const double *u = y + fused->nq;
+    const int open = mstmm_stage_speeds(run, t, y, &u);
+    if (open) return open;
+    const int code = fused->accelerations(run->fused_p, &t, y, u, run->memory,
                                           run->fused_numbers, dy, dy + fused->nq);
     return code ? failed(run, fused, code) : 0;
 }
@@ -80,7 +83,10 @@ static int accelerations_and_power(void *context, double t, const double *y, dou
         return accelerations(context, t, y, dy);
     }
     mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
-    const int code = fused->accelerations_power(run->fused_p, &t, y, y + fused->nq, run->memory,
+    const double *u = y + fused->nq;
+    const int open = mstmm_stage_speeds(run, t, y, &u);
+    if (open) return open;
+    const int code = fused->accelerations_power(run->fused_p, &t, y, u, run->memory,
                                                 run->fused_numbers, dy, dy + fused->nq, &power,
                                                 &potential);
     dy[fused->nq + fused->nu] = code ? 0 : power;
@@ -163,7 +169,7 @@ static int compiled_slips(void *context)
     const mstmm_fused *fused = run->fused;
     real *du = run->fused_numbers + fused->nu, *u = at->y + fused->nq;
     const int code = fused->slips(run->fused_p, &at->t, at->y, u, run->memory,
-                                  run->fused_numbers, du);
+                                  run->fused_numbers, du, &run->strain);
     if (code) return failed(run, fused, code);
     for (int i = 0; i < fused->nu; i++) u[i] += du[i];
     return 0;
@@ -172,13 +178,33 @@ static int compiled_slips(void *context)
 int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y)
 {
     const mstmm_model *model = run->model;
-    if (!run->fused)
-        return mstmm_close_loops(model, run->workspace, t, y, y + model->nq, run->memory,
-                                 run->n_quaternions, run->quaternions, run->on_positions, &run->failure);
+    if (!run->fused) {
+        const int code = mstmm_close_loops(model, run->workspace, t, y, y + model->nq, run->memory,
+                                           run->n_quaternions, run->quaternions,
+                                           run->on_positions, &run->failure);
+        run->strain = mstmm_strain(model, run->workspace);
+        return code;
+    }
     compiled_state at = {run, t, y};
     mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
     const mstmm_closing by = {&at, compiled_gaps, run->on_positions ? NULL : compiled_slips};
     return mstmm_closed(&by, model, &run->failure);
+}
+
+int mstmm_stage_speeds(mstmm_scene_run *run, double t, const double *y, const double **u)
+{
+    const mstmm_model *model = run->model;
+    const mstmm_fused *fused = run->fused;
+    real *speeds = run->speeds, strain;
+    if (!speeds || !(run->memory[model->strained] > 0)) return 0;
+    const int code = fused ? fused->slips(run->fused_p, &t, y, *u, run->memory,
+                                          run->fused_numbers, speeds, &strain)
+                           : mstmm_correction(model, run->workspace, MSTMM_SLIP, 0, t, y, *u,
+                                              run->memory, speeds, NULL, &run->failure);
+    if (code) return fused ? failed(run, fused, code) : code;
+    for (int i = 0; i < model->nu; i++) speeds[i] += (*u)[i];
+    *u = speeds;
+    return 0;
 }
 
 /* --- trajectories side by side ---------------------------------------------------------------- */

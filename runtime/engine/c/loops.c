@@ -114,6 +114,16 @@ int mstmm_correction(const mstmm_model *model, real *workspace, int level, real 
     return code;
 }
 
+real mstmm_strain(const mstmm_model *model, const real *workspace)
+{
+    real found = 0;
+    for (int r = 0; r < model->n_rows; r++) {
+        const real *numbers = workspace + model->loops + MSTMM_ROW * (int64_t)r;
+        found = fmax(found, model->rows[r].floor * numbers[MSTMM_ROW_INVERSE]);
+    }
+    return found;
+}
+
 void mstmm_missing(const mstmm_state *state, real *missing)
 {
     const mstmm_model *model = state->model;

@@ -11,6 +11,9 @@ int mstmm_refine(mstmm_state *state, const real *q, const real *u);
 int mstmm_placing_accelerations(const mstmm_model *model, real *workspace, real closing, real t,
                                 const real *q, const real *u, const real *a, const real *memory,
                                 real *qdot, real *found, mstmm_failure *failure);
+/* How near to a singular pose the sweep that was made last met the loops: the largest of what is
+ * rounding for a row in parts of its pivot. */
+real mstmm_strain(const mstmm_model *model, const real *workspace);
 /* How much the rows lack in the sweep that was made last, by row. */
 void mstmm_missing(const mstmm_state *state, real *missing);
 /* What a coupling lacked in the sweep that was made last; 0 where nothing is asked of it. */

@@ -201,8 +201,11 @@ static int scene_rhs(void *context, double t, const double *y, double *dy)
     mstmm_scene_run *run = context;
     const mstmm_model *model = run->model;
     mstmm_balance balance;
-    int code = mstmm_accelerations(model, run->workspace, t, y, y + model->nq, run->memory, NULL,
-                                   dy, dy + model->nq, run->with_power ? &balance : NULL,
+    const double *u = y + model->nq;
+    int code = mstmm_stage_speeds(run, t, y, &u);
+    if (!code)
+        code = mstmm_accelerations(model, run->workspace, t, y, u, run->memory, NULL, dy,
+                                   dy + model->nq, run->with_power ? &balance : NULL,
                                    &run->failure);
     if (run->with_power) dy[model->nq + model->nu] = code ? 0 : balance.power;
     return code;
@@ -261,8 +264,10 @@ int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, cons
 
 static int scene_accept(void *context, double t, double *y)
 {
-    const int code = mstmm_scene_settle(context, t, y);
-    return code ? code : mstmm_controllers_act(context, t, y);
+    mstmm_scene_run *run = context;
+    const int code = mstmm_scene_settle(run, t, y), place = run->model->strained;
+    if (place >= 0) run->memory[place] = run->strain > run->model->loops_strain;
+    return code ? code : mstmm_controllers_act(run, t, y);
 }
 
 int mstmm_probes_seen(mstmm_scene_run *run, real t, const real *y, const real *u)

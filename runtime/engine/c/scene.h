@@ -105,6 +105,8 @@ typedef struct {
      * NULL: not prepared */
     mstmm_tangent *base, *stage;
     mstmm_implicit implicit;
+    real strain;      /* of the loops when their slips were stopped last: see mstmm_strain */
+    real *speeds;     /* nu: those of a stage near a singular pose; NULL: there are no loops */
     int on_positions; /* implicit steps close gaps, and leave slips: index 3 */
     int steady;       /* nothing in the scene goes by time */
     int *coordinates; /* nu: see mstmm_implicit */
@@ -129,6 +131,10 @@ int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, cons
 
 /* Gaps of closed loops closed and slips stopped in place, by compiled code where there is some. */
 int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y);
+
+/* *u, which are speeds of a state inside a step: near a singular pose they are taken without slips,
+ * for whose sake accelerations there would be wrong by the slips over the distance from it. */
+int mstmm_stage_speeds(mstmm_scene_run *run, double t, const double *y, const double **u);
 
 /* Places and velocities of the probes of a state with speeds u, to `probe_values`. */
 int mstmm_probes_seen(mstmm_scene_run *run, real t, const real *y, const real *u);

@@ -260,6 +260,8 @@ typedef struct {
     const mstmm_tape *coupling_slopes; /* the same and derivatives of all -> those of the numbers */
     int64_t coupling_numbers; /* the first behind `loops` */
     real loops_apart;     /* gap (m, rad) at which rows that repeat others do so no longer */
+    real loops_strain;    /* strain from which on a pose is near a singular one; 0: never */
+    int strained;         /* place in memory that is 1 while the last step ended there; -1: none */
     int needs_pose; /* loads or forces that need poses and velocities */
     int64_t workspace; /* numbers of workspace */
     int64_t scratch;   /* first number behind the blocks: state copy, values, tape slots */

@@ -120,3 +120,8 @@ class LoopCalls(LoopNumbers):
             floor = max(ROUNDING * pivot, _LEAST * mobility) if heavy else floors[row]
             self.records.judge(row, min(floor, floors[row]))
         return {row for row, pivot in enumerate(usual.tolist()) if not pivot}
+
+    def strain(self, q: Array) -> float:
+        """The largest of what is rounding for a row in parts of its pivot, at a closed state."""
+        self.correction(self.slip, q, np.zeros(self.engine.nu))
+        return float((self.inverses() * self.records.floors).max(initial=0.0))

@@ -32,6 +32,8 @@ _OF_CONSTRAINTS = {
 #: Gaps at which it may still be that rows repeat others but for a misfit, in parts of the length of
 #: the scene.
 _NEARLY = 1e-2
+#: A pose is near a singular one where the strain is this many times that of the start.
+_STRAINED = 10.0
 #: So many hinges are named.
 _NAMED = 8
 
@@ -163,6 +165,8 @@ class Closed:
             calls = LoopCalls(self.engine, q)
             records = calls.records
         silent, here = calls.judge_by(rank.states), {names[row] for row in rank.here}
+        packed = self.engine.packed
+        packed.model.loops_strain = _STRAINED * min(map(calls.strain, rank.states))
         drowned = [name for row, name in enumerate(self._names(calls)) if row in silent]
         self._refuse_drowned([name for name in drowned if name not in here])
         told = Loops(

@@ -47,6 +47,7 @@ def write(system: System, elements: Elements) -> Written:
     memory = Memory(ffi)
     model = memory.new("mstmm_model *")
     model.nq, model.nu, model.n_memory = system.nq, system.nu, system.n_memory
+    model.strained = system.strained
     model.gravity = list(system.gravity)
     bodies = BodyRecords(system, elements, memory, lib)
     model.bodies, model.n_bodies = bodies.records.array, system.count

@@ -205,7 +205,7 @@ def _lanes(model: Compiled) -> FusedLibrary | None:
     packed = model.packed
     if has_switches(packed.scene):
         return None
-    if packed.system.n_memory or packed.scene.events or packed.system.driven:
+    if packed.system.remembers or packed.scene.events or packed.system.driven:
         return None
     return model.fusion.ready_lanes(math.inf)
 

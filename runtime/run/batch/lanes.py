@@ -121,6 +121,7 @@ def _group(lanes: Lanes, many: Any, settling: SceneSystem, numbers: Any, kept: l
     scratch = np.zeros(max(1, lib.mstmm_lanes_numbers(view.fused)))
     view.numbers = lanes.engine.pointer(scratch)
     lib.mstmm_scene_lanes_system(view, system, group)
+    system.n_memory = 0  # where steps end near singular poses is remembered of single runs
     group.many = many
     workspace = np.zeros(max(1, lib.mstmm_group_size(system, many.problem.tableau)))
     group.workspace = lanes.engine.pointer(workspace)

@@ -25,10 +25,15 @@ PRINTED_SPEEDS = {
 
 
 @pytest.mark.parametrize(
-    ("count", "rtol", "bound"), [(2, 1e-6, 1e-3), (2, 1e-9, 1e-6), (40, 1e-6, 1e-3)]
-)
-def test_four_bars_pass_their_singular_pose(count: int, rtol: float, bound: float) -> None:
-    """Flat on the ground the windows could fold; the cranks stay side by side."""
+    ("count", "rtol", "bound", "most"),
+    [(2, 1e-6, 1e-3, 1500), (2, 1e-9, 1e-6, 3000), (40, 1e-6, 1e-3, 1500), (2, 1e-11, 1e-8, 4000),
+     (40, 1e-10, 1e-7, 4000), (40, 1e-11, 1e-8, 15000)],
+)  # fmt: skip
+def test_four_bars_pass_their_singular_pose(
+    count: int, rtol: float, bound: float, most: int
+) -> None:
+    """Flat on the ground the windows could fold; the cranks stay side by side.  With slips of
+    stages in their accelerations the last three take 4586, 18734 and 56438 evaluations."""
     model = mstmm.compile(mstmm.Scene(**four_bars(count)))
     result = model.simulate(10.0, "dop853", rtol=rtol, atol=1e-3 * rtol, output_times=[0.0, 10.0])
     assert result.success, result.message
@@ -36,7 +41,32 @@ def test_four_bars_pass_their_singular_pose(count: int, rtol: float, bound: floa
     assert abs(cranks[0] - ANGLES[count]) < bound
     assert np.ptp(cranks) < 1e-12
     assert result.statistics is not None
-    assert result.statistics.evaluations < 1500 * (2 if rtol < 1e-6 else 1)
+    assert result.statistics.evaluations < most
+
+
+def test_code_of_its_own_passes_alike() -> None:
+    """Near the singular pose stages go without slips there too."""
+    counts = []
+    for engine in ("looped", "fused"):
+        model = mstmm.compile(mstmm.Scene(**four_bars(2)), engine=engine)
+        result = model.simulate(10.0, rtol=1e-11, atol=1e-14, output_times=[0.0, 10.0])
+        assert result.success and abs(result.q[-1, 0] - ANGLES[2]) < 1e-8
+        assert result.statistics is not None
+        counts.append(result.statistics.evaluations)
+    assert abs(counts[0] - counts[1]) < 0.2 * counts[0]
+
+
+def test_a_session_passes_as_a_run_does() -> None:
+    """Where a step ended is remembered: ticks and copies change nothing."""
+    model = mstmm.compile(mstmm.Scene(**four_bars(2)), engine="looped")
+    ends = []
+    for ticks in (1, 40):
+        session = model.session(method="rk4", step=0.005)
+        for _ in range(ticks):
+            session.advance(4.0 / ticks)
+            session = session.copy()
+        ends.append(session.q)
+    assert np.array_equal(ends[0], ends[1])
 
 
 def test_four_bars_at_the_start() -> None:
