@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.errors import NumericalFailure, SceneError
+from mstmm.errors import MstmmError, NumericalFailure, SceneError
 
 from ...pack.loops.variants import LOCKED, keeping, length_of, without
 from ...pack.pack import packed_system
@@ -107,7 +107,10 @@ class Closed:
         calls = LoopCalls(engine, q)
         q, u = calls.driven(q, u)
         length = length_of(packed.system)
-        near = Assembly(engine, q, holds).positions(q, _NEARLY * length)
+        try:
+            near = Assembly(engine, q, holds).positions(q, _NEARLY * length)
+        except SceneError as error:
+            raise SceneError(f"{error}{self._too_many(q, holds, free_speeds)}") from None
         self._keep(near)
         self.loops, repeating = self._judged(near, free_speeds)
         self._refuse_structure()
@@ -176,6 +179,20 @@ class Closed:
             mobility, records.width, rank.singular, rank.not_unique, min(mobility, bent),
         )  # fmt: skip
         return told, {row: names[row] for row in sorted(rank.going)}
+
+    def _too_many(self, q: Array, holds: Sequence[str], free_speeds: int) -> str:
+        """What ends a message where more is held than is free near q, by the rank there."""
+        count = sum(self.engine.packed.layout.hinges[name].nu for name in holds)
+        try:
+            near = Assembly(self.engine, q).positions(q)
+            self._keep(near)
+            mobility = self._judged(near, free_speeds)[0].mobility
+        except MstmmError:  # it does not close without holds either
+            return ""
+        if count <= mobility:
+            return ""
+        ways = "1 freedom" if mobility == 1 else f"{mobility} freedoms"
+        return f"; hold keeps {count} coordinate{'s' * (count > 1)}, the mechanism has {ways}"
 
     def _refuse_structure(self) -> None:
         """SceneError where nothing can move, and nothing that goes by time moves it."""

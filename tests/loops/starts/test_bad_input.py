@@ -55,7 +55,9 @@ REFUSED = {
     "drives at odds in speed": (driven(foot="0.9 + t", end=f"{REST!r}"),
                                 r'speeds given for "foot", "end" contradict .* m/s'),
     "more held than is free": (held("foot", "end", off=0.2),
-                               r'with "foot", "end" held.*hold or drive less'),
+                               r'with "foot", "end" held.*hold or drive less.*; hold keeps 2 '
+                               r"coordinates, the mechanism has 1 freedom$"),
+    "one held out of reach": (held("end", off=-1.3), r'with "end" held; [^;]*$'),
     "speeds at odds": (fast(foot=1.0, end=5.0), r'speeds given for "foot", "end" contradict'),
     "an axis off by a hundredth": (four_bar(end={"axis": [math.sin(0.01), 0, math.cos(0.01)]}),
                                    "lengths or axes"),
