@@ -193,6 +193,18 @@ def batch(*given: tuple[str, ArrayLike, Width]) -> tuple[tuple[int, ...], list[A
     ]
 
 
+def into(out: Array | None, found: Array) -> Array:
+    """What was found, written into `out` where one is given; SceneError unless that holds it."""
+    if out is None:
+        return found
+    holds = type(out) is np.ndarray and out.dtype is _DOUBLE and out.shape == found.shape
+    if not holds or not out.flags.writeable:
+        given = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
+        raise SceneError(f"out: expected a writeable float64 array {found.shape}, found {given}")
+    out[...] = found
+    return out
+
+
 def _tail(width: Width) -> tuple[int, ...]:
     """The axes behind those of the states."""
     if width is None:

@@ -90,6 +90,11 @@ class Calls:
         return self._pulled((0.0, 0.0, 0.0))
 
     @cached_property
+    def weighed(self) -> Self:
+        """The same tree under its gravity, without laws, drives and loads."""
+        return self._pulled(tuple(self.packed.model.gravity))
+
+    @cached_property
     def pulled(self) -> tuple[Self, ...]:
         """The same under a gravity of 1 m/s^2 along each inertial axis."""
         return tuple(self._pulled(tuple(row)) for row in np.eye(3).tolist())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 
 from mstmm.scene import split
+from mstmm.scene.rules.messages import near
 from mstmm.scene.tables.all import SceneTables
 from mstmm.scene.tables.body import BodyTable
 
@@ -26,6 +27,14 @@ class References(Collection[str]):
         if number is None or ends is None or (at and at not in ends):
             return None
         return self.bodies.name(number) + (f".{at}" if at else "")
+
+    def unknown(self, reference: str) -> str:
+        """That there is no such body or end, and what is near."""
+        body = split(reference)[0]
+        if self.bodies.of_chain(body) and self.bodies.find(body) is None:
+            return f'"{reference}": {self.bodies.missing(body)}'
+        hint = near(reference, self)
+        return f'"{reference}": there is no such body or end in the scene{hint}'
 
     def __contains__(self, reference: object) -> bool:
         return isinstance(reference, str) and self.canonical(reference) is not None

@@ -180,6 +180,16 @@ class Differentiation:
         found["rate_q"], found["rate_u"] = self._rates(states, increments)
         return found
 
+    def turning(self, q: Array, u: Array, t: float = 0.0) -> Array:
+        """`rate_q` (nu, nu) of one state alone."""
+        states = {
+            "p": np.atleast_2d(self._live.at(self.p, np.array([t]))), "t": np.array([[t]]),
+            "q": q[None], "u": u[None], "memory": self._memory[None],
+            "efforts": np.zeros((1, self._model.nu)),
+        }  # fmt: skip
+        increments = self.tangents.columns("u", "qdot", states, np.eye(self._model.nu)[None])
+        return self._rates(states, increments)[0][0]
+
     def _refuse_infinite(self, found: Mapping[str, Array], t: Array) -> None:
         for name, array in found.items():
             if not np.isfinite(array).all():

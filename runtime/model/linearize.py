@@ -101,8 +101,7 @@ class Linearising:
         model = self._model
         if self._straight or not state.u.any():
             return None
-        of = np.array([[state.t]]), state.q[None], state.u[None], np.zeros((1, model.nu))
-        found = Differentiation(model, ()).at(*of)["rate_q"][0]
+        found = Differentiation(model, ()).turning(state.q, state.u, state.t)
         return np.asarray(found[np.ix_(model.free_speeds, model.free_speeds)])
 
 

@@ -8,25 +8,20 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arrays import Array, batch, one, one_row, pair, real
-from mstmm.arrays import columns as columns_of
+from mstmm.arrays import Array, one, one_row, pair, real
 from mstmm.defaults import ATOL, METHOD, RTOL
-from mstmm.errors import NumericalFailure, SceneError
+from mstmm.errors import NumericalFailure
 from mstmm.markup import table
 from mstmm.risk import Risk
 
-from ..engine.compiled import Compiled
 from ..engine.given import GivenInput
 from ..integrate.settings import Settings, checked, times_of
-from ..pack.layout import refuse_dense
+from .at_states import AtStates
 
 if TYPE_CHECKING:
     from ..engine.loops.closed import Loops
-    from ..engine.solver import Solver
-    from ..engine.states.alone import Alone
     from ..linear.harmonic.counted import ExactModes
     from ..linear.harmonic.exact import Chosen
     from ..linear.harmonic.losses import Losses
@@ -39,13 +34,12 @@ if TYPE_CHECKING:
     from ..result.batch import Batch
     from ..result.result import Result
     from ..run.batch.inputs import BatchInput
-    from .derivatives import Derivatives, Differentiation
     from .equilibrium import Equilibrium
     from .linearize import Linearising
     from .session import Session
 
 
-class Model(Compiled):
+class Model(AtStates):
     """A scene ready to compute.  Made by `mstmm.compile`.
 
     `q` and `u` hold the hinges in the scene's order (`layout`); SI units and radians; speeds and
@@ -63,10 +57,6 @@ class Model(Compiled):
     def _freedom(self) -> int:
         """How many speeds are free, of those that loops leave."""
         return len(self.free_speeds) if self.closed is None else self.closed.loops.mobility
-
-    @cached_property
-    def _differentiations(self) -> dict[tuple[str, ...], Differentiation]:
-        return {}
 
     def initial_state(self) -> tuple[Array, Array]:
         """(q, u) at t = 0 as the scene gives them, driven coordinates included."""
@@ -131,128 +121,6 @@ class Model(Compiled):
             start = self.simulate(0.0, "dop853")
             for output in self.scene.output:
                 quantity_of(output, start.t, start.quantity)
-
-    def accelerations(
-        self,
-        q: ArrayLike,
-        u: ArrayLike,
-        t: ArrayLike = 0.0,
-        efforts: ArrayLike | None = None,
-        *,
-        threads: int | None = None,
-    ) -> Array:
-        """udot (..., nu) from q (..., nq), u (..., nu), t (s) and extra efforts (..., nu; N, N*m).
-
-        Driven coordinates take the drive's value whatever q and u say.  A batch (leading axes) goes
-        through vector lanes where there is fused code, and through `threads` threads (None: as many
-        as there are processors); with one engine a state's numbers depend neither on the batch
-        around it nor on the threads, to the last bit.
-
-        Raises SceneError for a shape that does not fit, NumericalFailure naming the state and the
-        hinge whose motion is undetermined.
-        """
-        if type(t) is float and threads is None:
-            found = self._alone.accelerations(t, q, u, efforts)
-            if found is not None:
-                return found
-        from ..engine.states.many import States, accelerations
-
-        extra = () if efforts is None else (("efforts", efforts, self.nu),)
-        lead, given = batch(("t", t, None), ("q", q, self.nq), ("u", u, self.nu), *extra)
-        states = States(lead, given[0], given[1], given[2], given[3] if extra else None)
-        return accelerations(self.looped, self.fusion, states, threads).reshape(*lead, self.nu)
-
-    @cached_property
-    def _alone(self) -> Alone:
-        from ..engine.states.alone import Alone
-
-        return Alone(self.looped, self.fusion)
-
-    def inverse_dynamics(
-        self,
-        q: ArrayLike,
-        u: ArrayLike,
-        udot: ArrayLike,
-        t: ArrayLike = 0.0,
-        *,
-        actuators: Sequence[str] | None = None,
-    ) -> Array:
-        """Efforts (..., nu) beyond the laws' own that give `udot`; for driven coordinates the
-        drive's.  q (..., nq), u and udot (..., nu), t (s).
-
-        Where loops are closed, `actuators` are what acts: hinges, or efforts of some of their
-        speeds ("shoulder.effort"), as many as the mechanism has motions; the efforts of all others
-        are zero.  Without, they are `loops.independent`.  udot may be that of these independent
-        speeds alone, (..., mobility); all of it must go with the loops.
-
-        Newton-Euler inverse dynamics over the tree, O(bodies), and a sweep more for each motion of
-        a mechanism.  Raises SceneError for a shape that does not fit, accelerations that tear a
-        loop, and actuators that are not as many as the motions; NumericalFailure where they do not
-        decide them at the state.
-        """
-        if self.freedom is not None:
-            from .actuated import actuated
-
-            return actuated(self, q, u, udot, t, actuators)
-        if actuators is not None:
-            raise SceneError("actuators: no loop is closed in this scene, so that all speeds act")
-        if type(t) is float and (found := self._alone.efforts(t, q, u, udot)) is not None:
-            return found
-        engine = self.looped
-        memory, nu = engine.start_memory(), self.nu
-        lead, (times, coordinates, speeds, rates) = batch(
-            ("t", t, None), ("q", q, self.nq), ("u", u, nu), ("udot", udot, nu)
-        )
-        rows = [
-            engine.inverse_dynamics(float(at), a, b, c, memory)
-            for at, a, b, c in zip(times, coordinates, speeds, rates, strict=True)
-        ]
-        return np.array(rows).reshape(*lead, nu)
-
-    def mass_matrix(self, q: ArrayLike) -> Array:
-        """Symmetric (..., nu, nu) mass matrix at q (..., nq), kg, kg*m, kg*m2; driven coordinates
-        as if free.  Where loops are closed it is that of the independent speeds alone, (...,
-        mobility, mobility) in the order of `loops.independent`, driven ones left out.
-
-        Raises SceneError for a shape that does not fit, NumericalFailure where the independent
-        speeds do not decide the others.
-        """
-        if self.freedom is None:
-            if (alone := self._alone.mass_matrix(q)) is not None:
-                return alone
-            refuse_dense(self.nu, "the mass matrix")
-        lead, (states,) = batch(("q", q, self.nq))
-        if self.freedom is not None:
-            from .actuated import reduced_mass
-
-            found = np.array([reduced_mass(self, one_state) for one_state in states])
-            return found.reshape(*lead, *found.shape[1:])
-        matrices = [self.looped.mass_matrix(one_state) for one_state in states]
-        return np.array(matrices).reshape(*lead, self.nu, self.nu)
-
-    def solve(self, q: ArrayLike, rhs: ArrayLike) -> Array:
-        """M(q)^-1 rhs: accelerations (..., nu) or (..., nu, k) that efforts rhs alone give.
-
-        q (..., nq); rhs (nu,), one column for all states, or (..., nu, k), k columns (N, N*m), as
-        `numpy.linalg.solve` has it.  M is never formed: the tree is factored once per state, and
-        each column is O(bodies).  Speeds that a drive or a hold imposes, released later or not,
-        stay unaccelerated: their rows of rhs are not read and their answers are zero.
-
-        Raises SceneError for a shape that does not fit, NumericalFailure naming the hinge whose
-        motion is undetermined.
-        """
-        alone, columns = columns_of("rhs", rhs, self.nu)
-        k = columns.shape[-1]
-        lead, (states, columns) = batch(("q", q, self.nq), ("rhs", columns, (self.nu, k)))
-        answers = self._solver.solve(states, np.ascontiguousarray(columns.swapaxes(-1, -2)))
-        found = answers.swapaxes(-1, -2).reshape(*lead, self.nu, k)
-        return np.ascontiguousarray(found[..., 0] if alone else found)
-
-    @cached_property
-    def _solver(self) -> Solver:
-        from ..engine.solver import Solver
-
-        return Solver(self.looped, self.fusion)
 
     def equilibrium(
         self, q: ArrayLike | None = None, t: float = 0.0, tolerance: float = 1e-10
@@ -396,34 +264,6 @@ class Model(Compiled):
 
     def _linear_at(self, parameter: str) -> Callable[[float], Linear]:
         return lambda value: self.with_parameters({parameter: value}).linearize(disturbances=())
-
-    def derivatives(
-        self,
-        q: ArrayLike,
-        u: ArrayLike,
-        t: ArrayLike = 0.0,
-        efforts: ArrayLike | None = None,
-        parameters: Sequence[str] = (),
-    ) -> Derivatives:
-        """Exact derivatives of the accelerations by q, u, efforts, t and named numbers.
-
-        Arguments as for `accelerations`; `parameters` are names as in `with_parameters`.  With
-        respect to q: nu tangent increments dphi, dq = N(q) dphi where qdot = N(q) u (rotation
-        vectors in outboard axes for quaternions).  No compiler is needed.
-
-        Raises SceneError for a name that the scene does not have and for scenes with releases,
-        NumericalFailure where `accelerations` does and where a derivative does not exist.
-        """
-        names = tuple(parameters)
-        differentiation = self._differentiations.get(names)
-        if differentiation is None:
-            differentiation = self._differentiations[names] = self._differentiated_by(names)
-        return differentiation(q, u, t, efforts, lambda: self.accelerations(q, u, t, efforts))
-
-    def _differentiated_by(self, names: tuple[str, ...]) -> Differentiation:
-        from .derivatives import Differentiation
-
-        return Differentiation(self, names)
 
     def simulate(
         self,

@@ -15,7 +15,6 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene import split
-from mstmm.scene.rules.messages import near
 
 from ..engine.calls import PARTS, Probe
 from ..engine.references import References
@@ -51,7 +50,7 @@ class Observed:
         if reference not in self._points:
             known = self.references.canonical(reference)
             if known is None and split(reference)[0] != "ground":
-                raise SceneError(self.unknown(reference))
+                raise SceneError(self.references.unknown(reference))
             self._observe("points", known or reference)
             self._points[reference] = self._points[known or reference]
         return self._points[reference]
@@ -119,14 +118,6 @@ class Observed:
             )
             self.failures = self.failures or seen.failures
             yield getattr(seen, name)
-
-    def unknown(self, reference: str) -> str:
-        """That there is no such body or end, and what is near."""
-        body = split(reference)[0]
-        if self.references.bodies.of_chain(body) and self.references.bodies.find(body) is None:
-            return f'"{reference}": {self.references.bodies.missing(body)}'
-        hint = near(reference, self.references)
-        return f'"{reference}": there is no such body or end in the scene{hint}'
 
     def _observe(self, part: str, reference: str | None) -> None:
         run = self.run

@@ -33,11 +33,12 @@ static int complete(mstmm_state *state, const real *q, const real *u)
     return mstmm_run_posed(state);
 }
 
-static void observe_probe(const mstmm_state *state, const mstmm_probe *probe, real *out)
+void mstmm_point_shown(const mstmm_state *state, const mstmm_probe *probe, const real *delta,
+                       real *out)
 {
     const real *block = mstmm_block(state->model, state->workspace, probe->body);
     const int moves = probe->body >= 0;
-    const real *a = block + MSTMM_BLOCK_A, *delta = block + MSTMM_BLOCK_DELTA;
+    const real *a = block + MSTMM_BLOCK_A;
     const real *motion = moves ? block + MSTMM_BLOCK_MOTION : mstmm_zeros;
     mstmm_frames_point(.A = a, .x = block + MSTMM_BLOCK_X, .v = block + MSTMM_BLOCK_V,
                        .motion = motion, .delta = delta, .offset = probe->offset,
@@ -46,6 +47,13 @@ static void observe_probe(const mstmm_state *state, const mstmm_probe *probe, re
     mstmm_frames_turning(.A = a, .motion = motion, .delta = delta, .w_K = out + 9,
                          .alpha_K = out + 12);
     mstmm_frames_end_frame(.A = a, .R_end = probe->axes, .A_end = out + 15);
+}
+
+/* Behind a sweep, which leaves deviations from the bias motion. */
+static void observe_probe(const mstmm_state *state, const mstmm_probe *probe, real *out)
+{
+    const real *block = mstmm_block(state->model, state->workspace, probe->body);
+    mstmm_point_shown(state, probe, block + MSTMM_BLOCK_DELTA, out);
 }
 
 static void observe_hinges(const mstmm_state *state, const real *udot,

@@ -129,6 +129,10 @@ int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, cons
                             real *memory, real *y);
 /* cdef end */
 
+/* The numbers of a probe whose body moves as its bias motion and `delta` (6) say. */
+void mstmm_point_shown(const mstmm_state *state, const mstmm_probe *probe, const real *delta,
+                       real *out);
+
 /* Gaps of closed loops closed and slips stopped in place, by compiled code where there is some. */
 int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y);
 

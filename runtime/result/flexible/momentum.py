@@ -57,7 +57,7 @@ class Momenta:
         references = self.observed.references
         known = references.canonical(name)
         if known is None or references.bodies.find(known) is None:
-            raise SceneError(self.observed.unknown(name))
+            raise SceneError(self.observed.references.unknown(name))
         if known not in self._known:
             of = self._of_flexible if known in self.flexible.known else self._of_rigid
             self._known[known] = of(known)

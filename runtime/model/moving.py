@@ -1,0 +1,198 @@
+"""Where a scene's bodies are and how they move at states; what they carry; states moved on."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mstmm.arrays import Array, batch, into, row
+from mstmm.errors import NumericalFailure
+
+from ..engine.compiled import Compiled
+from ..engine.shown import COLUMNS, SUMS
+
+if TYPE_CHECKING:
+    from ..engine.states.kinematics import Kinematics, Names
+    from .derivatives import Differentiation
+
+_AXES = slice(15, 24)
+_MOMENTA = slice(SUMS["momentum"][2].start, SUMS["angular_momentum"][2].stop)
+
+
+class Moving(Compiled):
+    """A compiled scene, and its kinematics at states.
+
+    `of` names a body or an end, "rod1" or "rod1.tip", whose origin is meant, or several: then
+    answers have an axis more for them.  Axes are inertial.  Coordinates and speeds are taken as
+    they are given, those that a drive imposes or that loops decide as well.
+    """
+
+    def positions(self, q: ArrayLike, of: Names, *, out: Array | None = None) -> Array:
+        """Places (..., 3) in m at q (..., nq).
+
+        Raises SceneError, here and below, for a shape that does not fit and for a body or an end
+        that there is not, with the nearest name.
+        """
+        return into(out, self._places(q, of)[..., COLUMNS["position"]])
+
+    def poses(self, q: ArrayLike, of: Names, *, out: Array | None = None) -> Array:
+        """Places and axes (..., 4, 4): the matrix that takes [x, y, z, 1] from the axes of the body
+        or end to inertial ones."""
+        points = self._places(q, of)
+        found = np.zeros((*points.shape[:-1], 4, 4))
+        found[..., :3, :3] = points[..., _AXES].reshape(*points.shape[:-1], 3, 3)
+        found[..., :3, 3] = points[..., COLUMNS["position"]]
+        found[..., 3, 3] = 1.0
+        return into(out, found)
+
+    def _places(self, q: ArrayLike, of: Names) -> Array:
+        alone = row(q, self.nq)
+        if alone is not None and np.isfinite(np.frombuffer(alone)).all():
+            return self._shaped((), of, self._kinematics.at_rest(of, alone))
+        lead, (states,) = batch(("q", q, self.nq))
+        return self._shaped(lead, of, self._kinematics.still(of, states))
+
+    def velocities(
+        self, q: ArrayLike, u: ArrayLike, of: Names, *, out: Array | None = None
+    ) -> Array:
+        """Velocity (m/s), then angular velocity (rad/s), (..., 6), at q (..., nq), u (..., nu)."""
+        lead, states = batch(("q", q, self.nq), ("u", u, self.nu))
+        return into(out, self._shaped(lead, of, self._kinematics.moving(of, *states)))
+
+    def jacobian(self, q: ArrayLike, of: Names, *, out: Array | None = None) -> Array:
+        """J (..., 6, nu) with `velocities` = J u; of the tree, where loops are closed."""
+        lead, (states,) = batch(("q", q, self.nq))
+        rows = [self._kinematics.jacobian(of, state) for state in states]
+        return into(out, self._shaped(lead, of, np.array(rows)))
+
+    def jacobian_rate(
+        self, q: ArrayLike, u: ArrayLike, of: Names, *, out: Array | None = None
+    ) -> Array:
+        """dJ/dt (..., 6, nu) along u: accelerations of the point and of its turn are
+        J udot + (dJ/dt) u.  Exact, no differences."""
+        lead, (states, speeds) = batch(("q", q, self.nq), ("u", u, self.nu))
+        turning = [self._turning(*one_state) for one_state in zip(states, speeds, strict=True)]
+        rows = [
+            self._kinematics.jacobian_rate(of, *given)
+            for given in zip(states, speeds, turning, strict=True)
+        ]
+        return into(out, self._shaped(lead, of, np.array(rows)))
+
+    def energy(
+        self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0, *, out: Array | None = None
+    ) -> Array:
+        """Total energy (...) in J as in a run at the time t (s): kinetic, that of gravity (zero at
+        the inertial origin), of springs and of bent bodies; driven coordinates are where their
+        drive has them.
+
+        Raises NumericalFailure where `accelerations` does.
+        """
+        return into(out, np.asarray(self._sums(q, u, t)[..., SUMS["energy"][2]].sum(axis=-1)))
+
+    def energies(self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0) -> dict[str, Array]:
+        """The three parts of `energy`, (...) each in J: kinetic, gravity, springs."""
+        sums = self._sums(q, u, t)
+        return {
+            name.removeprefix("energy."): sums[..., columns.start]
+            for name, (_, _, columns) in SUMS.items() if name.startswith("energy.")
+        }  # fmt: skip
+
+    def momentum(
+        self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0, *, out: Array | None = None
+    ) -> Array:
+        """Momentum in kg*m/s, then angular momentum about the inertial origin in kg*m2/s, (..., 6);
+        see `energy`."""
+        return into(out, self._sums(q, u, t)[..., _MOMENTA])
+
+    def integrate(
+        self, q: ArrayLike, u: ArrayLike, dt: ArrayLike, *, out: Array | None = None
+    ) -> Array:
+        """q + N(q) u dt (..., nq) of qdot = N(q) u: coordinates after dt (s) at steady rates;
+        quaternions turn at a steady angular velocity and stay units."""
+        lead, (states, speeds, times) = batch(
+            ("q", q, self.nq), ("u", u, self.nu), ("dt", dt, None)
+        )
+        if self._straight:
+            return into(out, (states + speeds * times[:, None]).reshape(*lead, self.nq))
+        given = zip(states, speeds, times.tolist(), strict=True)
+        rows = [self._moved(*one_state) for one_state in given]
+        return into(out, np.array(rows).reshape(*lead, self.nq))
+
+    def _moved(self, q: Array, u: Array, dt: float) -> Array:
+        turned = [slice(first, first + 4) for first in self._quaternions]
+        for four in turned:
+            q[four] /= np.linalg.norm(q[four])
+        engine = self.looped.inertia_alone
+        rates = engine.rates(0.0, q, u, engine.start_memory())
+        found = q + rates * dt
+        for four in turned:
+            rate = float(np.linalg.norm(rates[four]))
+            if rate > 0:
+                found[four] = np.cos(rate * dt) * q[four] + np.sin(rate * dt) / rate * rates[four]
+        return found
+
+    @cached_property
+    def _quaternions(self) -> list[int]:
+        return [int(k) for group in self.layout.groups for k in group.quaternions()]
+
+    def _sums(self, q: ArrayLike, u: ArrayLike, t: ArrayLike) -> Array:
+        lead, given = batch(("t", t, None), ("q", q, self.nq), ("u", u, self.nu))
+        times, states, speeds = given
+        memory = np.tile(self.looped.start_memory(), (len(times), 1))
+        seen = self.looped.observe(times, states, speeds, memory, (), ("sums",))
+        if seen.failures:
+            raise NumericalFailure(seen.failures[0])
+        return seen.sums.reshape(*lead, -1)
+
+    def _turning(self, q: Array, u: Array) -> Array | None:
+        """The rate of increments by themselves (nu, nu); None where rates are the speeds."""
+        if self._straight:
+            return None
+        if not all(hinge.straight or hinge.steady for hinge in self.layout.hinges.values()):
+            return self._differentiated_by(()).turning(q, u)
+        return np.tensordot(u[self._curved], self._brackets, 1)
+
+    @cached_property
+    def _curved(self) -> list[int]:
+        """Places of speeds that are no rates of coordinates."""
+        hinges = (hinge for hinge in self.layout.hinges.values() if not hinge.straight)
+        return [place for hinge in hinges for place in range(hinge.u, hinge.u + hinge.nu)]
+
+    @cached_property
+    def _brackets(self) -> Array:
+        """(k, nu, nu): `_turning` by each of those speeds, where no place changes it."""
+        q, units = np.zeros(self.nq), np.eye(self.nu)[self._curved]
+        q[self._quaternions] = 1.0
+        by = self._differentiated_by(())
+        return np.array([by.turning(q, unit) for unit in units])
+
+    @cached_property
+    def _straight(self) -> bool:
+        return all(hinge.straight for hinge in self.layout.hinges.values())
+
+    def _differentiated_by(self, names: tuple[str, ...]) -> Differentiation:
+        found = self._differentiations.get(names)
+        if found is None:
+            from .derivatives import Differentiation
+
+            found = self._differentiations[names] = Differentiation(self, names)
+        return found
+
+    @cached_property
+    def _differentiations(self) -> dict[tuple[str, ...], Differentiation]:
+        return {}
+
+    def _shaped(self, lead: tuple[int, ...], of: Names, found: Array) -> Array:
+        """From (states, names, ...) to leading axes, and one name without an axis of its own."""
+        shape = found.shape[2:] if isinstance(of, str) else found.shape[1:]
+        return found.reshape(*lead, *shape)
+
+    @cached_property
+    def _kinematics(self) -> Kinematics:
+        from ..engine.references import References
+        from ..engine.states.kinematics import Kinematics
+
+        return Kinematics(self.looped, References(self.scene.skeleton))
