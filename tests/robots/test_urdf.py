@@ -158,6 +158,19 @@ def test_an_inertia_that_no_body_has_is_taken_and_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("izz", "taken"), [("-5e-20", 0.0), ("-1e-4", -1e-4)], ids=["rounding", "no rounding"]
+)
+def test_moments_below_0_by_rounding_are_0(tmp_path: Path, izz: str, taken: float) -> None:
+    text = ARM.replace('iyy="0.003" izz="0.001"', f'iyy="0.002" izz="{izz}"')
+    found = mstmm.import_robot(written(tmp_path, text), merge=False)
+    tool = next(body for body in found.scene.body if body.name == "tool")
+    assert tool.inertia[:3] == (0.002, 0.002, taken)
+    told = [note.text for note in found.notes if note.element == "link 'tool'"]
+    dust = "moments of inertia below 0 by rounding taken as 0"
+    assert (dust in told) == (taken == 0)
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", "not valid XML: no element found"),

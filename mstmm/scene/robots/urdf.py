@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from ...errors import SceneError
 from ...numbers.pose import IN_PLACE, Pose
 from ...numbers.rotations import Matrix, Vector, from_rpy, perpendicular, product, transpose
-from ..rules.inertia import negative_moment
+from ..rules.inertia import negative_moment, without_dust
 from ..rules.messages import near
 from .markup import Element, parsed
 from .robot import FIXED, Joint, Link, Look, Mimic, Note, Robot, color
@@ -90,7 +90,10 @@ class _Reader:
             raise SceneError(
                 f"{inertial.where}: link {name!r}: a mass of {kg:g} kg; expected 0 or more"
             )
-        inertia = _inertia(inertial.first("inertia"))
+        given = _inertia(inertial.first("inertia"))
+        inertia = without_dust(given, kg)
+        if inertia != given:
+            self.note(one, f"link {name!r}", "moments of inertia below 0 by rounding taken as 0")
         turned = product(product(frame.rotation, inertia), transpose(frame.rotation))
         link = Link(name, kg, frame.position, _symmetric(turned), one.where)
         if negative := negative_moment(inertia):
