@@ -78,6 +78,14 @@ class Pair:
         self.ours.append(slots.u)
         self.theirs.append(joint.idx_v)
 
+    def speeds_of_all(self) -> tuple[list[int], list[int]]:
+        """`ours` and `theirs` with those of a base that flies."""
+        flying = [hinge.name for hinge in self.one.scene.hinge if hinge.type == "free"]
+        if not flying:
+            return self.ours, self.theirs
+        first = self.model.layout.hinges[flying[0]].u
+        return [*range(first, first + 6), *self.ours], [*range(6), *self.theirs]
+
     def mass(self) -> Any:
         """Pinocchio's mass matrix."""
         upper = np.triu(pin.crba(self.peer, self.data, self.at))

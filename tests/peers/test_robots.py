@@ -43,6 +43,31 @@ def differences(pair: Pair) -> dict[str, float]:
         "mass matrix": apart(model.mass_matrix(pair.q)[np.ix_(ours, ours)], whole[both]),
         "derivatives": derivatives(pair) / solved if model.nu <= MOST else 0.0,
         "frames": frames(pair),
+        "bias": apart(
+            model.bias(*given)[ours], pin.nonLinearEffects(peer, data, pair.at, pair.speeds)[theirs]
+        ),
+        **moving(pair),
+    }
+
+
+def moving(pair: Pair) -> dict[str, float]:
+    """Motions of the last link by all speeds, their rates, and what holds against gravity."""
+    peer, data, aligned = pair.peer, pair.data, pin.LOCAL_WORLD_ALIGNED
+    ours, theirs = pair.speeds_of_all()
+    gravity = pin.computeGeneralizedGravity(peer, data, pair.at)[theirs]
+    pin.computeJointJacobiansTimeVariation(peer, data, pair.at, pair.speeds)
+    pin.updateFramePlacements(peer, data)
+    name = next(
+        frame.name for frame in reversed(peer.frames)
+        if frame.type == pin.FrameType.BODY and pair.one.links.get(frame.name, "ground") != "ground"
+    )  # fmt: skip
+    frame, of = peer.getFrameId(name), pair.one.links[name]
+    rows = pin.getFrameJacobian(peer, data, frame, aligned)[:, theirs]
+    rates = pin.getFrameJacobianTimeVariation(peer, data, frame, aligned)[:, theirs]
+    return {
+        "gravity": apart(pair.model.gravity_efforts(pair.q)[ours], gravity),
+        "Jacobian": apart(pair.model.jacobian(pair.q, of)[:, ours], rows),
+        "its rate": apart(pair.model.jacobian_rate(pair.q, pair.u, of)[:, ours], rates),
     }
 
 
