@@ -128,3 +128,21 @@ def state_of(case: Case, peer: mujoco.MjModel, q: np.ndarray, u: np.ndarray) -> 
         data.qpos[peer.jnt_qposadr[joint]] = q[ours.q]
         data.qvel[peer.jnt_dofadr[joint]] = u[ours.u]
     return data
+
+
+def pinocchio_state(case: Case, peer: pin.Model, q: np.ndarray, u: np.ndarray) -> Any:
+    """Pinocchio's q and v in our state, and the places of the joints' speeds, ours and theirs."""
+    at, v, ours, theirs = pin.neutral(peer), np.zeros(peer.nv), list[int](), list[int]()
+    if case.base == "free":
+        at[:7] = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    for k in range(1, peer.njoints):
+        slots = case.layout.hinges.get(case.imported.names.get(peer.names[k], ""))
+        if slots is None or peer.nvs[k] != 1:
+            continue
+        angle = q[slots.q]
+        circle = [np.cos(angle), np.sin(angle)]
+        at[peer.idx_qs[k] : peer.idx_qs[k] + peer.nqs[k]] = circle if peer.nqs[k] == 2 else angle
+        v[peer.idx_vs[k]] = u[slots.u]
+        ours.append(slots.u)
+        theirs.append(peer.idx_vs[k])
+    return at, v, (ours, theirs)

@@ -1,4 +1,4 @@
-"""Robots in URDF: accelerations in C, a hundred steps, and from the file to the first answer.
+"""Robots in URDF: accelerations in C, single calls, a hundred steps, from the file to an answer.
 
     python benchmarks/robots/run.py [--quick] [--plot]
 
@@ -7,6 +7,8 @@ of the rounds; code of the scenes is compiled before.
 
 - accelerations: functions in C, every input waiting on the last output, as in an integrator;
   Pinocchio in the better of its two conventions.  The fingers of the panda are held there.
+- single calls from Python on states as NumPy arrays: aba, rnea, crba, computeABADerivatives and
+  computeFrameJacobian of the last link, all with code of the scene compiled.
 - 100 RK4 steps of 1 ms from Python: one `simulate` that gives the end, a session ticked a hundred
   times, and a hundred times mj_step, all from the same state to the same end (`apart`: of joints).
 - file to first: the text of the robot to accelerations at its start, beside
@@ -32,16 +34,23 @@ sys.path.insert(0, str(HERE.parent))
 sys.path.insert(0, str(HERE))
 
 from common import links, measure, mstmm_engines, pinocchio_peer  # noqa: E402
-from robots import ROBOTS, Case, state_of  # noqa: E402
+from robots import ROBOTS, Case, pinocchio_state, state_of  # noqa: E402
 
 import mstmm  # noqa: E402
 
 STEP, STEPS = 1e-3, 100
+#: Calls of one sample.
+CALLS = 200
 #: Fingers of the panda, for the peer's builder in C++ knows no sliding joint.
 HELD = {"panda": ("panda_finger_joint1", "panda_finger_joint2")}
 #: What is asked -> who is beside, the largest ratio allowed.
 BESIDE = {
     "accelerations in C": ("Pinocchio in C++", 1.0),
+    "accelerations": ("pin.aba", 1.0),
+    "inverse_dynamics": ("pin.rnea", 1.0),
+    "mass_matrix": ("pin.crba", 1.0),
+    "derivatives": ("pin.computeABADerivatives", 1.5),
+    "jacobian": ("pin.computeFrameJacobian", None),
     "simulate, 100 steps": ("100 mj_step", 0.5),
     "session, 100 ticks": ("100 mj_step", 0.5),
     "file to first": ("pin.buildModelFromUrdf, aba", 1.0),
@@ -72,6 +81,43 @@ def _whole(tables: Any) -> dict[str, Any]:
     """The tables of a scene with what is 0 by default."""
     bare = {"center_of_mass": (0, 0, 0), "inertia": (0, 0, 0)}
     return {**tables, "body": [{**bare, **body} for body in tables["body"]]}
+
+
+def single(name: str) -> tuple[Work, float]:
+    """Calls from Python, and how far accelerations lie apart."""
+    case = Case(name)
+    model, peer = case.model("fused"), case.pinocchio()
+    data, (q, u) = peer.createData(), case.start()
+    at, v, places = pinocchio_state(case, peer, q, u)
+    push, still, aligned = np.zeros(peer.nv), np.zeros(model.nu), pin.LOCAL_WORLD_ALIGNED
+    link = next(f.name for f in reversed(peer.frames) if f.name in case.imported.links)
+    frame, of = peer.getFrameId(link), case.imported.links[link]
+    calls: dict[str, Callable[[], Any]] = {
+        "accelerations": lambda: model.accelerations(q, u),
+        "pin.aba": lambda: pin.aba(peer, data, at, v, push),
+        "inverse_dynamics": lambda: model.inverse_dynamics(q, u, still),
+        "pin.rnea": lambda: pin.rnea(peer, data, at, v, push),
+        "mass_matrix": lambda: model.mass_matrix(q),
+        "pin.crba": lambda: pin.crba(peer, data, at),
+        "derivatives": lambda: model.derivatives(q, u),
+        "pin.computeABADerivatives": lambda: pin.computeABADerivatives(peer, data, at, v, push),
+        "jacobian": lambda: model.jacobian(q, of),
+        "pin.computeFrameJacobian": lambda: pin.computeFrameJacobian(
+            peer, data, at, frame, aligned
+        ),
+    }
+    for call in calls.values():
+        for _ in range(CALLS):  # code that pays is made at calls whose number doubles
+            call()
+    ours, theirs = calls["accelerations"](), np.array(calls["pin.aba"]())
+    joints = list(zip(*places, strict=True))
+    wanted = max(1.0, *(abs(theirs[b]) for _, b in joints))
+    apart = max(abs(ours[a] - theirs[b]) for a, b in joints) / wanted
+    return {one: partial(_each, call) for one, call in calls.items()}, float(apart)
+
+
+def _each(call: Callable[[], Any]) -> float:
+    return measure.cpu(lambda: [call() for _ in range(CALLS)]) / CALLS
 
 
 def runs(name: str) -> tuple[Work, float]:
@@ -125,7 +171,7 @@ def measured(quick: bool) -> list[dict[str, Any]]:
     """Seconds a call of everybody on every robot."""
     found = []
     for name in ROBOTS:
-        for part in (native, runs, first):
+        for part in (native, single, runs, first):
             work, apart = part(name)
             for one, samples in measure.rounds(work, 3 if quick else 40).items():
                 found.append({"robot": name, "call": one, "s": samples, "apart": apart})
@@ -143,13 +189,15 @@ def table(results: list[dict[str, Any]]) -> str:
         if r["call"] not in BESIDE:
             continue
         beside, asked = BESIDE[r["call"]]
-        peers = [p for p in results if p["robot"] == r["robot"] and p["call"].startswith(beside)]
+        rows = [p for p in results if p["robot"] == r["robot"]]
+        peers = [p for p in rows if p["call"].startswith(beside)]
         best = min(peers, key=lambda p: min(p["s"]))
         least, middle = (f(r["s"]) / f(best["s"]) for f in (min, statistics.median))
         apart = "" if np.isnan(r["apart"]) else f"{r['apart']:.1e}"
+        most = "" if asked is None else f"{asked:g}"
         lines.append(
             f"| {r['robot']} | {r['call']} | {1e6 * min(r['s']):.4g} | {best['call']} | "
-            f"{1e6 * min(best['s']):.4g} | {least:.3g} | {middle:.3g} | {asked:g} | {apart} |"
+            f"{1e6 * min(best['s']):.4g} | {least:.3g} | {middle:.3g} | {most} | {apart} |"
         )
     return "\n".join(lines)
 

@@ -50,7 +50,7 @@ class Moving(Compiled):
 
     def _places(self, q: ArrayLike, of: Names) -> Array:
         alone = row(q, self.nq)
-        if alone is not None and np.isfinite(np.frombuffer(alone)).all():
+        if alone is not None:
             return self._shaped((), of, self._kinematics.at_rest(of, alone))
         lead, (states,) = batch(("q", q, self.nq))
         return self._shaped(lead, of, self._kinematics.still(of, states))
@@ -64,6 +64,10 @@ class Moving(Compiled):
 
     def jacobian(self, q: ArrayLike, of: Names, *, out: Array | None = None) -> Array:
         """J (..., 6, nu) with `velocities` = J u; of the tree, where loops are closed."""
+        alone = row(q, self.nq)
+        if alone is not None:
+            found = self._kinematics.jacobian(of, alone)
+            return into(out, found[0] if isinstance(of, str) else found)
         lead, (states,) = batch(("q", q, self.nq))
         rows = [self._kinematics.jacobian(of, state) for state in states]
         return into(out, self._shaped(lead, of, np.array(rows)))

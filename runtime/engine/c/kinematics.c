@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "finite.h"
 #include "kernel_calls.h"
 #include "sweep_steps.h"
 
@@ -22,6 +23,7 @@ int mstmm_moving_points(const mstmm_kinematics *known, int64_t n, const void *q,
                         mstmm_failure *failure)
 {
     const mstmm_model *model = known->model;
+    if (!mstmm_finite(n * model->nq, q) || !mstmm_finite(n * model->nu, u)) return MSTMM_NO_NUMBER;
     for (int64_t k = 0; k < n; k++) {
         mstmm_state state = state_of(known, (const real *)q + k * model->nq,
                                      (const real *)u + k * model->nu,
@@ -61,6 +63,7 @@ int mstmm_jacobians(const mstmm_kinematics *known, const void *q, int n_probes,
                     const mstmm_probe *probes, real *rows, mstmm_failure *failure)
 {
     const int64_t nu = known->model->nu;
+    if (!mstmm_finite(known->model->nq, q)) return MSTMM_NO_NUMBER;
     mstmm_state state = state_of(known, q, known->none, known->none, failure);
     memset(rows, 0, (size_t)(6 * n_probes * nu) * sizeof(real));
     int code = mstmm_run_motion(&state);

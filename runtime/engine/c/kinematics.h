@@ -14,8 +14,9 @@ typedef struct {
     real *work;       /* nu, written over */
 } mstmm_kinematics;
 
-/* States and accelerations are rows of doubles, as bytes, as in alone.h.  Each function returns 0 or a
- * reason, with `failure` filled. */
+/* States and accelerations are rows of doubles, as bytes, as in alone.h.  Each function returns 0,
+ * MSTMM_NO_NUMBER where one of them is not finite, or a reason, with `failure` filled. */
+#define MSTMM_NO_NUMBER -1
 /* n states one after the other; points: n x n_probes x MSTMM_PROBE_NUMBERS. */
 int mstmm_moving_points(const mstmm_kinematics *known, int64_t n, const void *q, const void *u,
                         const void *udot, int n_probes, const mstmm_probe *probes, real *points,

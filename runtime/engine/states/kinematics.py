@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.arrays import Array, numbers
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.scene import split
 
@@ -42,13 +42,16 @@ class Kinematics:
         self._local = threading.local()
         self._still = np.zeros(engine.nu).tobytes()
         self._bends = bool(engine.packed.layout.modal)
+        lib = engine.lib
+        self._points, self._rows = lib.mstmm_moving_points, lib.mstmm_jacobians
+        self._numbers, self._no_number = int(lib.MSTMM_PROBE_NUMBERS), int(lib.MSTMM_NO_NUMBER)
 
     def points(self, of: Names, n: int, q: Any, u: Any, udot: Any) -> Array:
         """(n, k, 24): motion of k bodies or ends, see `Observation`."""
         probes, count = self._probes(of)
-        found = np.empty((n, count, int(self._engine.lib.MSTMM_PROBE_NUMBERS)))
+        found = np.empty((n, count, self._numbers))
         given = (self._bytes(x) for x in (q, u, udot))
-        self._call("mstmm_moving_points", n, *given, count, probes, self._engine.pointer(found))
+        self._call(self._points, n, *given, count, probes, self._engine.pointer(found))
         return found
 
     def still(self, of: Names, q: Array) -> Array:
@@ -70,7 +73,7 @@ class Kinematics:
             return self._by_units(of, q)
         probes, count = self._probes(of)
         found = np.empty((count, 6, self._engine.nu))
-        self._call("mstmm_jacobians", self._bytes(q), count, probes, self._engine.pointer(found))
+        self._call(self._rows, self._bytes(q), count, probes, self._engine.pointer(found))
         return found
 
     def _by_units(self, of: Names, q: Any) -> Array:
@@ -118,10 +121,12 @@ class Kinematics:
     def _bytes(self, rows: Any) -> Any:
         return rows if isinstance(rows, bytes) else self._engine.pointer(rows)
 
-    def _call(self, name: str, *given: Any) -> None:
+    def _call(self, function: Any, *given: Any) -> None:
         made = self._made()
-        call = getattr(self._engine.lib, name)
-        if call(made.record, *given, made.failure):
+        code = function(made.record, *given, made.failure)
+        if code == self._no_number:  # of one state, which nobody has looked at
+            numbers("q", np.frombuffer(next(x for x in given if isinstance(x, bytes))))
+        if code:
             raise NumericalFailure(self._engine.failure_text(made.failure, 0.0))
 
     def _made(self) -> _Record:
