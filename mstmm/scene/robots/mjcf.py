@@ -83,8 +83,13 @@ class _Reader:
         self._leave_out()
         return Robot(
             "", self._where, tuple(links), tuple(joints), mimics, looks, tuple(self._notes),
-            _vector(self._m.opt.gravity),
+            ZERO if self._off("gravity") else _vector(self._m.opt.gravity),
         )  # fmt: skip
+
+    def _off(self, what: str) -> bool:
+        """Whether a <flag> of the file switches it off."""
+        bit = getattr(self._mujoco.mjtDisableBit, f"mjDSBL_{what.upper()}")
+        return bool(self._m.opt.disableflags & int(bit))
 
     def _tell(self, element: str, text: str) -> None:
         self._notes.append(Note(self._where, element, text))
@@ -159,16 +164,19 @@ class _Reader:
         stop, values = dof + (6, 3, 1, 1)[kind], at + (7, 4, 1, 1)[kind]
         law: dict[str, Any] = {}
         for key, numbers in (("damping", m.dof_damping), ("inertia", m.dof_armature)):
+            if key == "damping" and self._off("damper"):
+                continue
             if (found := [float(x) for x in numbers[dof:stop]]) and any(found):
                 law[key] = found
-        if any(losses := [float(x) for x in m.dof_frictionloss[dof:stop]]):
+        losses = [float(x) for x in m.dof_frictionloss[dof:stop]]
+        if any(losses) and not self._off("frictionloss"):
             law["friction"] = [{"coulomb": x} for x in losses]
-        stiffness = float(m.jnt_stiffness[number].flat[0])
+        stiffness = 0.0 if self._off("spring") else float(m.jnt_stiffness[number].flat[0])
         if stiffness and kind in (_FREE, _BALL):
             self._tell(f"joint {joint!r}", "its spring is left out; give its hinge a law")
         elif stiffness:
             law |= {"stiffness": stiffness, "rest": float(m.qpos_spring[at])}
-        if m.jnt_limited[number]:
+        if m.jnt_limited[number] and not self._off("limit"):
             if kind == _BALL:
                 self._tell(f"joint {joint!r}", "its limit is left out")
             else:

@@ -1,0 +1,107 @@
+"""Robots in MJCF that the package dm_control ships, against MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.metadata import files
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+import mstmm
+from mstmm.scene.robots.convert import Choices, converted
+from mstmm.scene.robots.mjcf import read_mjcf
+from peers.robot_pairs import apart, of_peers
+from peers.test_robots import states
+
+#: Folders of the package with whole robots, and what is no robot by itself.
+FOLDERS = ("suite/", "locomotion/walkers/assets/", "locomotion/soccer/", "third_party/")
+#: What of MuJoCo's forces a scene has not; <flag> in a file may switch off more.
+OFF = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_ACTUATION
+
+
+def published() -> Iterator[Path]:
+    """Files that MuJoCo reads by themselves and in which something moves."""
+    for one in files("dm-control") or ():
+        inside = one.as_posix().removeprefix("dm_control/")
+        if one.suffix != ".xml" or not inside.startswith(FOLDERS):
+            continue
+        path = Path(str(one.locate()))
+        try:
+            model = mujoco.MjModel.from_xml_path(str(path))
+        except ValueError:  # a part of another file
+            continue
+        if model.nv and all(model.joint(k).name for k in range(model.njnt)):
+            yield path
+
+
+def bare(path: Path) -> Any:
+    """MuJoCo's model with the motion of links alone: no tendons, fluids, friction and lifts, and no
+    springs of balls, all of which our scenes are told to lack."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    model.opt.disableflags |= int(OFF)
+    model.opt.density = model.opt.viscosity = 0.0
+    for array in (model.dof_frictionloss, model.body_gravcomp, model.tendon_stiffness,
+                  model.tendon_damping, model.tendon_armature):  # fmt: skip
+        array[:] = 0.0
+    model.jnt_stiffness[model.jnt_type < int(mujoco.mjtJoint.mjJNT_SLIDE)] = 0.0
+    return model
+
+
+def differences(path: Path, rng: np.random.Generator) -> dict[str, float]:
+    """How far ours and MuJoCo's differ, in parts of the largest number."""
+    peer = bare(path)
+    robot = of_peers(read_mjcf(str(path), path.name), "damping", "inertia", "stiffness", "rest")
+    one = converted(robot, Choices())
+    model = mstmm.compile(one.scene)
+    q, u, data, ours, theirs = states(one, model, peer, rng)
+    both, whole = np.ix_(ours, ours), np.zeros((peer.nv, peer.nv))
+    mujoco.mj_fullM(peer, data, whole)
+    found = {
+        "accelerations": apart(model.accelerations(q, u)[ours], data.qacc[theirs]),
+        "mass matrix": apart(model.mass_matrix(q)[both], whole[np.ix_(theirs, theirs)]),
+    }
+    udot, data.qacc[:] = np.zeros(model.nu), 0.0
+    udot[ours] = data.qacc[theirs] = rng.uniform(-1, 1, len(ours))
+    mujoco.mj_inverse(peer, data)
+    found["efforts"] = apart(model.inverse_dynamics(q, u, udot)[ours], data.qfrc_inverse[theirs])
+    for number in range(1, peer.nbody):
+        name = peer.body(number).name
+        of = one.links.get(f"{name}/frame", one.links.get(name, "ground"))
+        if of == "ground":
+            continue
+        rows = np.zeros((6, peer.nv))
+        mujoco.mj_jacBody(peer, data, rows[:3], rows[3:], number)
+        found[f"place of {name}"] = apart(model.positions(q, of), data.xpos[number])
+        found[f"J of {name}"] = apart(model.jacobian(q, of)[:, ours], rows[:, theirs])
+    return found
+
+
+def test_published_robots_move_as_mujoco_has_them() -> None:
+    rng = np.random.default_rng(16)
+    found = {
+        path.relative_to(path.parents[2]).as_posix(): differences(path, rng) for path in published()
+    }
+    assert len(found) >= 25
+    far = {name: one for name, one in found.items() if not max(one.values()) < 1e-11}
+    assert far == {}
+
+
+FLAGS = """<mujoco><option><flag {}/></option><worldbody><body>
+  <joint name="swing" axis="0 1 0" damping="0.3" stiffness="2" springref="0.4"/>
+  <geom type="box" size="0.1 0.2 0.3" mass="2" pos="0.2 0 0.1"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("off", ["gravity", "spring", "damper"])
+def test_what_a_file_switches_off_is_off(off: str, tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    path.write_text(FLAGS.format(f'{off}="disable"'))
+    peer = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(peer)
+    data.qpos[:], data.qvel[:] = 0.3, 0.7
+    mujoco.mj_forward(peer, data)
+    found = mstmm.compile(mstmm.load_scene(path)).accelerations([0.3], [0.7])
+    assert found == pytest.approx(data.qacc, rel=1e-12)
