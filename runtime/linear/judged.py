@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.errors import SceneError
 
 from ..engine.sizes import speed_sizes
 from ..run.system import SceneSystem
-from .matrices import State, matrices
+from .matrices import State
 from .output.outputs import left_out
 
 if TYPE_CHECKING:
@@ -66,17 +66,11 @@ def warnings_of(linear: Equations, found: Modes) -> Iterator[str]:
         yield f"nothing pushes back {some(list(moved))}: motions of frequency 0"
 
 
-def refuse_unrest(linear: Equations) -> None:
-    """SceneError for closed loops at a state that does not last: what accelerations make of rows
-    that turn is not in their linear models."""
-    if linear.mechanism is None:
-        return
-    leaving = accelerating(linear)
-    if leaving and not _balanced(linear, linear.mechanism.ways):
-        raise SceneError(
-            f"a linear model of closed loops is that of a state at rest, and {some(leaving)} "
-            "would accelerate here; leave q out for the equilibrium, or give one"
-        )
+def unrest(linear: Equations) -> bool:
+    """Whether closed loops are at a state that does not last, so that accelerations turn rows."""
+    if linear.mechanism is None or not accelerating(linear):
+        return False
+    return not _balanced(linear, linear.mechanism.ways)
 
 
 def _balanced(linear: Equations, ways: Array) -> bool:
@@ -105,9 +99,16 @@ def accelerating(linear: Equations) -> list[str]:
 
 def _changes(linear: Equations) -> bool:
     """Whether the matrices are others a little further along the motion."""
-    engine, free = linear.model.looped, list(linear.free)
-    here, there = (matrices(engine, state, free) for state in (linear.state, ahead(linear)))
-    return any(apart(getattr(here, x), getattr(there, x)) > SAME for x in "MCK")
+    there = later(linear)
+    return any(apart(getattr(linear, x), getattr(there, x)) > SAME for x in "MCK")
+
+
+def later(linear: Equations) -> Equations:
+    """The equations a little further along the motion."""
+    state, loops = ahead(linear), linear.mechanism
+    loops = None if loops is None else loops.at(state)
+    turning = linear.turning if loops is None else loops.turning
+    return replace(linear, state=state, about=None, mechanism=loops, turning=turning)
 
 
 def ahead(linear: Equations) -> State:

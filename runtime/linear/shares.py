@@ -64,7 +64,7 @@ def strain(linear: Equations, shapes: NDArray[Any]) -> dict[str, Array]:
 def _pressed(linear: Equations, engine: Any) -> Callable[[Array], Array]:
     """K x of a scene, x' = G x + du."""
     pencil = Pencil(engine, linear.state, list(linear.model.free_speeds))
-    turning = linear.turning
+    turning = linear.turning if linear.mechanism is None else None
     if turning is None:
         return pencil.stiffness
     return lambda x: pencil.stiffness(x) - pencil.damping(turning @ x)

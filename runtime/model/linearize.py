@@ -13,9 +13,9 @@ from mstmm.errors import NumericalFailure
 
 from ..engine.sizes import speed_sizes
 from ..linear.channels import GROUND, Channel, inputs_of, pushes_of
-from ..linear.judged import refuse_unrest
+from ..linear.judged import unrest
 from ..linear.linear import Linear
-from ..linear.loops.mechanism import mechanism_at
+from ..linear.loops.mechanism import mechanism_at, moving_at
 from ..linear.matrices import State, matrices
 from ..pack.loops.refusal import refuse_bending
 from ..run.start import initial_state
@@ -64,12 +64,23 @@ class Linearising:
             about = model.slopes.at(t, q, u)
         if about is None:
             state = State(t, q, u, self._accelerations(t, q, u))
-            loops = mechanism_at(model, state)
-            found = Linear(model, state, pushes, others, self._turning(state), mechanism=loops)
-            refuse_unrest(found)
-            return found
+            if model.freedom is not None:
+                return self._of_mechanism(state, pushes, others)
+            return Linear(model, state, pushes, others, self._turning(state))
         turning = None if self._straight or not u.any() else about.G
         return Linear(model, State(t, q, u, about.a), pushes, others, turning, about)
+
+    def _of_mechanism(
+        self, state: State, pushes: tuple[Channel, ...], others: tuple[Channel, ...]
+    ) -> Linear:
+        model = self._model
+        if not state.u.any():
+            found = Linear(model, state, pushes, others, mechanism=mechanism_at(model, state))
+            if not unrest(found):
+                return found
+        loops = moving_at(model, state, self._slopes)
+        turning = None if loops is None else loops.turning
+        return Linear(model, state, pushes, others, turning, mechanism=loops)
 
     @cached_property
     def _inputs(self) -> tuple[Channel, ...]:
@@ -101,8 +112,17 @@ class Linearising:
         model = self._model
         if self._straight or not state.u.any():
             return None
-        found = Differentiation(model, ()).turning(state.q, state.u, state.t)
+        found = self._differentiation.turning(state.q, state.u, state.t)
         return np.asarray(found[np.ix_(model.free_speeds, model.free_speeds)])
+
+    def _slopes(self, state: State) -> dict[str, Array]:
+        """Exact slopes of the accelerations, by the names of `Derivatives`."""
+        of = np.array([[state.t]]), state.q[None], state.u[None], np.zeros((1, self._model.nu))
+        return {name: found[0] for name, found in self._differentiation.at(*of).items()}
+
+    @cached_property
+    def _differentiation(self) -> Differentiation:
+        return Differentiation(self._model, ())
 
 
 def _rest(model: Compiled, t: float) -> Array:

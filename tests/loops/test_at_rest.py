@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import mstmm
-from mstmm.errors import NumericalFailure, SceneError
+from mstmm.errors import NumericalFailure
 
 from .linkages import COUPLER, CRANK, angles, four_bar, rod
 from .test_cuts import compiled
@@ -109,17 +109,6 @@ def test_a_coordinate_alone_resonates_by_name() -> None:
 def test_bodies_alone_carry_a_motion() -> None:
     modes = compiled(on_a_spring(0.9, 1.0)).modes()
     assert set(modes.kinetic()) == {"crank", "coupler", "rocker"}
-
-
-def test_what_moves_a_state_is_named() -> None:
-    model = compiled(on_a_spring(0.9, 1.0))
-    with pytest.raises(SceneError, match=r"end\.angle_rate = .* take u = 0"):
-        model.linearize(u=np.ones(model.nu))
-    scene = on_a_spring(0.9, 1.0)
-    scene["hinge"][1] |= {"drive": "0.9 + 0.1*t", "law": {}}
-    scene["hinge"][1].pop("initial")
-    with pytest.raises((SceneError, NumericalFailure), match='the drive of "foot" moves it'):
-        compiled(scene).linearize()
 
 
 def test_a_saddle_is_told() -> None:

@@ -164,8 +164,6 @@ def test_bricards_ring_comes_to_rest() -> None:
 
 
 REFUSED: dict[str, tuple[Callable[[mstmm.Model], Any], str]] = {
-    "motion": (lambda m: m.linearize(u=m.initial_state()[1] + 1.0), "a state at rest, and this"),
-    "unrest": (lambda m: m.linearize(q=m.initial_state()[0]), "foot.angle would accelerate here"),
     "symbols": (lambda m: m.linearize().symbolic(["crank.mass"]), "linear models of closed loops"),
     "exact": (lambda m: m.linearize().exact_modes(1), "exact: a loop is closed"),
 }

@@ -9,13 +9,12 @@ goes round.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mstmm.errors import SceneError
 
 from ..channels import Channel
-from ..judged import SAME, accelerating, ahead, apart, some
+from ..judged import SAME, accelerating, apart, later, some
 from ..output.outputs import outputs_of, rows_of
 from ..output.seen import Seen
 
@@ -46,15 +45,15 @@ def refuse_unsteady(linear: Equations, pushes: Sequence[Channel], shown: Sequenc
 
 
 def _changing(linear: Equations, pushes: Sequence[Channel], shown: Sequence[Seen]) -> Iterator[str]:
-    later = replace(linear, state=ahead(linear), about=None)
-    if any(apart(getattr(linear, x), getattr(later, x)) > SAME for x in "MCK"):
+    there = later(linear)
+    if any(apart(getattr(linear, x), getattr(there, x)) > SAME for x in "MCK"):
         yield "the matrices"
     yield from accelerating(linear)
     for push in pushes:
-        if apart(linear.pushed([push]), later.pushed([push])) > SAME:
+        if apart(linear.pushed([push]), there.pushed([push])) > SAME:
             yield push.name
     names = [one.name for one in shown]
-    for one, other in zip(shown, outputs_of(later, names), strict=True):
-        here, there = (rows_of(at, [it], ()).orders for at, it in ((linear, one), (later, other)))
-        if any(apart(here[order], there[order]) > SAME for order in here):
+    for one, other in zip(shown, outputs_of(there, names), strict=True):
+        now, then = (rows_of(at, [it], ()).orders for at, it in ((linear, one), (there, other)))
+        if any(apart(now[order], then[order]) > SAME for order in now):
             yield one.name

@@ -1,13 +1,15 @@
-"""A scene with closed loops beside a state at rest: its tree along the motions that loops leave.
+"""A scene with closed loops beside a state: its tree along the motions that loops leave.
 
 Torn open, the scene is a tree with R(q, u, a) the efforts that it needs; the loads of its loops,
 with multipliers lambda, make R + J^T lambda = 0.  Of independent motions x, dq = N x, and
-N^T J^T = 0 wherever the loops are closed, so that the equations are N^T R = 0 and their slopes
+N^T J^T = 0 wherever the loops are closed, so that the equations are N^T R = 0 and their slopes at
+rest
 
     M = N^T R_a N,   C = N^T R_u N,   K = N^T (R_q + d(J^T lambda)/dq) N
 
 with lambda as it stands there: what turning loads add is K of the closed scene, whose tangent has
-the loads of its loops in it, less that of the tree.
+the loads of its loops in it, less that of the tree.  Beside a state that moves or does not last
+C and K come from the slopes of its accelerations (`Motion`).
 
 Where a drive goes by d, all else goes along: dq = N x + n d, x being zero in n, and what it asks
 for are the same slopes along n.
@@ -15,8 +17,8 @@ for are the same slopes along n.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -30,6 +32,10 @@ from ...pack.pack import packed_system
 from ..channels import Channel, columns
 from ..drives import Columns, Moves, coordinate, slopes_along
 from ..matrices import Matrices, State, matrices
+from .motion import Motion, refuse_rows_of_speeds
+
+#: Exact slopes (nu, nu) of the accelerations at a state, by the names of `Derivatives`.
+Slopes = Callable[[State], Mapping[str, Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +47,8 @@ class Mechanism:
         free: places of the speeds of the tree that nobody imposes.
         places: those of the n independent ones, which x are.
         ways: (nu, n) all speeds for a unit of each.
-        turned: (n, n) stiffness of the loads that the loops carry.
+        turned: (n, n) stiffness of the loads that the loops carry, at rest.
+        motion: what speeds do where the state does not rest, from `slopes`.
         model: whose mechanism it is.
     """
 
@@ -51,11 +58,34 @@ class Mechanism:
     places: tuple[int, ...]
     ways: Array
     turned: Array = field(repr=False)
+    motion: Motion | None = field(default=None, repr=False)
+    slopes: Slopes | None = field(default=None, repr=False)
+
+    @property
+    def turning(self) -> Array | None:
+        """(n, n) G of x' = G x + dv; None where x are integrals of the speeds v."""
+        return None if self.motion is None else self.motion.turning
+
+    def at(self, state: State) -> Mechanism | None:
+        """The same motions at another state."""
+        if self.slopes is None:
+            return mechanism_at(self.model, state)
+        return moving_at(self.model, state, self.slopes, self.places)
 
     def matrices(self, engine: Engine, state: State) -> Matrices:
         """Those of the tree, or of it with other elements, along x."""
-        found = _along(engine, state, self.free, self.ways, self.ways)
-        return Matrices(found.M, found.C, found.K + self.turned)
+        found = self._along(engine, state)
+        if self.motion is None:
+            return Matrices(found.M, found.C, found.K + self.turned)
+        whole = self.motion.matrices(found.M)
+        if engine is self.tree:
+            return whole
+        tree = self._along(self.tree, state)  # what the loops carry is the same for both
+        return Matrices(found.M, whole.C + found.C - tree.C, whole.K + found.K - tree.K)
+
+    def _along(self, engine: Engine, state: State) -> Matrices:
+        swept = None if self.motion is None else self.motion.swept
+        return _along(engine, state, self.free, self.ways, self.ways, swept)
 
     def pushed(self, state: State, channels: Sequence[Channel]) -> Array:
         """(n, channels): what a unit of each push does along x, of drives their accelerations."""
@@ -81,7 +111,12 @@ class Mechanism:
 
     def _driving(self, state: State, speed: int) -> Array:
         """n (nu,): all speeds for a unit of one that is imposed.  SceneError where loops do not let
-        it move."""
+        it move, and beside a state that does not rest."""
+        if self.motion is not None:
+            raise SceneError(
+                f'"{coordinate(self.model, speed)}": motions of drives of closed loops are inputs '
+                "beside a state at rest, and this one moves or does not last; leave them out"
+            )
         freedom = self.model.freedom
         assert freedom is not None
         along = freedom.driving(state.q, speed)
@@ -92,56 +127,70 @@ class Mechanism:
             )
         return np.asarray(along - self.ways @ along[list(self.places)])
 
-    def rows(self, state: State, wide: Array, drives: Collection[int]) -> Array:
-        """Rows (k, nu) of what goes with all speeds, as rows of x and of drives in the places of
-        these."""
-        found = np.zeros_like(wide)
-        found[:, self.places] = wide @ self.ways
-        for speed in drives:
-            found[:, speed] = wide @ self._driving(state, speed)
+    def rows(
+        self, state: State, orders: Mapping[int, Array], drives: Collection[int]
+    ) -> dict[int, Array]:
+        """Rows (k, nu) of what goes with all speeds, by powers of s, as rows of x and of drives in
+        the places of these."""
+        found, places = dict[int, Array](), list(self.places)
+        for order, wide in orders.items():
+            rows = found.setdefault(order, np.zeros_like(wide))
+            rows[:, places] += wide @ self.ways
+            for speed in drives:
+                rows[:, speed] += wide @ self._driving(state, speed)
+            for lower, along in () if self.motion is None else self.motion.below(order):
+                found.setdefault(lower, np.zeros_like(wide))[:, places] += wide @ along
         return found
 
 
 def mechanism_at(model: Compiled, state: State) -> Mechanism | None:
     """The mechanism at a state at rest; None for a tree.
 
-    Raises SceneError for a state that moves, NumericalFailure where loops leave no one set of
-    motions.
+    Raises NumericalFailure where loops leave no one set of motions.
     """
     if model.freedom is None:
         return None
-    _refuse_moving(model, state)
-    packed, places = model.packed, model.freedom.chosen(state.q)
-    ways, free = model.freedom.following(state.q, places), model.free_speeds
-    tree = Engine(packed_system(torn(packed.system), packed))
+    found = _mechanism(model, state, model.freedom.chosen(state.q))
+    tree, free, ways = found.tree, found.free, found.ways
     carried = _along(model.looped, state, free, ways, _with_own_still(model, ways)).K
-    alone = _along(tree, state, free, ways, ways).K
-    return Mechanism(model, tree, free, places, ways, carried - alone)
+    return replace(found, turned=carried - _along(tree, state, free, ways, ways).K)
 
 
-def _refuse_moving(model: Compiled, state: State) -> None:
-    free = set(model.free_speeds)
-    moving = [k for k in np.flatnonzero(state.u).tolist() if k in free]
-    if not moving:
-        return
-    driving = [k for k in np.flatnonzero(state.u).tolist() if k not in free]
-    if driving:
-        name = model.layout.u_name(driving[0]).rpartition(".")[0]
-        cause, way = f'the drive of "{name}" moves it', "let the drive stand still there"
-    else:
-        cause = f"{model.layout.u_name(moving[0])} = {state.u[moving[0]]:.4g}"
-        way = "take u = 0, or leave u out"
-    raise SceneError(
-        "a linear model of closed loops is that of a state at rest, and this one moves "
-        f"({cause} at t = {state.t:g} s); {way}"
-    )
+def moving_at(
+    model: Compiled, state: State, slopes: Slopes, places: tuple[int, ...] | None = None
+) -> Mechanism | None:
+    """The mechanism at a state that moves or does not last, along independent speeds in `places`
+    or those that are well chosen there; None for a tree.
+
+    Raises SceneError for rows of speeds and scenes whose accelerations have no slopes,
+    NumericalFailure as `mechanism_at`.
+    """
+    if model.freedom is None:
+        return None
+    refuse_rows_of_speeds(model, state.u)
+    found = _mechanism(model, state, places or model.freedom.chosen(state.q))
+    return replace(found, motion=Motion.of(slopes(state), found.places, found.ways), slopes=slopes)
+
+
+def _mechanism(model: Compiled, state: State, places: tuple[int, ...]) -> Mechanism:
+    """Without what its loads and its motion do."""
+    packed, freedom = model.packed, model.freedom
+    assert freedom is not None
+    ways, n = freedom.following(state.q, places), len(places)
+    tree = Engine(packed_system(torn(packed.system), packed))
+    return Mechanism(model, tree, model.free_speeds, places, ways, np.zeros((n, n)))
 
 
 def _along(
-    engine: Engine, state: State, free: tuple[int, ...], ways: Array, rows: Array
-) -> Matrices:
+    engine: Engine, state: State, free: tuple[int, ...], ways: Array, rows: Array,
+    swept: Array | None = None,
+) -> Matrices:  # fmt: skip
+    """N^T (M, C, K) N, and of speeds that go along with x besides."""
     found, n, left = matrices(engine, state, list(free)), ways[list(free)], rows[list(free)]
-    return Matrices(*(left.T @ matrix @ n for matrix in (found.M, found.C, found.K)))
+    mass, damping, stiffness = (left.T @ matrix @ n for matrix in (found.M, found.C, found.K))
+    if swept is not None:
+        stiffness = stiffness + left.T @ found.C @ swept[list(free)]
+    return Matrices(mass, damping, stiffness)
 
 
 def _with_own_still(model: Compiled, ways: Array) -> Array:

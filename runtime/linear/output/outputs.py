@@ -138,10 +138,7 @@ def rows_of(linear: Equations, outputs: Sequence[Seen], pushes: Sequence[Channel
                 through[k, places[name]] += slope
     if linear.mechanism is not None:
         drives = {speed for one in pushes for speed, _ in one.moves} | {*linear.drives}
-        orders = {
-            order: linear.mechanism.rows(linear.state, wide, drives)
-            for order, wide in orders.items()
-        }
+        orders = linear.mechanism.rows(linear.state, orders, drives)
     return Rows(_with_turning(linear, orders), through)
 
 

@@ -1,0 +1,1 @@
+"""Linear models of closed loops: motions of drives, and states that move."""
