@@ -33,10 +33,9 @@ _TOLERANCE = 1e-10
 
 
 class Linearising:
-    """Makes one model linear, at many states.  SceneError for loops that it cannot follow."""
+    """Makes one model linear, at many states."""
 
     def __init__(self, model: Compiled) -> None:
-        refuse_bending(model.packed, "a linear model")
         self._model = model
         system, layout = model.packed.system, model.layout
         twists = any(law.twist >= 0 for law in system.laws)
@@ -78,6 +77,7 @@ class Linearising:
             found = Linear(model, state, pushes, others, mechanism=mechanism_at(model, state))
             if not unrest(found):
                 return found
+        refuse_bending(model.packed, "a linear model beside a state that does not last")
         loops = moving_at(model, state, self._slopes)
         turning = None if loops is None else loops.turning
         return Linear(model, state, pushes, others, turning, mechanism=loops)
