@@ -15,6 +15,7 @@ import mstmm
 from mstmm.runtime.run.system import SceneSystem
 
 from ..linkages import OBLIQUE, bricard, four_bar, rod
+from ..test_at_rest import five_bar
 from ..test_cuts import LAWS, compiled
 from .test_driven import turned
 
@@ -57,11 +58,18 @@ def between_balls() -> dict[str, Any]:
     }  # fmt: skip
 
 
+def led() -> dict[str, Any]:
+    """A five-bar whose cranks a coupling that goes by time holds together."""
+    together = {"expression": "foot1.q - 0.4*foot0.q^2", "equals": "0.6 + 0.5*t + t^2"}
+    return five_bar({"stiffness": 3.0, "damping": 0.4}) | {"coupling": [together]}
+
+
 MOVING: dict[str, tuple[Callable[[], mstmm.Model], float | list[float]]] = {
     "four-bar": (lambda: compiled(four_bar(laws=LAWS, tilt=OBLIQUE)), 1.7),
     "bricard": (lambda: compiled(ring()), -0.8),
     "on balls": (lambda: compiled(between_balls()), [1.1, -0.7]),
     "driven": (lambda: turned(1.0, 0.9, 0), 0.6),
+    "led": (lambda: compiled(led()), -1.2),
     "at rest": (lambda: compiled(four_bar(laws=LAWS, tilt=OBLIQUE)), 0.0),
 }
 
