@@ -143,10 +143,13 @@ class Closed:
         packed, records = self.engine.packed, calls.records
         names = self._names(calls)
         if rank.stuck and not self._is_led:
+            way = "give what bends there axial shapes too, or let an end of it slide"
+            if not packed.flexible:
+                way = "change a length or the place of a hinge a little, so that they close in"
+                way += " more than this pose"
             raise SceneError(
                 f"scene: {_ending(names[row][0] for row in sorted(rank.here))} in a pose that no "
-                "motion leaves, stretched out or folded in line; change a length or the place of "
-                "a hinge a little, so that they close in more than this pose"
+                f"motion leaves, stretched out or folded in line; {way}"
             )
         met = [row for row in range(calls.count) if not records.yields(row)]
         rows = len(met) - len(rank.here)

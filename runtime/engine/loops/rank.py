@@ -26,8 +26,9 @@ from .stress import not_unique
 
 #: A pivot below this share of the mobility of its row repeats others: misfits up to 4e-3 rad.
 REPEATED = 1e-6
-#: Closed states nearby: how many, and how far (rad, m).
-_NEIGHBOURS, _AWAY = 3, 3e-2
+#: Closed states nearby: how many, how far (rad, m), and how much farther the own coordinates of cut
+#: hinges may go, which only follow.
+_NEIGHBOURS, _AWAY, _FOLLOWING = 3, 3e-2, 10.0
 #: A closed state that is nearer than this part of the way asked for is the pose itself.
 _BACK = 0.1
 #: A row that repeats others here does so there too where its pivot is not this many times larger,
@@ -35,7 +36,7 @@ _BACK = 0.1
 _RAISED, _ROUNDING = 1e2, 1e-12
 #: Most steps to such a state, the gap (m, rad) that is none, the compliance of rows at first, and
 #: by the gap that is left.
-_STEPS, _CLOSED, _GIVE, _SHARE = 60, 1e-9, 1e-6, 1e-2
+_STEPS, _CLOSED, _GIVE, _SHARE = 200, 1e-9, 1e-6, 1e-2
 
 
 @dataclass(frozen=True)
@@ -149,6 +150,9 @@ def _neighbour(calls: LoopCalls, q: Array, speeds: Array) -> Array | None:
         if not length > 1e-9:
             return None
         near = calls.moved(q, tangent * (_AWAY / length))
+        farther = min(_AWAY / max(_way(calls, near - q), _CLOSED), _FOLLOWING)
+        if farther > 1.0:
+            near = calls.moved(q, tangent * (farther * _AWAY / length))
         give = _GIVE
         for _ in range(_STEPS):
             change, missing = calls.correction(calls.gap, near, np.zeros_like(speeds), give)

@@ -106,7 +106,8 @@ class _Expansion:
     # --- references ---------------------------------------------------------------------------
 
     def _references(self) -> Iterator[str]:
-        yield from (cut.body for cut in self.cuts)
+        for cut in self.cuts:
+            yield cut.body if cut.constraint is None else cut.constraint.to
         yield from (hinge.inboard for hinge in self.scene.hinge)
         yield from (chain.inboard for chain in self.scene.chain)
         yield from (load.on for load in self.scene.load)

@@ -101,3 +101,19 @@ def test_what_closes_acts_along_its_row(name: str) -> None:
     kept = [row(one_q[places]) for one_q in run.q]
     assert np.ptp(kept) < 1e-9
     assert run.certificate.energy.relative < 1e-8
+
+
+def test_a_tip_where_nothing_else_is() -> None:
+    """A beam on a pin, its tip on a plane along it: neither moves across it."""
+    rail = {"name": "rail", "type": "point-on-plane", "from": "ground", "to": "b.tip",
+            "normal": [0, 1, 0], "offset": 0.0}  # fmt: skip
+    one = mstmm.compile(mstmm.Scene(
+        gravity=[0, -9.81, 0], constraint=[rail],
+        beam=[{"name": "b", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 9.0,
+               "modes": {"y": 3}}],
+        hinge=[{"name": "foot", "type": "pin", "inboard": "ground", "outboard": "b"}],
+    ))  # fmt: skip
+    assert (one.loops.rank, one.loops.mobility) == (1, 3)
+    run = one.simulate(0.2, rtol=1e-8, output_times=np.linspace(0, 0.2, 5))
+    assert np.abs(run.position("b.tip")[:, 1]).max() < 1e-12
+    assert np.abs(run.q[:, run.model.layout.modal["b"].q_slice]).max() > 1e-3
