@@ -13,14 +13,21 @@ from mstmm.ir.graph import Node
 from mstmm.ir.structure import ClosureStructure
 
 from ..schedule.motion import HINGE_MOTION
-from ..schedule.steps import Run, Sweep
+from ..schedule.steps import Copy, Do, Pass, Run, Sweep
 from ..schedule.sweeps import CORRECTION
 from .replay import Replay
 from .rows import row_subject
 from .state import FusionState
 
 #: Coordinates follow a change along the speeds as they follow speeds.
-_MOVED = Sweep("moved", "Change of the coordinates.", (Run(whole=HINGE_MOTION),))
+_MOVED_ALONG = Pass(
+    "moved", "body", "Change of the coordinates of a hinge and of modes.",
+    (
+        Do(whole=HINGE_MOTION, when="!section"),
+        Copy(to="modes.qdot", source="modes.etad", when="modal"),
+    ),
+)  # fmt: skip
+_MOVED = Sweep("moved", "Change of the coordinates.", (Run(whole=_MOVED_ALONG),))
 
 
 def slips(state: FusionState, inputs: list[Port]) -> KernelIR:

@@ -23,19 +23,24 @@ from .slots import Slots, Subject
 #: Whose entry of L a slot is: fields of the subject.
 _PAIRS = {
     "row.pivot": ("row", "row"), "other.L": ("row", "other"), "second.L": ("row", "second"),
-    "both.L": ("other", "second"), "pair.L": ("row", "other"),
+    "both.L": ("other", "second"), "pair.L": ("row", "other"), "bent_pair.L": ("row", "other"),
 }  # fmt: skip
 #: On which body a slot has a column, and of which row.
 _COLUMNS = {
     "row.K": ("meeting", "row"), "other.K": ("meeting", "other"), "pending.K": ("body", "row"),
     "pending.onward": ("parent", "row"), "side.inner": ("parent", "row"),
     "side.outer": ("outboard", "row"), "own.inner": ("parent", "row"),
-    "own.outer": ("outboard", "row"),
+    "own.outer": ("outboard", "row"), "bent.K": ("body", "row"),
+}  # fmt: skip
+#: What of a row on the modes of the flexible body at hand a slot is, and of which row.
+_ON_MODES = {
+    "pending.modes": ("K_f", "row"), "bent.modes": ("K_f", "row"),
+    "bent_before.modes": ("K_f", "other"), "bent.y": ("Y", "row"),
 }  # fmt: skip
 #: Numbers of one row, by the owner that tells which.
 _OF_ROW = {
     "row": "row", "line": "row", "pending": "row", "own": "row", "coupling": "row",
-    "other": "other", "before": "other",
+    "bent": "row", "other": "other", "before": "other",
 }  # fmt: skip
 
 
@@ -79,9 +84,12 @@ class RowSlots(Slots):
                 yield row_subject(rows, number)
         elif of == "pending":
             yield from (replace(at, row=number) for number in self.body.pending)
-        elif of == "before":
-            up_to = self.body.pending.index(at.row) + 1
-            yield from (replace(at, other=number) for number in self.body.pending[:up_to])
+        elif of == "bent":
+            yield from (replace(at, row=number) for number in self.body.bent)
+        elif of in ("before", "bent_before"):
+            passing = self.body.pending if of == "before" else self.body.bent
+            up_to = passing.index(at.row) + 1
+            yield from (replace(at, other=number) for number in passing[:up_to])
         elif of == "others":
             yield from (replace(at, other=number) for number in self.row().others)
         elif of == "own":
@@ -105,6 +113,9 @@ class RowSlots(Slots):
         if slot in _COLUMNS:
             role, whose = _COLUMNS[slot]
             return "K", at.roles[role], getattr(at, whose)
+        if slot in _ON_MODES:
+            name, whose = _ON_MODES[slot]
+            return name, self.frame, getattr(at, whose)
         owner, _, name = slot.partition(".")
         if owner in _OF_ROW:
             body = self.index if name in ("y", "z", "tau") else None
@@ -119,6 +130,8 @@ class RowSlots(Slots):
             return f.entries(self.row().floor) or f.zeros(1)
         if slot in _COLUMNS:
             return f.zeros(6)
+        if slot in _ON_MODES:
+            return f.zeros(self.modal.n)
         if slot.partition(".")[0] in _OF_ROW:
             return f.zeros(1)
         return super()._given(slot)

@@ -292,6 +292,10 @@ def _pushed(when: str, load: str, effort: str, rest: str, onward: str) -> tuple[
     )  # fmt: skip
 
 
+#: A column at an end of a flexible body is felt by its modes.
+_FELT_BY_MODES = call("modal.row_felt", when="outward", H="section.H", K="pending.K",
+                      K_f="pending.modes")  # fmt: skip
+
 _ALONE = only(
     "!staged",
     call("generic{free}.factor", fails="undetermined", **BODY, H="hinge.H_free",
@@ -301,8 +305,7 @@ _ALONE = only(
     Each(
         of="pending",
         steps=(
-            call("modal.row_felt", when="outward", H="section.H", K="pending.K",
-                 K_f="pending.modes"),
+            _FELT_BY_MODES,
             *_pushed("!coupled", "pending.K", "zero", "pending.y", "pending.onward"),
             *only(
                 "coupled",
@@ -325,6 +328,7 @@ _BY_STAGES = only(
     Each(
         of="pending",
         steps=(
+            _FELT_BY_MODES,
             *reached("pending.K"),
             *only(
                 "!coupled", _felt("local.e", "zero", "pending.y"), *eliminated("zero", "pending.z")

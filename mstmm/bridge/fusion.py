@@ -369,8 +369,6 @@ def _obstacle(packed: Packed, most: int) -> str:
         return "the sweep as least squares is looped"
     if packed.model.refines:
         return "heavy bodies behind light ones cost digits, which refinement mends: it is looped"
-    if packed.system.closes and packed.flexible:
-        return "loops through flexible bodies are looped"
     hinges = (packed.elements[body.hinge] for body in packed.system.distinct)
     if any(hinge.tape is not None and hinge.spec is None for hinge in hinges):
         return "a hinge is interpreted because it was generated without a compiler"
@@ -379,7 +377,7 @@ def _obstacle(packed: Packed, most: int) -> str:
 
 def _too_wide(structure: Structure, most: int) -> str:
     """Why code of closed loops would be too long; empty if it would not."""
-    rows = sum(len(body.pending) ** 2 for body in structure.bodies)
+    rows = sum(len(body.pending) ** 2 + len(body.bent) ** 2 for body in structure.bodies)
     size = len(structure.bodies) + rows // _ROWS_PER_BODY
     if size <= most:
         return ""

@@ -68,7 +68,7 @@ class BodyStructure:
     link: instead of both, cosine, sine and shift of a screw about x, then the constant angle and
     shift of the hinge's own screw about z; empty where the connection is none.
     `imposed[k]` marks a driven speed; `rotor` is the reflected inertia per speed.  `pending` are
-    the rows of closed loops that are open across the hinge.
+    the rows of closed loops that are open across the hinge, `bent` those that pass its own modes.
     """
 
     parent: int
@@ -89,6 +89,7 @@ class BodyStructure:
     section: SectionStructure | None = None
     idle: bool = False  #: an end that nothing hangs on or acts on
     pending: tuple[int, ...] = ()
+    bent: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

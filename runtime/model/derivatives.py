@@ -23,7 +23,6 @@ from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.live import LiveInputs
 from ..engine.tangents import Tangents
-from ..pack.loops.refusal import refuse_bending
 from ..pack.slopes import slopes
 from ..pack.structure import structure_of
 
@@ -74,7 +73,6 @@ class Differentiation:
         self._model = model
         self.names = tuple(names)
         known = model.known or {}
-        refuse_bending(model.packed, "exact derivatives")
         _refuse(model)
         if names:
             structure, self.p, self.slopes = slopes(model.scene, known, names, model.packed)

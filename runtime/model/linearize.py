@@ -17,7 +17,6 @@ from ..linear.judged import unrest
 from ..linear.linear import Linear
 from ..linear.loops.mechanism import mechanism_at, moving_at
 from ..linear.matrices import State, matrices
-from ..pack.loops.refusal import refuse_bending
 from ..run.start import initial_state
 from ..run.system import SceneSystem
 from .derivatives import Differentiation

@@ -16,7 +16,8 @@ from mstmm.ir.structure import (
 )
 
 from ..system import ClosureNumbers, CouplingNumbers, System
-from .rows import RowPlan, planned, row_groups
+from .bent import BentPlan
+from .rows import row_groups
 
 
 class Sort(Protocol):
@@ -34,8 +35,7 @@ def with_loops(
     """The bodies with the rows that are open across their hinges, closures in the order of their
     frames, rows, and couplings.  `floors` go by row; without them a pivot counts that is more than
     zero."""
-    groups = row_groups([body.parent for body in bodies], system)
-    plan = planned([body.parent for body in bodies], groups)
+    plan = BentPlan(system, row_groups([body.parent for body in bodies], system))
     soft: dict[int, Entries] = {}
     closures = [
         _closure(one, plan.of[group], bodies[one.frame], sort, soft)
@@ -75,11 +75,12 @@ def _coupling(
     return CouplingStructure(row, one.first, unasked, kept, tuple(columns))
 
 
-def _pending(bodies: Sequence[BodyStructure], plan: RowPlan) -> tuple[BodyStructure, ...]:
-    return tuple(
-        replace(body, pending=tuple(plan.pending[place])) if place in plan.pending else body
-        for place, body in enumerate(bodies)
-    )
+def _pending(bodies: Sequence[BodyStructure], plan: BentPlan) -> tuple[BodyStructure, ...]:
+    def passing(place: int, body: BodyStructure) -> BodyStructure:
+        pending, bent = plan.pending.get(place, ()), plan.bent.get(place, ())
+        return replace(body, pending=tuple(pending), bent=tuple(bent)) if pending or bent else body
+
+    return tuple(passing(place, body) for place, body in enumerate(bodies))
 
 
 def _closure(

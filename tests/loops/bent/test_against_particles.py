@@ -16,7 +16,7 @@ import mstmm
 Scene = dict[str, Any]
 
 
-def _closed(scene: Scene, seed: int) -> tuple[Scene, Array, Array, tuple[str, str]]:
+def closed(scene: Scene, seed: int) -> tuple[Scene, Array, Array, tuple[str, str]]:
     """The scene with a ball that closes it where its ends are now, the state at which it is closed,
     and the two ends that meet.
 
@@ -73,7 +73,7 @@ def test_chains_of_flexible_bodies(seed: int) -> None:
     """
     print(f"random_beams seed = {seed}")
     tree = random_beams.random_system(seed, most=3, chain=True)
-    scene, q, u, meeting = _closed(tree, seed)
+    scene, q, u, meeting = closed(tree, seed)
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     slots = model.layout.hinges["wrist"]
     whole_q, whole_u = np.insert(q, [slots.q] * 4, 0.0), np.insert(u, [slots.u] * 3, 0.0)

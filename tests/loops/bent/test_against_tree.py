@@ -251,12 +251,8 @@ def test_implicit_methods_keep_their_order(method: str, order: int, step: float)
 def test_what_is_refused() -> None:
     scene = slider_crank()
     model = mstmm.compile(mstmm.Scene(**scene))
-    for asked in (
-        lambda: model.simulate(0.1, method="genalpha-index3", step=1e-3),
-        lambda: model.derivatives(*model.initial_state()),
-    ):
-        with pytest.raises(SceneError, match="with flexible bodies cannot follow that yet"):
-            asked()
+    with pytest.raises(SceneError, match="with flexible bodies cannot follow that yet"):
+        model.simulate(0.1, method="genalpha-index3", step=1e-3)
     with pytest.raises(SceneError, match='hold: there is no hinge "bar"'):
         model.assemble(hold=["bar"])
     static = slider_crank()
