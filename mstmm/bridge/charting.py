@@ -59,11 +59,12 @@ def chart(
     is stated, and points below three times that are marked.  A fixed step of which `simulate` says
     that it is too long is never recommended; what else runs warn of goes with their points.
 
+    Where loops are closed, methods that do not follow them are left out, with the reason.
+
     Raises SceneError for arguments that make no sense, NumericalFailure where no reference is found
     within its part of the budget.
     """
     from ..runtime.chart.charting import charted, request
-    from ..runtime.pack.loops.refusal import INSTEAD, refuse
 
     asked = request(t_end, quantities, methods, models, error, budget, samples, rounds)
 
@@ -78,7 +79,6 @@ def chart(
         model = scene
     else:
         raise SceneError(f"scene = {scene!r:.60}: expected a Scene, or a Model of one")
-    refuse(model.packed, "a chart", INSTEAD)
     return charted(model, asked, compiled, title, progress or _quiet, state or _quiet)
 
 

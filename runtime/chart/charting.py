@@ -200,7 +200,7 @@ class _Charting:
         if self.asked.models and not others:
             self.left_out.append(LeftOut("", "", "", _NO_MODELS, True))
         models.append((reference.model, top, None))
-        self.levels.append(Level(reference.model, reference.error, top.nu, top.engine))
+        self.levels.append(Level(reference.model, reference.error, _freedom(top), top.engine))
         return [
             curve(method, level, model, self.asked.t_end, reference.floor, own)
             for method in self.asked.methods
@@ -227,7 +227,7 @@ class _Charting:
             why = f"no error of its own was found: {own}"
             self.left_out.append(LeftOut("", variant.name, "", why, False))
         known = None if isinstance(own, str) else own
-        self.levels.append(Level(variant.name, known, model.nu, model.engine))
+        self.levels.append(Level(variant.name, known, _freedom(model), model.engine))
         return model, known
 
     def _converged(self, model: Model, level: str, best: Converged, measure: Measure) -> Trial:
@@ -243,6 +243,11 @@ class _Charting:
         tight = replace(best.run.setting, model=level)
         tighter = self.runs.trial(model, tight, measure, limit)
         return run if tighter.numbers is None else tighter
+
+
+def _freedom(model: Model) -> int:
+    """Its speeds, of a mechanism those that its loops leave."""
+    return model.nu if model.closed is None else model.closed.loops.mobility
 
 
 def _still(q: Array) -> bool:

@@ -22,14 +22,14 @@ def pendulum() -> mstmm.Scene:
     return mstmm.Scene(gravity=[0, -GRAVITY, 0], body=[body], hinge=[pin])
 
 
-def swing(t: NDArray[np.float64]) -> NDArray[np.float64]:
+def swing(t: NDArray[np.float64], amplitude: float = AMPLITUDE) -> NDArray[np.float64]:
     """The pendulum's angle from where it hangs, rad, by Jacobi's elliptic functions.
 
     After a release at rest sin(angle / 2) = k sn(K - w t) with k = sin(amplitude / 2), w^2 = g / l
     (E. T. Whittaker, A Treatise on the Analytical Dynamics of Particles and Rigid Bodies, 1937,
     section 44).
     """
-    k = np.sin(AMPLITUDE / 2)
+    k = np.sin(amplitude / 2)
     sn = ellipj(ellipk(k**2) - np.sqrt(GRAVITY / LENGTH) * t, k**2)[0]
     return np.asarray(2 * np.arcsin(k * sn))
 
