@@ -76,7 +76,6 @@ class Linearising:
             found = Linear(model, state, pushes, others, mechanism=mechanism_at(model, state))
             if not unrest(found):
                 return found
-        refuse_bending(model.packed, "a linear model beside a state that does not last")
         loops = moving_at(model, state, self._slopes)
         turning = None if loops is None else loops.turning
         return Linear(model, state, pushes, others, turning, mechanism=loops)

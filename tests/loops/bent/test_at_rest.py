@@ -72,9 +72,3 @@ def test_matrices_are_slopes_of_accelerations(make: Any) -> None:
         x = np.linalg.solve(s**2 * linear.M + s * linear.C + stiff, linear.V)
         wanted = c[:, :n] @ x + c[:, n:] @ (s * x)
         assert np.abs(found.values[k] - wanted).max() < 1e-9 * np.abs(wanted).max()
-
-
-def test_motions_are_refused() -> None:
-    model = mstmm.compile(mstmm.Scene(**slider_crank()))
-    with pytest.raises(mstmm.SceneError, match="a state that does not last with flexible bodies"):
-        model.linearize(*model.initial_state())

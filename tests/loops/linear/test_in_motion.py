@@ -14,12 +14,13 @@ from reference.jets import Array
 import mstmm
 from mstmm.runtime.run.system import SceneSystem
 
+from ..bent.test_against_tree import shackled, slider_crank
 from ..linkages import OBLIQUE, bricard, four_bar, rod
 from ..test_at_rest import five_bar
 from ..test_cuts import LAWS, compiled
 from .test_driven import turned
 
-STEP, G = 1e-4, 9.81
+STEP, G = 5e-5, 9.81
 #: The governor's arms (m, kg, kg m2 about their axes), sleeve (kg), and what else turns (kg m2).
 ARM, MASS, THIN, SLEEVE, SHAFT = 0.3, 0.4, 2e-4, 1.5, 0.02
 
@@ -70,6 +71,8 @@ MOVING: dict[str, tuple[Callable[[], mstmm.Model], float | list[float]]] = {
     "on balls": (lambda: compiled(between_balls()), [1.1, -0.7]),
     "driven": (lambda: turned(1.0, 0.9, 0), 0.6),
     "led": (lambda: compiled(led()), -1.2),
+    "a bent rod": (lambda: mstmm.compile(mstmm.Scene(**slider_crank())), [0.8] + [0.0] * 20),
+    "bent and shackled": (lambda: mstmm.compile(mstmm.Scene(**shackled())), 0.3),
     "at rest": (lambda: compiled(four_bar(laws=LAWS, tilt=OBLIQUE)), 0.0),
 }
 
@@ -84,7 +87,7 @@ def test_slopes_along_closed_motions(scene: str) -> None:
     freedom = model.freedom
     assert freedom is not None
     places = list(freedom.chosen(q))
-    u = u + freedom.following(q, places) @ (np.broadcast_to(speeds, len(places)) - u[places])
+    u = u + freedom.following(q, places) @ (np.resize(speeds, len(places)) - u[places])
 
     def closed(q: Array) -> tuple[Array, Array]:
         """A state next to q and u in which they fit."""
