@@ -1,0 +1,152 @@
+"""What a model answers as a linear one: motions, responses, and where they become unstable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
+
+from mstmm.arrays import one, one_row, real
+
+from .at_states import AtStates
+
+if TYPE_CHECKING:
+    from ..linear.harmonic.counted import ExactModes
+    from ..linear.harmonic.exact import Chosen
+    from ..linear.harmonic.losses import Losses
+    from ..linear.harmonic.prescribed import Ratios
+    from ..linear.linear import Linear
+    from ..linear.locus import Critical, Locus
+    from ..linear.motions import Modes
+    from ..linear.response import FrequencyResponse
+    from ..linear.waterfall import Waterfall
+    from .linearize import Linearising
+
+
+class Linearised(AtStates):
+    """A compiled scene that is asked for small motions; see `Model`."""
+
+    def linearize(
+        self,
+        q: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        t: float = 0.0,
+        *,
+        inputs: Sequence[str] | None = None,
+        disturbances: Sequence[str] | None = None,
+    ) -> Linear:
+        """M x'' + C x' + K x = V v + W w near a state: at rest where nothing is given, else near
+        `q` (nq,) and `u` (nu,; 0, or the scene's start q where only u is given) at time t (s).
+
+        `inputs` name v and `disturbances` w: efforts of hinges and springs ("shoulder.effort"),
+        forces and moments at ends in inertial axes ("boom.tip.force.x", "boom.tip.mz"),
+        accelerations of the ground ("ground.acceleration.y"; all three are w where nothing is
+        named), inputs of the scene that nothing is driven by (all are v where nothing is named).
+        Coordinates that a drive imposes are left out; the others move along with it.  Exact, no
+        differences.
+
+        Raises SceneError for a name or shape that does not fit, NumericalFailure where there is no
+        equilibrium near the scene's start or the state has no accelerations.
+        """
+        instead = "call linearize for each of several"
+        return self._linearising(
+            None if q is None else one("q", q, self.nq, instead),
+            None if u is None else one("u", u, self.nu, instead),
+            real("t", t, "a time in s"), inputs, disturbances,
+        )  # fmt: skip
+
+    @cached_property
+    def _linearising(self) -> Linearising:
+        from .linearize import Linearising
+
+        return Linearising(self)
+
+    def modes(
+        self,
+        count: int | None = None,
+        q: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        t: float = 0.0,
+        *,
+        damped: bool | None = None,
+    ) -> Modes:
+        """Natural motions near a state, as `linearize` takes it: all, or the `count` slowest.
+
+        With damping and gyroscopic loads where there are any; `damped` False leaves them out.  See
+        `Linear.modes`.
+        """
+        return self.linearize(q, u, t).modes(count, damped)
+
+    def exact_modes(
+        self,
+        count: int,
+        exact: Chosen = True,
+        q: ArrayLike | None = None,
+        t: float = 0.0,
+    ) -> ExactModes:
+        """The `count` slowest undamped natural motions at rest with exact beams, all of them or
+        those named.  See `Linear.exact_modes`."""
+        return self.linearize(q, None, t).exact_modes(count, exact)
+
+    def frequency_response(
+        self,
+        omega: ArrayLike,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+        q: ArrayLike | None = None,
+        t: float = 0.0,
+        *,
+        structural: Losses = 0.0,
+        modal: Ratios = 0.0,
+        exact: Chosen = False,
+    ) -> FrequencyResponse:
+        """Amplitudes of outputs under harmonic inputs at omega (k,) in rad/s, near rest at `q`, or
+        at the equilibrium.  See `Linear.frequency_response`; without `inputs` those of the
+        scene push, else the ground moves."""
+        return self.linearize(q, None, t).frequency_response(
+            omega, inputs, outputs, structural=structural, modal=modal, exact=exact
+        )
+
+    def locus(
+        self,
+        parameter: str,
+        values: ArrayLike,
+        count: int | None = None,
+        *,
+        damped: bool | None = None,
+    ) -> Locus:
+        """Natural motions at rest over a number of the scene, named as in `with_parameters`: its
+        root locus, or Campbell's diagram where it is a spin ("constants.spin" in a drive).
+
+        Raises SceneError for an unknown name or values (m,) that make no sense, NumericalFailure
+        where there is no equilibrium.
+        """
+        from ..linear.locus import traced
+
+        points = one_row("values", values)
+        return traced(self._linear_at(parameter), parameter, points, count, damped)
+
+    def waterfall(
+        self, parameter: str, values: ArrayLike, omega: ArrayLike, input: str, output: str
+    ) -> Waterfall:
+        """`frequency_response` of one output under one input over a number of the scene too."""
+        from ..linear.waterfall import waterfall
+
+        points = one_row("values", values)
+        return waterfall(self._linear_at(parameter), parameter, points, omega, (input, output))
+
+    def critical(self, parameter: str, stable: float, unstable: float) -> Critical:
+        """Where between two values of a number of the scene a motion near rest begins to grow: the
+        buckling load, the speed of flutter.  By bisection; of several places one is found.
+
+        Raises SceneError for an unknown name, or ends that are not stable and unstable.
+        """
+        from ..linear.locus import critical
+
+        ends = real("stable", stable), real("unstable", unstable)
+        return critical(self._linear_at(parameter), parameter, *ends)
+
+    def _linear_at(self, parameter: str) -> Callable[[float], Linear]:
+        return lambda value: self.with_parameters({parameter: value}).linearize(disturbances=())
