@@ -117,7 +117,7 @@ def _relation(statement: HingeStatement, body: sp.MatrixSymbol) -> tuple[Equatio
     right = Matrix(sp.zeros(freedoms, n - 1).row_join(effort))
     return (
         Equation("carried state", sp.MatrixSymbol("E", n, n), carry, "", "z_O at zero alpha"),
-        Equation("free directions", sp.MatrixSymbol("G", n, freedoms), free, "", "dz_O / dalpha"),
+        Equation("free directions", sp.MatrixSymbol("G", n, freedoms), free, "", "d z_O / d alpha"),
         Equation(
             "next hinge's condition", sp.MatrixSymbol("L", freedoms, first), rows,
             "", "rows on (m, q) at the output end of the outboard body",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from .layout import Fence, Fraction, Name, Node, Raised, Root, Row, Sign, Word
@@ -46,13 +46,25 @@ class PaperLine:
     right: Node
 
 
-def paper_lines(line: Node) -> list[PaperLine]:
-    """An equation, or words between equations, in lines that fit the page."""
+def paper_lines(lines: Sequence[Node]) -> Iterator[PaperLine]:
+    """Equations, and words between them, in lines that fit the page; all begin behind the widest
+    left side."""
+    sides = [_sides(line) for line in lines]
+    room = PAGE - max((width(left) + _SPACED for left, _ in sides if left), default=0.0)
+    for left, right in sides:
+        if left is None:
+            yield PaperLine(None, right)
+            continue
+        first, *more = broken(right, room)
+        yield PaperLine(left, first)
+        yield from (PaperLine(None, part) for part in more)
+
+
+def _sides(line: Node) -> tuple[Node | None, Node]:
+    """Left and right of =; no left side of what is no equation."""
     if not isinstance(line, Row) or len(line.items) < 3 or line.items[1] != Sign("=", True):
-        return [PaperLine(None, line)]
-    left, _, *rest = line.items
-    first, *more = broken(Row(tuple(rest)), PAGE - width(left) - _SPACED)
-    return [PaperLine(left, first), *(PaperLine(None, part) for part in more)]
+        return None, line
+    return line.items[0], Row(line.items[2:])
 
 
 def broken(node: Node, room: float) -> list[Node]:
@@ -78,7 +90,7 @@ def _pieces(node: Row, room: float) -> Iterator[list[Node]]:
     """Parts of a row that stay together; each but the first begins with a sign."""
     piece: list[Node] = []
     for atom in _atoms(node, room):
-        if isinstance(atom, Sign) and atom.spaced and atom.text not in "=,":
+        if isinstance(atom, Sign) and (atom.text == "/" or (atom.spaced and atom.text not in "=,")):
             yield piece
             piece = []
         piece.append(atom)

@@ -211,7 +211,7 @@ def _parting(word: str) -> str:
 def _latex_formula(item: Formula) -> str:
     head = _in_latex(item.name) + (f" {escaped(item.source)}" if item.source else "")
     tail = f" --- {_in_latex(item.remark)}" if item.remark else ""
-    rows = " \\\\\n".join(_aligned(part) for line in item.lines for part in paper_lines(line))
+    rows = " \\\\\n".join(map(_aligned, paper_lines(item.lines)))
     said = f"{{\\raggedright\\noindent {head}{tail}\\par}}\n" if head + tail else ""
     return f"{said}\\begin{{align*}}\n{rows}\n\\end{{align*}}"
 
@@ -245,8 +245,9 @@ def _html_item(item: Item) -> str:
         return f'<div class="wide">{table}</div>'
     if isinstance(item, Code):
         return f"<pre><code>{escape(item.text)}</code></pre>"
-    parts = (part for line in item.lines for part in paper_lines(line))
-    lines = "\n".join(f'<div class="formula">{mathml(_html_line(part))}</div>' for part in parts)
+    lines = "\n".join(
+        f'<div class="formula">{mathml(_html_line(part))}</div>' for part in paper_lines(item.lines)
+    )
     remark = f" — {_in_html(item.remark)}" if item.remark else ""
     source = f'<span class="source">{escape(item.source)}</span>' if item.source else ""
     caption = f"<figcaption><span>{_in_html(item.name)}{remark}</span>{source}</figcaption>"

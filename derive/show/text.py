@@ -94,6 +94,8 @@ def _grouped(node: Node) -> Box:
 
 
 def _plain(node: Node) -> bool:
+    if isinstance(node, Row) and len(node.items) == 2:  # a function of something
+        return isinstance(node.items[0], Word) and isinstance(node.items[1], Fence)
     return isinstance(node, (Name, Word, Fence, Raised, Root))
 
 

@@ -34,7 +34,6 @@ from .closed import ClosedEquations, Motion, closed
 from .drawing import path, tree
 
 if TYPE_CHECKING:
-    from ..derive.catalogue.registry import Element
     from ..runtime.model.model import Model
 
 
@@ -162,10 +161,12 @@ def _items(
 def _closed(found: ClosedEquations, measure: Columns) -> list[Item]:
     free = [found.speeds[k] for k in found.free]
     rates = sp.Matrix([sp.Symbol(f"udot{str(one.symbol)[1:]}") for one in free])
+    names = tuple(str(one.symbol).partition("_")[2] for one in free)
     n = len(free)
     m, h, tau, u = (sp.MatrixSymbol(name, n, k) for name, k in
                     (("M", n), ("h", 1), ("tau", 1), ("udot", 1)))  # fmt: skip
-    rows = [_row(one) for one in (*found.coordinates, *found.speeds)]
+    rows = [*(_row(one, "coordinate") for one in found.coordinates),
+            *(_row(one, "speed") for one in found.speeds)]  # fmt: skip
     kept = [QuantityRow(layout(s), name, "1", "", "") for name, s in
             (*found.parameters.items(), *found.inputs.items())]  # fmt: skip
     return [
@@ -173,7 +174,7 @@ def _closed(found: ClosedEquations, measure: Columns) -> list[Item]:
         Formula("equations of motion", tuple(stated(m * u + h, tau, measure=measure))),
         Formula("accelerations", tuple(stated(u, rates, measure=measure))),
         Formula("mass matrix", tuple(stated(m, found.M, measure=measure))),
-        Formula("inertia, gravity, laws and loads", tuple(stated(h, found.h, measure=measure))),
+        Formula("inertia, gravity, laws and loads", tuple(stated(h, found.h, names, measure))),
         Paragraph(
             "tau are efforts on the speeds beyond those of the laws. Numbers of the scene that are "
             "not kept as symbols stand as they are."
@@ -181,5 +182,7 @@ def _closed(found: ClosedEquations, measure: Columns) -> list[Item]:
     ]
 
 
-def _row(one: Motion) -> QuantityRow:
-    return QuantityRow(layout(one.symbol), one.name, "1", one.unit, "")
+def _row(one: Motion, what: str) -> QuantityRow:
+    return QuantityRow(
+        layout(one.symbol), one.name, "1", one.unit, f"{what} of {one.name.rpartition('.')[0]}"
+    )

@@ -164,7 +164,7 @@ def _elimination(hinge: FlexibleHinge) -> tuple[Equation, ...]:
     )
     return (
         Equation("carried state", e, carry, "", "z_O at x = 0"),
-        Equation("free unknowns", g, free, "", "dz_O / dx, x = [own freedom; eta_O]"),
+        Equation("free unknowns", g, free, "", "d z_O / d x, x = [own freedom; eta_O]"),
         Equation("conditions", rows, _conditions(hinge), "", "V z_O = 0"),
         Equation("gain", gain, Solve(rows * g, rows * e), "", "x = -K z_I"),
         Equation("transfer matrix", whole, e - g * gain, hinge.equation),
