@@ -10,6 +10,7 @@ from typing import Any, TypeAlias, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arguments import short
 from .errors import SceneError
 
 Array: TypeAlias = NDArray[np.float64]
@@ -24,7 +25,7 @@ def real(name: str, value: Any, expected: str = "a finite number") -> float:
         return value
     number = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
     if isinstance(number, bool | np.bool_) or not isinstance(number, Real):
-        raise SceneError(f"{name} = {_short(value)}: expected {expected}")
+        raise SceneError(f"{name} = {short(value)}: expected {expected}")
     try:
         found = float(number)
     except OverflowError:  # a whole number beyond all floats, which may not even have a text
@@ -37,7 +38,7 @@ def real(name: str, value: Any, expected: str = "a finite number") -> float:
 def whole(name: str, value: Any, least: int, expected: str) -> int:
     """A whole number from `least` up."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, Integral) or value < least:
-        raise SceneError(f"{name} = {_short(value)}: expected {expected}")
+        raise SceneError(f"{name} = {short(value)}: expected {expected}")
     return int(value)
 
 
@@ -48,18 +49,13 @@ def threads_of(value: int | None) -> int | None:
     return whole("threads", value, 1, "a whole number from 1 up, or None")
 
 
-def _short(value: Any) -> str:
-    shown = " ".join(repr(value).split())
-    return shown if len(shown) <= 60 else f"{shown[:57]}..."
-
-
 def numbers(name: str, value: ArrayLike) -> Array:
     """A new contiguous array of finite numbers; SceneError for anything else."""
     try:
         array = value.copy() if _ready(value) else _converted(value)
     except (TypeError, ValueError, OverflowError):
         raise SceneError(
-            f"{name} = {_short(value)}: expected an array of real numbers, every row as long"
+            f"{name} = {short(value)}: expected an array of real numbers, every row as long"
         ) from None
     if not _surely_finite(array) and not np.isfinite(array).all():
         if array.ndim == 0:
@@ -99,10 +95,10 @@ def one_row(name: str, value: ArrayLike) -> Array:
     return found
 
 
-def by_name(name: str, value: Any) -> dict[str, Any]:
+def by_name(name: str, value: Any, what: str = "numbers") -> dict[str, Any]:
     """A table of values by their names, not yet looked into."""
     if not isinstance(value, Mapping):
-        raise SceneError(f"{name}: expected numbers by their names, found {_short(value)}")
+        raise SceneError(f"{name}: expected {what} by their names, found {short(value)}")
     return {str(key): entry for key, entry in value.items()}
 
 
@@ -111,7 +107,7 @@ def pair(name: str, value: Any) -> tuple[ArrayLike, ArrayLike]:
     try:
         q, u = value
     except (TypeError, ValueError):
-        raise SceneError(f"{name}: expected two arrays (q, u), found {_short(value)}") from None
+        raise SceneError(f"{name}: expected two arrays (q, u), found {short(value)}") from None
     return q, u
 
 

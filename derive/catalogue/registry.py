@@ -11,6 +11,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
 
+from mstmm.arguments import path_of
 from mstmm.errors import ElementError
 from mstmm.ir.spec import ENTRY_POINTS
 
@@ -101,7 +102,7 @@ def load_file(path: str | Path) -> list[Element]:
 
     Raises ElementError if the file cannot be run, defines no element, or one twice.
     """
-    path = Path(path)
+    path = path_of("elements", path)
     if not path.is_file():
         raise ElementError(f"{path}: no such file")
     name = f"mstmm_user_{path.stem}"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..arguments import short
 from ..errors import EnvironmentFailure, SceneError
 from ..runtime.host.files import replacing
 from . import cases as known
@@ -74,8 +75,8 @@ def stability(
 
     Raises SceneError for a name that there is not and for settings that make no sense.
     """
-    if isinstance(cases, str):
-        raise SceneError(f'cases = "{cases:.60}": expected a list of names')
+    if isinstance(cases, str) or (cases is not None and not isinstance(cases, Iterable)):
+        raise SceneError(f"cases = {short(cases)}: expected a list of names")
     if isinstance(points, bool) or not isinstance(points, int) or not 3 <= points <= 1000:
         raise SceneError(f"points = {points!r}: expected a whole number from 3 to 1000")
     if not 0 < tolerance < 1:

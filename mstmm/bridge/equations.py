@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import sympy as sp
 
-from ..derive.catalogue.registry import BASES
+from ..derive.catalogue.registry import Element, instance
 from ..derive.show.document import (
     Code,
     Formula,
@@ -103,13 +103,9 @@ def equations(
 
     if isinstance(of, Model):
         return _of_model(of, keep)
-    made = of() if isinstance(of, type) and issubclass(of, BASES) else of
-    if not isinstance(made, BASES):
-        raise ElementError(
-            f"equations: expected the name of an element, an element, a scene, its file or its "
-            f"model, found {of!r:.60}"
-        )
-    return _of_element(made, keep)
+    if not isinstance(of, Element):
+        of = instance(of)
+    return _of_element(of, keep)
 
 
 def _of_element(of: str | Element, keep: Sequence[str]) -> Equations:

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from mstmm.arguments import path_of
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
 
@@ -173,7 +174,7 @@ class Advice:
 
     def write(self, path: str | Path) -> Path:
         """Write the reduced scene.  SceneError for a name that does not end in .toml."""
-        place = Path(path)
+        place = path_of("scene", path)
         if place.suffix != ".toml":
             raise SceneError(f"{place}: expected a name that ends in .toml")
         with replacing(place) as temporary:

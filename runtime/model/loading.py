@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from mstmm.arguments import path_of
 from mstmm.errors import MstmmError, SceneError
 from mstmm.extras import missing
 from mstmm.scene import Scene
@@ -34,7 +35,7 @@ def load_result(path: str | Path) -> Result | Columns:
 
     Raises SceneError if the file is no such result, EnvironmentFailure if the extra io is missing.
     """
-    path = Path(path)
+    path = path_of("result file", path)
     refuse_special(path, "result file")
     reader = READERS.get(path.suffix.lower())
     if reader is None:

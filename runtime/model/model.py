@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
+from mstmm.arguments import yes_or_no
 from mstmm.arrays import Array, one, pair, real
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import NumericalFailure
@@ -209,6 +210,7 @@ class Model(Linearised):
         from .wanted.asked import Control, asked
 
         model = self if inputs is None else self.with_inputs(inputs)
+        certify = yes_or_no("certify", certify)
         given = Control(method, step, rtol, atol)
         wanted = asked(error, error_of, given, checkpoint is not None or resume)
         method, rtol, atol = given.filled(wanted)

@@ -6,7 +6,6 @@ the length of q and u.
 
 from __future__ import annotations
 
-import difflib
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,6 +17,7 @@ from mstmm.expression.drive import motion_at
 from mstmm.scene import Scene
 from mstmm.scene.checks.types import inherit
 from mstmm.scene.files.write import to_toml
+from mstmm.scene.rules.messages import near
 from mstmm.scene.rules.text import to_expression
 from mstmm.scene.rules.values import Refused
 from mstmm.scene.rules.written import known
@@ -132,8 +132,7 @@ def resolved(scene: Scene, names: Sequence[str]) -> list[str]:
 
 def _unknown(name: str, known: Mapping[str, float]) -> SceneError:
     whole = [one for one in known if one.endswith(f".{name}")]
-    near = whole or difflib.get_close_matches(name, known, 1, 0.5)
-    hint = f'; did you mean "{near[0]}"?' if near else ""
+    hint = f'; did you mean "{whole[0]}"?' if whole else near(name, known)
     return SceneError(f'parameter "{name}": there is no such number in the scene{hint}')
 
 

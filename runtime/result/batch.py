@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mstmm.arguments import path_of
 from mstmm.arrays import Array, whole
 from mstmm.errors import SceneError
 from mstmm.extras import missing
@@ -128,7 +129,7 @@ class Batch(BatchResult):
 
     def save(self, path: str | Path) -> Path:
         """Write ".nc" (NetCDF, extra: io); returns the path."""
-        path = Path(path)
+        path = path_of("batch", path)
         if path.suffix.lower() != ".nc":
             raise SceneError(f'batch "{path}": expected a name that ends in .nc')
         return save_dataset(self.to_xarray, path)

@@ -133,7 +133,7 @@ class Quantities:
             if entry is not None:
                 return entry()
         known = [n for owner in owners for n in self.of(owner).entries]
-        hint = near(name, known or self._every())
+        hint = near(name, (*known, *self._every()))
         raise SceneError(f'"{name}": there is no such quantity{hint}')
 
     def _owners_in(self, name: str) -> list[str]:

@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mstmm.arguments import path_of
 from mstmm.markup import table
 
 from .certificate import Certificate
@@ -85,7 +86,7 @@ class Result(Record):
         """
         from .output.storage import save
 
-        saved = save(self, Path(path))
+        saved = save(self, path_of("result file", path))
         if self.checkpoint is not None and self.status is not None:
             self.checkpoint.remove()
         return saved

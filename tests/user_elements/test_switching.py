@@ -74,11 +74,14 @@ class Broken(Floor):
         return p.stiffness * x[2] ** 2 * sp.floor(x[2]) / 2
 
 
-class Root(Floor):
+class Root(ForceElement):
     """Has no value where a width without bounds is below zero."""
 
     name = "rooted_floor"
-    parameters = (*Floor.parameters, Param("width", "m"))
+    parameters = (Param("stiffness", "N/m", minimum=0), Param("width", "m"))
+
+    def wrench(self, x, v, rotation, w, p, effort, t):  # type: ignore[no-untyped-def]
+        return sp.zeros(3, 1), sp.zeros(3, 1)
 
     def potential(self, x, p):  # type: ignore[no-untyped-def]
         return p.stiffness * sp.sqrt(p.width) ** 3 * sp.sqrt(x.dot(x)) ** sp.Rational(1, 2)

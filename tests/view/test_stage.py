@@ -216,7 +216,7 @@ def test_the_rail_of_a_slide_stays_behind() -> None:
 
 def test_wrong_kinds_of_arguments(tmp_path: Path) -> None:
     run = scenes.run()
-    with pytest.raises(SceneError, match="title and trails are texts"):
+    with pytest.raises(SceneError, match=r"trails = \[3\]: expected a list of names"):
         run.view(trails=[3])  # type: ignore[list-item]
     view = run.view(trails="rod.tip", speed=20.0)
     assert [line.name for line in view.stage.lines if line.name.startswith("trails")] == [

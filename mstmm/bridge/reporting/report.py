@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ...arguments import path_of, text_of, texts_of
 from ...errors import SceneError
 from . import words
 from .curves import curves
@@ -37,13 +38,13 @@ def report(
     `Result.plot` chooses, and the energy; `trails` as in `Result.view`.  SceneError for a path that
     does not end in .html and for names that there are not; EnvironmentFailure without the extras.
     """
-    path = Path(path)
+    path = path_of("report", path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise SceneError(f'report "{path}": expected a name ending in .html')
     from ...runtime.host.files import replacing
 
-    title = title or path.stem
-    quantities = (quantities,) if isinstance(quantities, str) else quantities
+    title = text_of("title", title) or path.stem
+    quantities = texts_of("quantities", quantities, "energy")
     seen = result.view(title=title, trails=trails) if len(result.t) else None
     style, formulas = equations(result.model.scene)
     sections = (

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ...arguments import short
 from ...errors import SceneError
 from ...numbers.pose import IN_PLACE, Pose
 from ...numbers.rotations import perpendicular, product, transpose
@@ -59,10 +60,12 @@ def export_robot(scene: Scene, name: str = "robot") -> Exported:
     Raises SceneError for closed loops, flexible bodies, bodies of users' types and hinges that URDF
     does not have.
     """
+    from ..scene import Scene
+
     if not isinstance(scene, Scene):
-        raise SceneError(f"export_robot: expected a scene, found {scene!r:.60}; see load_scene")
+        raise SceneError(f"{short(scene)}: expected a Scene; mstmm.load_scene reads a file")
     if not isinstance(name, str) or not name.isprintable():
-        raise SceneError(f"export_robot: expected a name of letters and signs, found {name!r:.60}")
+        raise SceneError(f"name = {short(name)}: expected a name of letters and signs")
     found = _Reader(scene).robot(name)
     return Exported(as_urdf(found), found.notes, len(found.links), len(found.joints))
 

@@ -15,8 +15,10 @@ from .values import Location, Refused, Rule, Shorthand, found
 MAX_LINES = 10
 #: Where to stop looking: a file in which every element is wrong should not take minutes.
 MAX_PROBLEMS = 60
-#: Nearest names are looked for among this many at most.
-_MAX_OPTIONS = 2000
+#: Nearest names are looked for among this many at most, and of these among the nearest.
+_MAX_OPTIONS, _CANDIDATES = 2000, 20
+#: How alike, from 0 to 1, what is near must be, as a whole and where it differs.
+_NEAR = 0.6
 #: Keys kept free for coming releases, and what they will hold.
 RESERVED = {
     "thermal": "thermal data",
@@ -42,9 +44,10 @@ def near(name: str, options: Iterable[str]) -> str:
     """'; did you mean "x"?', or the options themselves where none is near and they are few."""
     choices = list(dict.fromkeys(islice(options, _MAX_OPTIONS)))
     lowered = {option.lower(): option for option in reversed(choices)}
-    close = difflib.get_close_matches(name.lower(), lowered, n=1, cutoff=0.6)
-    if close:
-        return f'; did you mean "{lowered[close[0]]}"?'
+    close = difflib.get_close_matches(name.lower(), lowered, n=_CANDIDATES, cutoff=_NEAR)
+    for one in close:
+        if _alike(name.lower(), one):
+            return f'; did you mean "{lowered[one]}"?'
     if not choices:
         return "; there is none"
     if len(choices) > 12:
@@ -52,6 +55,15 @@ def near(name: str, options: Iterable[str]) -> str:
     if len(choices) == 1:
         return f"; there is only {choices[0]}"
     return "; one of " + ", ".join(choices)
+
+
+def _alike(name: str, option: str) -> bool:
+    """Are both alike without the parts that they share, such as an owner or a file's ending?"""
+    one, other = name.split("."), option.split(".")
+    for end in (0, -1):
+        while min(len(one), len(other)) > 1 and one[end] == other[end]:
+            del one[end], other[end]
+    return difflib.SequenceMatcher(None, ".".join(one), ".".join(other)).ratio() >= _NEAR
 
 
 def scene_error(

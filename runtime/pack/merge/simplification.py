@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
+from mstmm.arguments import texts_of
 from mstmm.arrays import real
 from mstmm.errors import SceneError
 
@@ -51,11 +52,10 @@ def asked_for(simplify: bool | Collection[str] | Words) -> Words:
     """The words that an option means; SceneError for others."""
     if isinstance(simplify, bool):
         return USUAL if simplify else NOTHING
-    if isinstance(simplify, str) or not isinstance(simplify, Collection):
-        simplify = [simplify]
-    words = list(simplify)
+    words = texts_of("simplify", list(simplify) if isinstance(simplify, Mapping) else simplify,
+                     "welds")  # fmt: skip
     for word in words:
-        if not isinstance(word, str) or word not in _ALONE:
+        if word not in _ALONE:
             raise SceneError(
                 f"simplify: {word!r:.60} is not known; expected True, False, or some of: "
                 + ", ".join(_ALONE)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from mstmm.arguments import path_of
 from mstmm.arrays import Array, Integers
 from mstmm.errors import SceneError
 from mstmm.scene.rules.messages import near
@@ -107,7 +108,7 @@ class Columns:
 
     def save(self, path: str | Path) -> Path:
         """As `Result.save`, to ".csv" or ".mat"."""
-        path = Path(path)
+        path = path_of("result file", path)
         if path.suffix.lower() not in TABLES:
             raise SceneError(
                 f'result file "{path}": columns without their scene go into .csv and .mat files'

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from mstmm.arguments import path_of, short, text_of
+from mstmm.arrays import by_name
 from mstmm.errors import SceneError
 from mstmm.extras import figures
 from mstmm.printable import printable
@@ -126,20 +128,17 @@ def plot_of(
     beside: Mapping[str, Shown] | None = None, label: str = "this run",
 ) -> Any:  # fmt: skip
     """One run, and others beside it; see `Result.plot`."""
+    where = None if path is None else path_of("picture", path)
     runs: dict[str, Shown] = {label: run}
-    others = {} if beside is None else beside
-    if not isinstance(others, Mapping) or not all(hasattr(x, "quantity") for x in others.values()):
-        raise SceneError(
-            f'beside: expected results by their labels, such as {{"before": other}}, found '
-            f"{beside!r:.60}"
-        )
-    for other, one in others.items():
+    for other, one in ({} if beside is None else by_name("beside", beside, "runs")).items():
         if other in runs:
             raise SceneError(f'beside: "{other}" is the label of another run; give each its own')
+        if not hasattr(one, "candidates"):
+            raise SceneError(f'beside: "{other}" = {short(one)}: expected a result')
         runs[other] = one
-    made = drawn(runs, Wanted(tuple(names), against, kind), title, ax)
-    if path is not None:
-        made.write(Path(path))
+    made = drawn(runs, Wanted(tuple(names), against, kind), text_of("title", title), ax)
+    if where is not None:
+        made.write(where)
     return made.figure
 
 
@@ -181,6 +180,8 @@ def _lay_out(figure: Any, found: Sequence[Picture]) -> None:
 def _into(ax: Any, found: Sequence[Picture]) -> Any:
     """Draw into axes of somebody else's figure."""
     axes = list(np.ravel(np.asarray(ax, dtype=object)))
+    if not all(hasattr(axis, "figure") for axis in axes):
+        raise SceneError(f"ax = {short(ax)}: expected axes of matplotlib, or a list of them")
     if len(axes) != len(found):
         raise SceneError(
             f"ax: there are {len(found)} panels, one for each unit, and {len(axes)} axes; give as "
@@ -217,7 +218,8 @@ def _curve(axis: Any, trace: Trace) -> None:
     colour = _COLOURS[trace.colour % len(_COLOURS)]
     turn = trace.style + trace.colour // len(_COLOURS)
     axis.plot(trace.x, trace.y, label=trace.label, color=colour,
-              linestyle=_STYLES[turn % len(_STYLES)])  # fmt: skip
+              linestyle=_STYLES[turn % len(_STYLES)], marker="o" if len(trace.x) == 1 else None,
+              )  # fmt: skip
     if trace.low is not None and trace.high is not None:
         axis.fill_between(trace.x, trace.low, trace.high, color=colour, alpha=0.2, linewidth=0)
 

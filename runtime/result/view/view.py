@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from mstmm.arguments import path_of, text_of, texts_of
 from mstmm.arrays import whole
 from mstmm.errors import SceneError
 
@@ -57,9 +58,8 @@ class View:
         A file appears under its name when it is whole.  SceneError for another ending,
         EnvironmentFailure for what is not installed or cannot be written.
         """
-        if not isinstance(path, str | Path) or not str(path):
-            raise SceneError(f"view {path!r:.60}: expected the name of a file or of a folder")
-        path, moments = Path(path), whole("moments", moments, 1, "a whole number, 1 or more")
+        path = path_of("view", path)
+        moments = whole("moments", moments, 1, "a whole number, 1 or more")
         ending = path.suffix.lower()
         if not ending:
             frames(shots_over(self.parts, self.stage), path)
@@ -104,8 +104,6 @@ def view(
     speed: float | None,
 ) -> View:
     """See `Result.view`."""
-    if isinstance(trails, str):
-        trails = (trails,)
-    if not isinstance(title, str) or not all(isinstance(one, str) for one in trails):
-        raise SceneError("view: title and trails are texts, such as trails=['rod2.tip']")
+    trails = texts_of("trails", trails, "rod2.tip")
+    title = text_of("title", title) or ""
     return View(title, [(title, staged(run, title, trails, speed))])

@@ -1,0 +1,47 @@
+"""Arguments that are no numbers, as they come from users: paths, texts and lists of them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from .errors import SceneError
+
+
+def path_of(what: str, value: Any) -> Path:
+    """The path of a file, a text or a `Path`; SceneError for anything else."""
+    if isinstance(value, str | os.PathLike) and isinstance(os.fspath(value), str) and str(value):
+        return Path(value)
+    raise SceneError(f"{what} {short(value)}: expected the name of a file, such as 'run'")
+
+
+def texts_of(what: str, value: Any, such_as: str) -> tuple[str, ...]:
+    """Texts one by one; a single one counts as a list of one."""
+    found = (value,) if isinstance(value, str) else value
+    there = tuple(found) if isinstance(found, Iterable) else (None,)
+    if isinstance(found, Mapping) or not all(isinstance(one, str) for one in there):
+        shown = short(value)
+        raise SceneError(f"{what} = {shown}: expected a list of names, such as [{such_as!r}]")
+    return there
+
+
+def text_of(what: str, value: Any) -> str | None:
+    """A text, or None where there is to be none."""
+    if value is None or isinstance(value, str):
+        return value
+    raise SceneError(f"{what} = {short(value)}: expected a text")
+
+
+def yes_or_no(what: str, value: Any) -> bool:
+    """True or False, and nothing that Python takes for one of them."""
+    if isinstance(value, bool):
+        return value
+    raise SceneError(f"{what} = {short(value)}: expected True or False")
+
+
+def short(value: Any) -> str:
+    """What was given, on one line of at most 60 characters."""
+    shown = " ".join(repr(value).split())
+    return shown if len(shown) <= 60 else f"{shown[:57]}..."

@@ -1,0 +1,72 @@
+"""Arguments of a wrong kind are told by our messages, never by a traceback of Python's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import mstmm
+from mstmm.errors import ElementError, SceneError
+
+ROD = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.01, 0.1, 0.1]}
+
+
+@pytest.fixture(scope="module")
+def result() -> Any:
+    scene = mstmm.Scene(
+        gravity=[0, -9.81, 0],
+        body=[{"name": "rod", **ROD, "ends": {"tip": [1, 0, 0]}}],
+        hinge=[{"name": "pivot", "type": "pin", "inboard": "ground", "outboard": "rod"}],
+    )
+    return mstmm.compile(scene, engine="looped").simulate(t_end=0.1)
+
+
+THREE: Any = 3
+OF_RESULTS: dict[str, tuple[Callable[[Any], Any], str]] = {
+    "picture": (lambda r: r.plot("rod.x", path=3), "picture 3: expected the name of a file"),
+    "title": (lambda r: r.plot("rod.x", title=3), "title = 3: expected a text"),
+    "beside": (lambda r: r.plot("rod.x", beside=3), "beside: expected runs by their names"),
+    "a run beside": (lambda r: r.plot("rod.x", beside={"a": 3}), '"a" = 3: expected a result'),
+    "axes": (lambda r: r.plot("rod.x", ax=3), "ax = 3: expected axes of matplotlib"),
+    "trails": (lambda r: r.view(trails=3), r"trails = 3: expected a list of names"),
+    "report": (lambda r: r.report(3), "report 3: expected the name of a file"),
+    "quantities": (lambda r: r.report("r.html", quantities=3), "quantities = 3: expected a list"),
+    "file": (lambda r: r.save(3), "result file 3: expected the name of a file"),
+    "simplify": (
+        lambda r: mstmm.compile(r.model.scene, simplify=THREE),
+        "simplify = 3: expected",
+    ),
+    "certify": (lambda r: r.model.simulate(0.1, certify="yes"), "expected True or False"),
+}
+
+
+@pytest.mark.parametrize("name", OF_RESULTS)
+def test_of_results_and_models(result: Any, name: str) -> None:
+    call, message = OF_RESULTS[name]
+    with pytest.raises(SceneError, match=message):
+        call(result)
+
+
+def test_of_the_public_functions() -> None:
+    for call, message in (
+        (mstmm.load_result, "result file 3: expected the name of a file"),
+        (mstmm.stability, "cases = 3: expected a list of names"),
+        (mstmm.export_robot, "3: expected a Scene"),
+        (mstmm.generate_file, "elements 3: expected the name of a file"),
+    ):
+        with pytest.raises(SceneError, match=message):
+            call(THREE)
+    with pytest.raises(ElementError, match="3 is no element"):
+        mstmm.equations(THREE)
+
+
+def test_names_are_guessed_where_they_differ(result: Any) -> None:
+    """What two names share, an owner or a file's ending, makes them no nearer."""
+    with pytest.raises(SceneError, match=r'"rod.tipp".* did you mean "rod.tip.[xyz]"'):
+        result.quantity("rod.tipp")
+    with pytest.raises(SceneError, match=r'"rod.zzzz": .*; the first of them are'):
+        result.quantity("rod.zzzz")
+    with pytest.raises(SceneError, match=r'did you mean "rod.mass"'):
+        result.model.with_parameters({"rod.mas": 2.0})
