@@ -22,15 +22,18 @@ from .checkpoint import Checkpoint, State
 from .error_estimate import ErrorEstimate, alike, compare, tighter
 from .method_choice import Choice
 from .simulate import advance, choice_of, said, trajectory
-from .stability import check_step
+from .stability import check_later, check_step
 from .trajectory import Trajectory
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
+    from ..engine.engine import Engine
     from .system import SceneSystem
 
 Progress = Callable[[float, float], None]
 
+#: Speeds, rad/s or m/s, that no motion has.
+_WILD = 1e9
 #: Seconds of wall time between checkpoints.
 CHECKPOINT_EVERY = 30.0
 
@@ -131,9 +134,18 @@ def first_run(
     if watch.choice is not None:
         found = replace(found, methods=tuple(watch.choice.stretches))
     if status is not None and not found.success:
-        step = check_step(engine, settings, q, u)
-        found = found if step is None else replace(found, message=step.blamed(found.message))
+        found = replace(found, message=_cause(engine, found, q, u))
     return found
+
+
+def _cause(engine: Engine, run: Trajectory, q: Array, u: Array) -> str:
+    """Why a run failed: its step where that is too long, at the start or, for numbers that grew
+    beyond all bounds, later."""
+    step = check_step(engine, run.settings, q, u)
+    wild = run.status is Status.NOT_FINITE or float(np.abs(run.u).max(initial=0.0)) > _WILD
+    if (step is None or step.risk is None) and wild:
+        step = check_later(engine, run) or step
+    return run.message if step is None else step.blamed(run.message)
 
 
 def _advanced(

@@ -173,6 +173,17 @@ def test_a_step_too_long_is_told_first_of_a_loop_with_a_beam() -> None:
     assert "the run with it ended" in run.message
 
 
+def test_a_step_that_becomes_too_long_is_said_first() -> None:
+    """Nothing moves at the start of a double pendulum; what the step drives it to, numbers that
+    are not finite or at which no hinge is determined, is not of the scene."""
+    scene = mstmm.Scene(**chain(["pin", "pin"], gravity=(0, -9.81, 0)))
+    run = mstmm.compile(scene, engine="looped").simulate(4.0, "rk4", step=0.4)
+    assert not run.success
+    assert run.certificate.step is None
+    assert run.message.startswith("step = 0.4 s is too long for the fastest motion at t = ")
+    assert "; the run with it ended: " in run.message
+
+
 def test_a_run_costs_no_look_at_its_step(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is looked at when somebody asks for what speaks against the numbers, once."""
     calls = []
