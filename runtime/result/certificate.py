@@ -118,6 +118,11 @@ class Certificate:
         """Time (s) after which two accurate runs part; None if they do not, or were not made."""
         return None if self.error is None else self.error.horizon
 
+    @property
+    def covers(self) -> str:
+        """What the estimated error is the error of, and what it is not."""
+        return _covered(self)
+
     def __str__(self) -> str:
         return self.text()
 
@@ -217,7 +222,7 @@ def _error_rows(c: Certificate) -> list[tuple[str, str]]:
     error = c.error
     rows = [] if c.reached is None else [("error", str(c.reached))]
     if error is None:
-        covered = [("what this covers", _covered(c))]
+        covered = [("what this covers", c.covers)]
         missing = [("error", "not estimated (certify=True makes a second run)")]
         return rows + covered if rows else missing
     within = error.horizon is not None and not error.nowhere
@@ -228,7 +233,7 @@ def _error_rows(c: Certificate) -> list[tuple[str, str]]:
         if values:
             about = f" (from a second run, {error.reference})" if kind == "q" else ""
             rows.append((f"error of {kind}, at most", f"{values}{until}{at_all}{about}"))
-    rows.append(("what this covers", _covered(c)))
+    rows.append(("what this covers", c.covers))
     if error.horizon is not None:
         since = (
             f"t = {error.horizon:.6g} s: later" if within else "the start: from the first sample on"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import ceil
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,13 +16,18 @@ if TYPE_CHECKING:
     from ...runtime.result.plotting.panels import Panel, Trace
     from ...runtime.result.result import Result
 
-#: Curves in one panel, points of a curve, height of a panel in pixels.
-_MOST, _POINTS, _TALL = 12, 1500, 260
+#: Curves in one panel, points of a curve.
+_MOST, _POINTS = 12, 1500
+#: Pixels: height of a panel, of a line of its title and of its legend; above these, between panels.
+_TALL, _TITLE, _LINE, _AIR, _GAP = 210, 19, 18, 8, 28
+#: Characters of a line of a title.
+_LONG = 42
+#: Pixels that a legend may be wide in narrow windows; of an entry its line and of each character.
+_WIDE, _ENTRY, _CHARACTER = 285, 50, 6.0
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#555555", "#8a7a00")
-#: Within its panel, so that narrow windows have room for the curves.
+#: Between title and panel, so that it covers no curve and narrow windows have room for these.
 _LEGEND = {
-    "x": 1, "xanchor": "right", "yanchor": "top", "bgcolor": "rgba(255,255,255,0.6)",
-    "font": {"size": 11},
+    "x": 0, "xanchor": "left", "yanchor": "bottom", "orientation": "h", "font": {"size": 11},
 }  # fmt: skip
 
 
@@ -36,9 +43,10 @@ def curves(result: Result, names: Sequence[str]) -> str:
     from ...runtime.result.plotting.panels import steady
 
     shown = _panels(result, names)
+    titles = [wrap(panel.title, _LONG) for panel in shown]
     figure = subplots.make_subplots(
-        rows=len(shown), cols=1, shared_xaxes=True, vertical_spacing=0.24 / len(shown),
-        subplot_titles=[text(panel.title) for panel in shown],
+        rows=len(shown), cols=1, shared_xaxes=True,
+        subplot_titles=["<br>".join(map(text, lines)) for lines in titles],
     )  # fmt: skip
     for row, panel in enumerate(shown, 1):
         legend = f"legend{row if row > 1 else ''}"
@@ -52,12 +60,11 @@ def curves(result: Result, names: Sequence[str]) -> str:
                 row=row, col=1,
             )  # fmt: skip
         figure.update_yaxes(range=steady(panel), row=row, col=1)
-        top = figure.layout["yaxis" if row == 1 else f"yaxis{row}"].domain[1]
-        figure.update_layout({legend: {**_LEGEND, "y": top, "visible": len(panel.traces) > 1}})
-    figure.update_annotations(x=0, xanchor="left", font={"size": 14})
+    tall = _placed(figure, [_legend_height(panel) for panel in shown], [*map(len, titles)])
+    figure.update_annotations(x=0, xanchor="left", align="left", font={"size": 13})
     figure.update_xaxes(title_text="time (s)", row=len(shown), col=1)
     figure.update_layout(
-        height=_TALL * len(shown) + 110, margin={"l": 60, "r": 10, "t": 60, "b": 45},
+        height=tall + 85, margin={"l": 60, "r": 10, "t": 40, "b": 45},
         hovermode="x unified", template="plotly_white",
     )  # fmt: skip
     drawn: str = figure.to_html(
@@ -65,6 +72,30 @@ def curves(result: Result, names: Sequence[str]) -> str:
     )
     notes = "".join(f"<p>{text(note)}</p>" for panel in shown for note in panel.notes)
     return f'<div class="curves">{drawn}</div>{notes}'
+
+
+def _placed(figure: Any, legends: Sequence[int], lines: Sequence[int]) -> int:
+    """Panels below each other, each under its title and its legend; pixels of all of it."""
+    heads = [_TITLE * many + legend for many, legend in zip(lines, legends, strict=True)]
+    tall = sum(heads) + _TALL * len(heads) + _GAP * (len(heads) - 1)
+    above = 0
+    for row, (head, legend) in enumerate(zip(heads, legends, strict=True), 1):
+        top, bottom = 1 - (above + head) / tall, 1 - (above + head + _TALL) / tall
+        above += head + _TALL + _GAP
+        figure.update_yaxes(domain=(max(0.0, bottom), top), row=row, col=1)
+        figure.layout.annotations[row - 1].update(y=top, yshift=legend)
+        name = f"legend{row if row > 1 else ''}"
+        figure.update_layout({name: {**_LEGEND, "y": top, "visible": legend > 0}})
+    return tall
+
+
+def _legend_height(panel: Panel) -> int:
+    """Pixels of the lines that a legend takes in a narrow window; 0 where there is none."""
+    labels = [trace.label for trace in panel.traces[:_MOST]]
+    if len(labels) < 2:
+        return 0
+    columns = max(1, int(_WIDE / (_ENTRY + _CHARACTER * max(map(len, labels)))))
+    return _LINE * ceil(len(labels) / columns) + _AIR
 
 
 def _panels(result: Result, names: Sequence[str]) -> list[Panel]:

@@ -30,6 +30,11 @@ ul { padding-left: 1.2rem; margin: .4rem 0; } li { margin: .2rem 0; }
 details { margin: .6rem 0; } summary { cursor: pointer; color: var(--accent); }
 details > h1 { font-size: 1.2rem; margin-top: .8rem; }
 a { color: var(--accent); }
+@media (max-width: 40rem) {
+  .long tr { display: grid; grid-template-columns: repeat(3, auto); border-bottom: 1px solid
+    var(--line); padding: .2rem 0; }
+  .long tr > :last-child { grid-column: 1 / -1; } .long tr > * { border: 0 !important; }
+}
 """
 
 

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import log10
 from typing import TYPE_CHECKING
 
 from ...markup import bullets, folded, table, text
 
 if TYPE_CHECKING:
     from ...runtime.result.result import Result
+    from ...runtime.run.error_estimate import ErrorEstimate
 
 #: Bodies and hinges that are listed one by one.
 _LISTED = 200
+#: Share of the motion from which on no digits are told, and digits beyond which none are counted.
+_ONE_DIGIT, _MOST_DIGITS = 0.01, 12
 #: Rows of loops that are listed.
 _REPEATED = 12
 
@@ -32,14 +36,33 @@ def _how_far(result: Result) -> Iterator[str]:
     certificate, reached = result.certificate, result.error_estimate
     if reached is not None:
         yield f"Asked for an error: {reached}"
-    if certificate.error is not None:
-        units = ", ".join(f"{v:.1e} {u}" for u, v in certificate.error.largest("q").items())
-        yield f"A second, more accurate run differs by at most {units}."
-    if certificate.predictable_until is not None:
+    error, until = certificate.error, certificate.predictable_until
+    if error is not None:
+        end = float(result.t[-1]) if until is None else until
+        units = ", ".join(f"{v:.1e} {u or '1'}" for u, v in error.largest("q").items())
         yield (
-            f"From t = {certificate.predictable_until:.3g} s on accurate runs part: what comes "
+            f"Up to t = {end:.4g} s a second, more accurate run differs by at most {units}"
+            f"{_digits(error)}."
+        )
+    if until is not None:
+        yield (
+            f"From t = {until:.3g} s on accurate runs part: what comes "
             "later can be trusted as one possible motion, not as the one."
         )
+    if error is not None or reached is not None:
+        yield f"Looked at was {certificate.covers}."
+
+
+def _digits(error: ErrorEstimate) -> str:
+    """How many digits of coordinates that makes, beside how far they go."""
+    shares = [value / error.moved.get(unit, 0.0) for unit, value in error.largest("q").items()
+              if error.moved.get(unit, 0.0) > 0]  # fmt: skip
+    worst = max(shares, default=0.0)
+    if not shares or worst >= _ONE_DIGIT:
+        return ""
+    digits = _MOST_DIGITS if worst <= 10.0**-_MOST_DIGITS else int(-log10(worst))
+    more = " or more" if digits == _MOST_DIGITS else ""
+    return f", so that {digits} digits{more} of how far coordinates go can be used"
 
 
 def made(result: Result) -> str:
@@ -68,7 +91,7 @@ def _models(result: Result) -> str:
         for name, body in result.model.flexible.items()
     ]
     head = ("flexible body", "shapes", "floating frame", "worth knowing")
-    found = table(rows, head) if rows else ""
+    found = f'<div class="long">{table(rows, head)}</div>' if rows else ""
     if packed := [str(one) for one in result.model.simplifications]:
         found += folded("What is packed otherwise than the scene says it", bullets(packed))
     return f"<h3>What is simplified</h3>{found}" if found else ""

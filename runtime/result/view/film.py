@@ -78,9 +78,9 @@ def strip(shots: Sequence[Shot], file: Path | IO[bytes], kind: str, title: str =
 
 def _columns(count: int, shape: float) -> int:
     """Moments in a row: about as many as make the strip wider than it is tall."""
-    if shape > 0.8:
-        return min(count, _ROW)
-    return min(count, max(1, int(np.ceil(np.sqrt(count * shape * 2.2)))))
+    most = _ROW if shape > 0.8 else max(1, int(np.ceil(np.sqrt(count * shape * 2.2))))
+    rows = -(-count // min(count, most))
+    return -(-count // rows)  # rows alike, so that the last one has no hole
 
 
 def film(shots: Sequence[Shot], path: Path) -> None:
