@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ from view import scenes
 
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.result.view.drawn import Flat
+from mstmm.runtime.result.view.film import _columns
 from mstmm.runtime.result.view.staging import staged
 from mstmm.runtime.result.view.view import View
 
@@ -20,6 +22,14 @@ from mstmm.runtime.result.view.view import View
 @pytest.fixture(scope="module")
 def view() -> View:
     return View("", [("", staged(scenes.run(), "a beam and a rod", speed=20.0))])
+
+
+@pytest.mark.parametrize("shape", [0.3, 0.7, 1.5])
+def test_rows_of_a_strip_are_alike(shape: float) -> None:
+    for count in range(1, 13):
+        columns = _columns(count, shape)
+        rows = math.ceil(count / columns)
+        assert rows * columns - count < rows
 
 
 def test_a_strip(view: View, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,9 @@ import pytest
 from PIL import Image
 from view import browser, scenes
 
+import mstmm
 from mstmm import markup
+from mstmm.bridge.reporting import words
 from mstmm.errors import SceneError
 
 #: Nothing may be fetched: the page names no other place but in what readers may follow themselves.
@@ -26,17 +29,17 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_what_it_says(page: Path) -> None:
-    words = page.read_text()
+    text = page.read_text()
     assert page.stat().st_size < 10_000_000
-    assert words.index("<iframe") < 1_000_000  # the strip, however much it shows
-    assert "<title>a &lt;b&gt;beam&lt;/b&gt;</title>" in words
-    assert "<b>NOT trusted</b>: beam &quot;blade&quot;" in words
+    assert text.index("<iframe") < 1_000_000  # the strip, however much it shows
+    assert "<title>a &lt;b&gt;beam&lt;/b&gt;</title>" in text
+    assert "<b>NOT trusted</b>: beam &quot;blade&quot;" in text
     for heading in ("The mechanism", "The run", "Curves", "The certificate", "The equations"):
-        assert f"<h2>{heading}</h2>" in words
-    assert "<summary>rigid body</summary>" in words
-    assert "<math" in words
-    assert str(scenes.run().certificate.energy) in words
-    assert not any(mark in words for mark in _FETCHED)
+        assert f"<h2>{heading}</h2>" in text
+    assert "<summary>rigid body</summary>" in text
+    assert "<math" in text
+    assert str(scenes.run().certificate.energy) in text
+    assert not any(mark in text for mark in _FETCHED)
 
 
 @pytest.mark.skipif(browser.PROGRAM is None, reason="Chromium is not installed")
@@ -50,6 +53,22 @@ def test_opened(page: Path) -> None:
         assert seen.value("document.documentElement.scrollWidth <= innerWidth")
         assert seen.console == []
     assert len(np.unique(picture.reshape(-1, 3) // 16, axis=0)) > 20
+
+
+def test_it_tells_how_many_digits_hold_until_when() -> None:
+    """Of a pendulum, whose second run differs by a known share of how far it swings."""
+    rod = {"name": "rod", "mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.01, 0.1, 0.1]}
+    pin = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod"}
+    scene = mstmm.Scene(gravity=[0, -9.81, 0], body=[rod], hinge=[pin])
+    run = mstmm.compile(scene, engine="looped").simulate(2.0, rtol=1e-5, certify=True)
+    error = run.certificate.error
+    assert error is not None
+    share = error.largest("q")["rad"] / np.ptp(run.q[:, 0])
+    said = r"Up to t = 2 s a second.* by at most (\S+) rad, so that (\d+) digits of"
+    found = re.search(said, words.verdict(run))
+    assert found is not None
+    assert float(found[1]) == pytest.approx(error.largest("q")["rad"], rel=0.05)
+    assert 10.0 ** -(int(found[2]) + 1) < share <= 10.0 ** -int(found[2])
 
 
 def test_refusals(tmp_path: Path) -> None:
