@@ -220,5 +220,6 @@ class AtStates(Moving):
         Raises SceneError for a name that the scene does not have and for scenes with releases,
         NumericalFailure where `accelerations` does and where a derivative does not exist.
         """
-        by = self._differentiated_by(tuple(parameters))
+        names = tuple(parameters)
+        by = self._differentiations.get(names) or self._differentiated_by(names)
         return by(q, u, t, efforts, lambda: self.accelerations(q, u, t, efforts))

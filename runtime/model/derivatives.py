@@ -128,9 +128,13 @@ class Differentiation:
         if found is None:
             return None
         about, slopes = found
-        n, rate_u = len(slopes), self._units.copy()
-        by_q, by_u, by_efforts = slopes[:, :n], slopes[:, n : 2 * n], slopes[:, 2 * n : -1]
-        return Derivatives(about.a, by_q, by_u, by_efforts, slopes[:, -1], about.G, rate_u)
+        n = len(slopes)
+        made = object.__new__(Derivatives)  # a frozen one is filled field by field otherwise
+        made.__dict__.update(
+            udot=about.a, q=slopes[:, :n], u=slopes[:, n : 2 * n], efforts=slopes[:, 2 * n : -1],
+            t=slopes[:, -1], rate_q=about.G, rate_u=self._units.copy(), parameters={},
+        )  # fmt: skip
+        return made
 
     def _all_at_once(self, t: Array, q: Array, u: Array, efforts: Array) -> dict[str, Array] | None:
         """`at` by that code."""
