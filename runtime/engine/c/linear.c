@@ -46,31 +46,55 @@ int mstmm_linear_swept(mstmm_tangent *at, real t, const real *q, const real *u, 
     return code;
 }
 
-/* rows (n x m) become M^-1 rows, by M = L D L^T; `factors` (n x n) keeps L, and 1 / D. */
+typedef real two_reals __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
+
+/* to -= factor from, of m numbers */
+static void take_away(int m, real factor, const real *restrict from, real *restrict to)
+{
+    int c = 0;
+    for (; c + 4 <= m; c += 4) {
+        const two_reals *other = (const two_reals *)(from + c);
+        two_reals *own = (two_reals *)(to + c);
+        own[0] -= factor * other[0];
+        own[1] -= factor * other[1];
+    }
+    for (; c < m; c++) to[c] -= factor * from[c];
+}
+
+/* M = L^T D L from the last speed to the first, which leaves zeros between branches of a tree what
+ * they are (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 6.5).  Below the diagonal
+ * `factors` gets L, on it 1 / D. */
+static int factored(int n, const real *restrict mass, real *restrict factors)
+{
+    memcpy(factors, mass, (size_t)(n * n) * sizeof(real));
+    for (int k = n - 1; k >= 0; k--) {
+        real *last = factors + n * k;
+        if (!(last[k] > 0)) return 1;
+        last[k] = 1 / last[k];
+        for (int i = k - 1; i >= 0; i--) {
+            const real scaled = last[i] * last[k];
+            if (scaled == 0) continue;
+            take_away(i + 1, scaled, last, factors + n * i);
+            last[i] = scaled;
+        }
+    }
+    return 0;
+}
+
+/* rows (n x m) become M^-1 rows; `factors` are n x n numbers of room. */
 static int divide_by_mass(int n, int m, const real *restrict mass, real *restrict rows,
                           real *restrict factors)
 {
-    for (int i = 0; i < n; i++) {
-        real *own = factors + n * i, pivot = mass[n * i + i];
-        for (int j = 0; j < i; j++) {
-            real rest = mass[n * i + j];
-            for (int k = 0; k < j; k++) rest -= own[k] * factors[n * j + k];
-            own[j] = rest; /* times D as yet */
-        }
-        for (int j = 0; j < i; j++) {
-            const real scaled = own[j] * factors[n * j + j];
-            pivot -= own[j] * scaled;
-            own[j] = scaled;
-        }
-        if (!(pivot > 0)) return 1;
-        own[i] = 1 / pivot;
+    if (factored(n, mass, factors)) return 1;
+    for (int i = n - 1; i >= 0; i--)
         for (int j = 0; j < i; j++)
-            for (int c = 0; c < m; c++) rows[m * i + c] -= own[j] * rows[m * j + c];
-    }
-    for (int i = n - 1; i >= 0; i--) {
+            if (factors[n * i + j] != 0)
+                take_away(m, factors[n * i + j], rows + m * i, rows + m * j);
+    for (int i = 0; i < n; i++) {
         for (int c = 0; c < m; c++) rows[m * i + c] *= factors[n * i + i];
-        for (int k = i + 1; k < n; k++)
-            for (int c = 0; c < m; c++) rows[m * i + c] -= factors[n * k + i] * rows[m * k + c];
+        for (int j = 0; j < i; j++)
+            if (factors[n * i + j] != 0)
+                take_away(m, factors[n * i + j], rows + m * j, rows + m * i);
     }
     return 0;
 }
