@@ -15,6 +15,7 @@ from .options import Json, python_file, quoted
 if TYPE_CHECKING:
     from mstmm.bridge.crosscheck import Report as Crosscheck
     from mstmm.runtime.engine.loops.closed import Loops
+    from mstmm.runtime.model.model import Model
     from mstmm.scene import Scene
     from mstmm.scene.checks.topology import Topology
 
@@ -32,6 +33,10 @@ def check(
     ],
     echo: Annotated[
         bool, typer.Option("--echo", help="Print scenes with every default filled in.")
+    ] = False,
+    assembled: Annotated[
+        bool,
+        typer.Option("--assembled", help="The same with the start at which closed loops close."),
     ] = False,
     hinge: Annotated[
         list[str] | None,
@@ -52,8 +57,10 @@ def check(
     for each in what:
         try:
             report = _checker(each)(each)
-            text = report.pop("text")
-            if echo and "toml" in report:
+            text, model = report.pop("text"), report.pop("model", None)
+            if assembled and model is not None:
+                report["toml"] = _assembled(model)
+            if (echo or assembled) and "toml" in report:
                 text = report["toml"].rstrip("\n")
             if not json:
                 say(text)
@@ -107,7 +114,14 @@ def _scene(path: str) -> Report:
     warnings = [*scene.warnings, *(w for body in model.flexible.values() for w in body.warnings)]
     report = {"ok": True, "kind": "scene", **sizes, "warnings": warnings, "choices": notes}
     lines = [_scene_text(path, scene, sizes, warnings, notes), *_loop_lines(model.loops)]
-    return {**report, "toml": scene.to_toml(), "text": "\n".join(lines)}
+    text = "\n".join(lines)
+    return {**report, "toml": scene.to_toml(), "text": text, "model": model}
+
+
+def _assembled(model: Model) -> str:
+    from mstmm.bridge.assembled import assembled
+
+    return assembled(model).to_toml()
 
 
 _ONE = {

@@ -72,6 +72,31 @@ def test_echo_loads_back_to_the_same_scene(mstmm: Command, folder: Path) -> None
     assert echoed == package.load_scene(folder / "pendulum.toml")
 
 
+def test_starts_of_loops_are_written_as_they_close(mstmm: Command, folder: Path) -> None:
+    """Two equal cranks side by side: the bar between them lies flat, whatever was wished."""
+    rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.01, 0.1, 0.1],
+           "ends": {"tip": [1, 0, 0]}}  # fmt: skip
+    pins = [("ground", "left", 0.7), ("left.tip", "bar", -0.4), ("ground", "right", 0.6),
+            ("bar.tip", "right.tip", 0.8)]  # fmt: skip
+    hinges = [
+        {"name": f"pin{k}", "type": "pin", "inboard": inboard, "outboard": outboard,
+         "initial": {"q": q}, "hold": k == 0, "cut": k == 3}
+        for k, (inboard, outboard, q) in enumerate(pins)
+    ]  # fmt: skip
+    hinges[2]["position"] = [1, 0, 0]
+    bodies = [rod | {"name": name} for name in ("left", "bar", "right")]
+    scene = package.Scene(gravity=[0, -9.81, 0], body=bodies, hinge=hinges)
+    (folder / "cranks.toml").write_text(scene.to_toml())
+    done = mstmm("check", "cranks.toml", "--assembled")
+    (folder / "closed.toml").write_text(done.out)
+    for hinge, wanted in zip(
+        package.load_scene(folder / "closed.toml").hinge, (0.7, -0.7, 0.7, 0.7), strict=True
+    ):
+        assert hinge.initial is not None and hinge.initial.q is not None
+        assert abs(hinge.initial.q[0] - wanted) < 1e-9
+    assert mstmm("check", "closed.toml", "--assembled").code == 0
+
+
 def test_every_file_is_looked_at(mstmm: Command, folder: Path) -> None:
     (folder / "bad.toml").write_text("gravity = 3\n")
     done = mstmm("check", "bad.toml", "pendulum.toml", "none.toml", "--json")
