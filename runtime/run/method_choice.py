@@ -59,7 +59,7 @@ class Choice:
             return
         if run.tableau.implicit:
             self._look_back(run, rate)
-        elif self._is_stiff(run, rate) and not self._bends():
+        elif self._is_stiff(run, rate):
             self._change(run, implicit_method(self._settings.rtol), rate)
         else:
             self._ask(run, 2 * self._asked_for[0])
@@ -98,11 +98,6 @@ class Choice:
     def _is_stiff(self, run: Run, rate: float) -> bool:
         span = self._settings.t_end - self._settings.t_start
         return rate * span > _FEW and rate * run.last_step > _STABLE
-
-    def _bends(self) -> bool:
-        """Whether loops close through flexible bodies, which implicit methods cannot follow yet."""
-        packed = self._system.engine.packed
-        return bool(packed.flexible and packed.system.closures)
 
     def _look_back(self, run: Run, rate: float) -> None:
         """After 10, 20, 40, ... implicit steps, or when so many were short for an explicit one."""

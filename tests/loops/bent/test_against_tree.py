@@ -248,6 +248,18 @@ def test_implicit_methods_keep_their_order(method: str, order: int, step: float)
     assert errors[1] < 1e-4 and errors[0] / errors[1] > 0.8 * 2**order
 
 
+def test_a_stiff_rod_is_followed_by_implicit_steps() -> None:
+    """Where its shapes set the steps and their vibration has died out."""
+    scene = slider_crank(stiffness=1e5)
+    scene["beam"][0]["damping"] = {"stiffness": 1e-4}
+    model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
+    plain, chosen = (model.simulate(0.3, method=method, rtol=1e-6) for method in ("dop853", "auto"))
+    assert plain.success and chosen.success
+    assert plain.statistics is not None and chosen.statistics is not None
+    assert chosen.statistics.steps < 0.3 * plain.statistics.steps
+    np.testing.assert_allclose(chosen.q[-1], plain.q[-1], atol=1e-6)
+
+
 def test_what_is_refused() -> None:
     scene = slider_crank()
     model = mstmm.compile(mstmm.Scene(**scene))
