@@ -78,15 +78,40 @@ def test_runs_that_end_elsewhere_have_no_estimate() -> None:
     assert next_rtol(found, 1e-6, kind=Kind.EXPLICIT) == pytest.approx(1e-7)
 
 
-def test_an_explicit_run_after_implicit_ones_begins_anew() -> None:
+def test_an_explicit_run_after_an_implicit_one_begins_anew() -> None:
     implicit = [Look(1e-4, Kind.IMPLICIT, 0.05, 1e-4)]
     first = next_rtol(implicit, 1e-7, kind=Kind.EXPLICIT)
     assert first == first_rtol(1e-7, kind=Kind.EXPLICIT)
     found = [*implicit, Look(first, Kind.EXPLICIT, 0.0, 1e-2)]
     assert estimate(found) == pytest.approx(1.5 * 0.05)
     assert next_rtol(found, 1e-7, kind=Kind.EXPLICIT) == pytest.approx(
-        first * (1e-5 / 3) ** (1 / 0.9)
+        first * (0.4 * 1e-5 / 3) ** (1 / 0.9)
     )
+
+
+def test_an_explicit_run_after_implicit_ones_that_are_known_is_known_by_them() -> None:
+    """It errs by little where stability sets its steps: what it costs to compare it with another
+    of its kind is saved."""
+    implicit = looks(lambda rtol: 20.0 * rtol**0.8, 1e-2, 1e-4, kind=Kind.IMPLICIT)
+    first = next_rtol(implicit, 1e-3, kind=Kind.EXPLICIT)
+    apart = 20.0 * implicit[-1].rtol ** 0.8
+    implicit[-1] = Look(implicit[-1].rtol, Kind.IMPLICIT, apart, 1e-3)
+    told = estimate([*implicit, Look(first, Kind.EXPLICIT, 0.0, 1e-2)])
+    assert told is not None and told <= 1e-3
+    assert first < first_rtol(1e-3, kind=Kind.EXPLICIT)
+
+
+def test_a_third_run_suffices_where_the_second_errs_twice_as_much_as_was_believed() -> None:
+    rtols = [1e-3, 1e-6]
+
+    def error(rtol: float) -> float:
+        return (2.0 if rtol <= rtols[1] else 1.0) * 0.1 * rtol**0.9
+
+    known = estimate(looks(error, *rtols))
+    assert known is not None
+    rtols.append(next_rtol(looks(error, *rtols), known / 3, Kind.EXPLICIT))
+    told = estimate(looks(error, *rtols))
+    assert told is not None and told <= known / 3
 
 
 def test_local_errors_where_stability_sets_the_steps_count_for_less() -> None:

@@ -37,7 +37,7 @@ _VIBRATING, _LOOSE, _RISES = 700.0, 1e-3, 0.25
 
 #: The explicit method for loose tolerances, and the tolerance down to which it costs less than that
 #: of higher order.
-_LOOSE_EXPLICIT, _LOW_ORDER = "dopri5", 2e-5
+_LOOSE_EXPLICIT, _LOW_ORDER = "dopri5", 1e-4
 
 #: The exponential method; for errors from this one on, and from this |lambda| T on; steps after
 #: which its first run is given up, and that number in |lambda| T.
@@ -57,7 +57,7 @@ _PILOT = 3000
 #: falls.
 _FOLLOWED, _AT, _SLOWLY = 4.0, 1e-3, 16.0
 
-#: A step in explicit ones, and the order at which their number grows.
+#: A step in explicit ones; the order at which the number of exponential ones grows.
 _STEP, _ORDER = {Kind.IMPLICIT: 4.0, Kind.EXPONENTIAL: 2.0}, 3.0
 
 #: Explicit ones among the methods of SciPy and SUNDIALS.
@@ -158,7 +158,8 @@ class Family:
             return kind
         expected = _EXPECTED * asked
         rate = max([self._rate, *(one.rate or 0.0 for run in made for one in run.methods)])
-        growth = (last.settings.rtol / rtol) ** (1 / _ORDER)
+        order = get(implicit_method(rtol)).order if kind is Kind.IMPLICIT else _ORDER
+        growth = (last.settings.rtol / rtol) ** (1 / order)
         followed = rate * self._span / _FOLLOWED * (_AT / expected) ** (1 / _SLOWLY)
         steps = _STEP[kind] * last.statistics.steps * growth
         return Kind.EXPLICIT if steps >= followed else kind

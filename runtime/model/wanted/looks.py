@@ -56,8 +56,8 @@ class _Usual:
 
 
 _USUAL = {
-    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 3e3, 3.0, 0.3, 0.9, 1.5, 0.5, 1e-7),
-    Kind.IMPLICIT: _Usual((100.0, 1e-4, 1e-1), 1e6, 1.0, 1.0, 0.8, 1.0, 0.1, 1e-6),
+    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 2.5e3, 3.0, 0.3, 0.9, 1.5, 0.5, 1e-7),
+    Kind.IMPLICIT: _Usual((100.0, 1e-4, 3e-2), 1e6, 1.0, 1.0, 0.8, 1.0, 0.1, 1e-6),
     Kind.EXPONENTIAL: _Usual((30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.6, 1.0, 0.1, 1e-4),
 }
 
@@ -75,8 +75,16 @@ _TRUSTED, _NOISE, _SURE = 0.9, 0.5, 0.75
 #: exponential method tell nothing of others.
 _CHANGED, _ROUGH, _HARDLY = 0.8, 0.8, 0.25
 
-#: A next tolerance aims at this part of what is wanted; it is at most this part of the one before.
-_AIM, _MOST = 0.7, 0.3
+#: A next tolerance aims at this part of what is wanted: by local errors of explicit steps, by those
+#: of others, and once runs have been compared.  A run more costs more than tighter steps of high
+#: order.
+_FORETOLD, _OTHERS, _AIM = 0.4, 1.0, 0.3
+
+#: A next tolerance is at most this part of the one before: of the first one, and of later ones.
+_MOST, _LATER = 0.3, 0.1
+
+#: The first explicit tolerance behind an implicit run is at least this part of the usual first one.
+_FOLLOWING = 1e-3
 
 #: The next tolerance in the one before, where runs have parted.
 _LEAP = 1e-2
@@ -131,16 +139,33 @@ def estimate(looks: Sequence[Look]) -> float | None:
 def next_rtol(looks: Sequence[Look], asked: float, kind: Kind) -> float:
     """Tolerance of the next run, for an error `asked` in the size of the motion (1 for angles and
     parts); `kind` is that of the method by which it is made."""
-    last, known, tightest = looks[-1], estimate(looks), TIGHTEST
+    last, known, tightest, most = looks[-1], estimate(looks), TIGHTEST, _LATER
     if kind is not last.kind:
-        return first_rtol(asked, kind)
+        return _changed(last, known, asked, kind)
     if known is None or looks[-2].kind is not kind:
-        factor, tightest = (asked / _summed(last)) ** (1 / _SUMMED), min(_ROUNDING, last.rtol / 2)
+        factor, tightest = _foretold(last, asked), min(_ROUNDING, last.rtol / 2)
+        most = _MOST
     elif not looks[-2].apart < _USUAL[kind].parted:
         factor = _LEAP
     else:
         factor = (_AIM * asked / known) ** (1 / _usual(last))
-    return max(last.rtol * min(max(factor, _USUAL[kind].least), _MOST), tightest)
+    return max(last.rtol * min(max(factor, _USUAL[kind].least), most), tightest)
+
+
+def _foretold(last: Look, asked: float) -> float:
+    """The next tolerance in the last one by what its local errors sum up to."""
+    aim = _FORETOLD if last.kind is Kind.EXPLICIT else _OTHERS
+    return float((aim * asked / _summed(last)) ** (1 / _SUMMED))
+
+
+def _changed(last: Look, known: float | None, asked: float, kind: Kind) -> float:
+    """The first tolerance of another kind: of an explicit one behind implicit runs one with which
+    it is known by them, for stability sets its steps in any case."""
+    first = first_rtol(asked, kind)
+    if known is None or not (last.kind is Kind.IMPLICIT and kind is Kind.EXPLICIT):
+        return first
+    enough = last.rtol * (_AIM * asked / (_USUAL[kind].safety * known)) ** (1 / _CHANGED)
+    return min(first, max(enough, _FOLLOWING * first, TIGHTEST))
 
 
 def hopeless(looks: Sequence[Look]) -> str:
