@@ -24,6 +24,8 @@ EXPECTED = {
     "heavy-tip": ((1e6, 1e9), 1e20),
     # across its plane a chain resists with the cube of its length, and rounding of that leaks
     "inertial-axes": ((100, 2000), 1e5),
+    # one spring between a light and a heavy mass: the square of what is missed is 1 + M/m
+    "light-between": ((2.7, 3.3), 1e12),
     # docs/theory/classical-steps.md: 4 welded beams of three shapes at h = 0.001
     "product-beams": ((3, 4), 40),
     # h omega = sqrt 8, omega = sqrt(3 k) of a rod
@@ -53,6 +55,9 @@ EXPECTED = {
     "one-way": ((5.0, 100.0), 0.1),
     # eps e^beta is some thousandths, beta = (n - 1/2) pi
     "mode-shapes": ((9, 13), 1000),
+    # rounding of a stiffness 12, over z^4 for what cancels in it, beside an inertia of 13/35 z^4:
+    # 1e-6 of it at z = 0.096
+    "short-parts": ((0.06, 0.16), 1e-6),
     # eps e^beta is 1 at beta = 36, the twelfth mode
     "determinant-search": ((9, 13), 200),
     "end-moment": ((4, 20), 2),

@@ -1,0 +1,66 @@
+"""The fastest motion of heavy bodies with light ones between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ....arrays import Array
+from ....runtime.model.model import Model
+from ....runtime.run.fastest import fastest_at_start
+from ...definition import Definition, Method
+from ...scale import LOG
+from ...scenes import model
+from ...variants import pivots
+
+#: Enough that not all motions are looked at to find the fastest one.
+BODIES = 14
+#: Of the springs inboard and outboard of light bodies, N/m.
+SOFT, STIFF = 1.0, 1e6
+
+
+def _row(masses: Array, springs: Array) -> Model:
+    """Bodies on slides along one line, each behind the one before."""
+    bodies = [{"name": f"body{i}", "mass": mass} for i, mass in enumerate(masses.tolist())]
+    hinges = [
+        {"name": f"slide{i}", "type": "prismatic", "axis": [1, 0, 0], "outboard": f"body{i}",
+         "inboard": f"body{i - 1}" if i else "ground", "law": {"stiffness": spring}}
+        for i, spring in enumerate(springs.tolist())
+    ]  # fmt: skip
+    return model({"gravity": [0, 0, 0], "body": bodies, "hinge": hinges})
+
+
+def _exact(masses: Array, springs: Array) -> float:
+    """|lambda| of the fastest motion, in displacements from the ground."""
+    stretch = np.eye(BODIES) - np.eye(BODIES, k=-1)
+    weighed = np.sqrt(springs)[:, None] * stretch / np.sqrt(masses)
+    return float(np.linalg.norm(weighed, 2))
+
+
+def _missed(ratio: float, found: Callable[[Model], float]) -> float:
+    light = np.arange(BODIES) % 2 == 0
+    masses, springs = np.where(light, 1.0, ratio), np.where(light, SOFT, STIFF)
+    return _exact(masses, springs) / found(_row(masses, springs))
+
+
+def _by_iterations(row: Model) -> float:
+    return fastest_at_start(row.looped, 0.0, *row.initial_state())
+
+
+CASE = Definition(
+    name="light-between",
+    title="The fastest motion by pivots: a light body between heavy ones",
+    why="The sweep divides by the inertia D that a hinge moves outboard of it. A spring over that "
+    "is no frequency: the inboard side does not stand still. Where it is light and held softly, it "
+    "is what swings, and explicit steps that are chosen by k/D are too long by the root of the "
+    "ratio of masses. A few power iterations with M^-1, each two passes over the bodies, see both "
+    "sides.",
+    parameter="mass of the heavy bodies over that of the light ones", unit="", low=1.0, high=1e6,
+    scale=LOG,
+    measured="fastest frequency over the one found", limit=2.0,
+    method=Method("stiffness over pivots of the sweep", lambda x: _missed(x, pivots.fastest)),
+    remedy=Method("four power iterations", lambda x: _missed(x, _by_iterations)), reach=1e12,
+    source="Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 7 (D); Golub, Van Loan, Matrix "
+    "Computations, 4th ed., 2013, 8.2 (power iteration)",
+)  # fmt: skip
