@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import sympy as sp
 
-from ..derive.catalogue.registry import Element, instance
+from ..arguments import short
+from ..derive.catalogue.registry import BASES, Element, instance
 from ..derive.show.document import (
     Code,
     Formula,
@@ -104,6 +105,11 @@ def equations(
     if isinstance(of, Model):
         return _of_model(of, keep)
     if not isinstance(of, Element):
+        if not (isinstance(of, type) and issubclass(of, BASES)):
+            raise ElementError(
+                "equations: expected the name of an element, an element, a scene, its file or its "
+                f"model, found {short(of)}"
+            )
         of = instance(of)
     return _of_element(of, keep)
 

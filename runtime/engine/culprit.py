@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from mstmm.scene import Hinge, Scene
     from mstmm.scene.tables.loads import Spring
 
+#: What the messages that name an expression end with.
+REMEDY = "keep it finite where the motion goes"
+
 
 def culprit(engine: Calls, t: float, q: Array, u: Array) -> str:
     """'load "wind": force[1] = "sqrt(1-t)" is nan at t = 1.1 s'; empty if there is none.
@@ -72,7 +75,7 @@ def _equation(where: str, expression: Expression) -> str:
 
 def _sentence(where: str, expression: Expression, number: float, t: float) -> str:
     found = f"{_equation(where, expression)} is {number} at t = {t:.9g} s"
-    return f"{found}; keep it finite where the motion goes"
+    return f"{found}; {REMEDY}"
 
 
 # --- the expressions of a scene -------------------------------------------------------------------

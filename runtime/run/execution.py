@@ -12,6 +12,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import MstmmError, SceneError
 
+from ..engine.culprit import REMEDY
 from ..host.interruptible import interruptible
 from ..integrate.loop import Run, Samples, Status
 from ..integrate.settings import Settings
@@ -140,10 +141,10 @@ def first_run(
 
 def _cause(engine: Engine, run: Trajectory, q: Array, u: Array) -> str:
     """Why a run failed: its step where that is too long, at the start or, for numbers that grew
-    beyond all bounds, later."""
+    beyond all bounds, later, unless an expression stopped it."""
     step = check_step(engine, run.settings, q, u)
     wild = run.status is Status.NOT_FINITE or float(np.abs(run.u).max(initial=0.0)) > _WILD
-    if (step is None or step.risk is None) and wild:
+    if (step is None or step.risk is None) and wild and REMEDY not in run.message:
         step = check_later(engine, run) or step
     return run.message if step is None else step.blamed(run.message)
 

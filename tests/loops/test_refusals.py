@@ -25,7 +25,6 @@ def model() -> mstmm.Model:
 
 ASKED: dict[str, Callable[[mstmm.Model], Any]] = {
     "advise": lambda m: mstmm.advise(m, 0.1),
-    "chart": lambda m: mstmm.chart(m, 0.1),
     **{
         method: lambda m, method=method: m.simulate(0.1, method)  # type: ignore[misc]
         for method in ("exprb32", "scipy-DOP853", "sundials-BDF")

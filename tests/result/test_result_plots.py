@@ -137,7 +137,7 @@ def test_names_and_runs_that_are_none(run: Result) -> None:
         with pytest.raises(mstmm.SceneError, match=r"expected the name of a quantity, .*found"):
             run.plot(names, against=against)  # type: ignore[arg-type]
     for beside in (run, "run.nc", {"other": "run.nc"}):
-        with pytest.raises(mstmm.SceneError, match=r"beside: expected results by their labels"):
+        with pytest.raises(mstmm.SceneError, match=r"beside: .*expected (runs by their|a result)"):
             run.plot("energy", beside=beside)  # type: ignore[arg-type]
 
 

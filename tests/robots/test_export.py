@@ -133,10 +133,10 @@ def test_what_urdf_cannot_say_is_refused(tables: dict[str, Any], message: str) -
 def test_arguments_that_are_none(tmp_path: Path) -> None:
     scene = mstmm.Scene(gravity=[0, 0, -9.81], body=[BAR], hinge=[PIN])
     for wrong in ("arm.toml", None):
-        with pytest.raises(mstmm.SceneError, match=r"expected a scene, found .*see load_scene"):
+        with pytest.raises(mstmm.SceneError, match="expected a Scene; mstmm"):
             mstmm.export_robot(wrong)  # type: ignore[arg-type]
     for name in ("a\x01b", 5):
-        with pytest.raises(mstmm.SceneError, match="expected a name of letters and signs, found"):
+        with pytest.raises(mstmm.SceneError, match="expected a name of letters and signs"):
             mstmm.export_robot(scene, name)  # type: ignore[arg-type]
     path = tmp_path / "odd.urdf"
     path.write_text(mstmm.export_robot(scene, 'Ü "<&').text, "utf-8")
