@@ -86,6 +86,17 @@ def double_pendulum(stiffness: float | None = None, stretch: float = 0.0) -> Mod
     return model({"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges})
 
 
+def sprung_elbow(stiffness: float, damping: float = 0.0) -> Model:
+    """Two rods that fall from the horizontal, held straight by a spring and a damper in their elbow
+    (N*m/rad, N*m*s/rad) that have nothing to hold at the start."""
+    law = {"stiffness": stiffness, "damping": damping}
+    hinges = [
+        {"name": "shoulder", "type": "pin", "inboard": "ground", "outboard": "upper"},
+        {"name": "elbow", "type": "pin", "inboard": "upper.tip", "outboard": "lower", "law": law},
+    ]
+    return model({"gravity": [0, -9.81, 0], "body": [rod("upper"), rod("lower")], "hinge": hinges})
+
+
 def spinning_top(kind: str, spin: Sequence[float] = (0.0, 0.0, 0.0)) -> Model:
     """A body with three different moments of inertia that turns about its mass centre on a hinge of
     this kind, without weight; `spin` is its angular velocity at the start (rad/s)."""

@@ -20,6 +20,7 @@ from mstmm.atlas.scenes import (
     model,
     rod,
     spinning_top,
+    sprung_elbow,
 )
 from mstmm.atlas.variants import (
     all_rows,
@@ -31,6 +32,7 @@ from mstmm.atlas.variants import (
     ros3p,
     textbook_shapes,
 )
+from mstmm.atlas.variants.laws_rosenbrock import LawsSteps
 from mstmm.atlas.variants.plain_rosenbrock import Steps
 from mstmm.runtime.flexible.beam.shapes import Eigenfunction
 
@@ -153,6 +155,29 @@ def test_whole_steps_are_those_of_a_run(method: str) -> None:
     assert np.abs(Steps(pulled, method).fixed(1 / n, n)[-1, 0] - run.q[-1]).max() < 1e-13
 
 
+ELBOW_END = 0.5
+
+
+@pytest.mark.parametrize("method, order", [("rodas4", 1), ("rodas4p2", 2), ("rodas5p", 2)])
+def test_by_laws_alone_the_order_falls(method: str, order: int) -> None:
+    arm = sprung_elbow(10.0, 0.2)
+    exact = arm.simulate(ELBOW_END, rtol=1e-12, atol=1e-14, output_times=[ELBOW_END]).q[-1]
+    errors = [
+        np.abs(LawsSteps(arm, method).fixed(ELBOW_END / n, n)[-1, 0] - exact).max()
+        for n in (128, 256)
+    ]
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.2)
+
+
+@pytest.mark.parametrize("method", ["ros34pw2", "rodas4pw"])
+def test_steps_by_laws_are_those_of_a_run_where_it_offers_them(method: str) -> None:
+    arm, n = sprung_elbow(1e5, 2e3), 32
+    run = arm.simulate(
+        ELBOW_END, method, ELBOW_END / n, output_times=[ELBOW_END], tangent="laws"
+    )  # fmt: skip
+    assert np.abs(LawsSteps(arm, method).fixed(ELBOW_END / n, n)[-1, 0] - run.q[-1]).max() < 1e-13
+
+
 class ByWay(Steps):
     """Steps in which speeds weigh by what they move, with the tolerances of coordinates."""
 
@@ -162,13 +187,7 @@ class ByWay(Steps):
 
 def test_only_the_norm_makes_steps_short() -> None:
     """A spring that swings for nobody to see."""
-    hinges = [
-        {"name": "shoulder", "type": "pin", "inboard": "ground", "outboard": "upper"},
-        {"name": "elbow", "type": "pin", "inboard": "upper.tip", "outboard": "lower",
-         "law": {"stiffness": 1e8}},
-    ]  # fmt: skip
-    bodies = [rod("upper"), rod("lower")]
-    arm = model({"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges})
+    arm = sprung_elbow(1e8)
     assert ByWay(arm, "rodas4p2").needed(0.5, 1e-4, 1e-6, 100) < 20
     with pytest.raises(mstmm.NumericalFailure, match="more than 1000 steps"):
         Steps(arm, "rodas4p2").needed(0.5, 1e-4, 1e-6, 1000)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...definition import Definition, Method
 from ...measures import simulated
 from ...scale import LOG
-from ...scenes import model, rod
+from ...scenes import sprung_elbow
 from ...variants.plain_rosenbrock import Steps
 
 T_END, RTOL, ATOL = 0.5, 1e-4, 1e-6
@@ -14,23 +14,12 @@ T_END, RTOL, ATOL = 0.5, 1e-4, 1e-6
 MOST = 4000
 
 
-def _arm(stiffness: float) -> dict[str, object]:
-    """Two rods that fall from the horizontal, held straight by a spring in their elbow (N*m/rad)
-    that has nothing to hold at the start."""
-    hinges = [
-        {"name": "shoulder", "type": "pin", "inboard": "ground", "outboard": "upper"},
-        {"name": "elbow", "type": "pin", "inboard": "upper.tip", "outboard": "lower",
-         "law": {"stiffness": stiffness}},
-    ]  # fmt: skip
-    return {"gravity": [0, -9.81, 0], "body": [rod("upper"), rod("lower")], "hinge": hinges}
-
-
 def _usual(stiffness: float) -> float:
-    return Steps(model(_arm(stiffness)), "rodas4p2").needed(T_END, RTOL, ATOL, MOST)
+    return Steps(sprung_elbow(stiffness), "rodas4p2").needed(T_END, RTOL, ATOL, MOST)
 
 
 def _ours(stiffness: float) -> float:
-    run = simulated(model(_arm(stiffness)), T_END, "rodas4p2", rtol=RTOL, atol=ATOL)
+    run = simulated(sprung_elbow(stiffness), T_END, "rodas4p2", rtol=RTOL, atol=ATOL)
     assert run.statistics is not None
     return run.statistics.steps + run.statistics.rejected
 

@@ -1,0 +1,55 @@
+"""Tables of Rosenbrock's kind whose tangent knows of laws alone: their order."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from ....arrays import Array
+from ....runtime.model.model import Model
+from ...definition import Definition, Method
+from ...measures import simulated
+from ...scale import LOG
+from ...scenes import sprung_elbow
+from ...variants.laws_rosenbrock import LawsSteps
+
+T_END = 0.5
+
+
+@cache
+def _arm() -> tuple[Model, Array]:
+    """The falling rods, and their angles at the end."""
+    arm = sprung_elbow(10.0, 0.2)
+    return arm, simulated(arm, T_END, rtol=1e-12, atol=1e-14, output_times=[T_END]).q[-1]
+
+
+def _laws(step: float) -> float:
+    arm, exact = _arm()
+    steps = round(T_END / step)
+    found = LawsSteps(arm, "rodas4").fixed(T_END / steps, steps)[-1, 0]
+    return float(np.abs(found - exact).max())
+
+
+def _whatever(step: float) -> float:
+    arm, exact = _arm()
+    found = simulated(
+        arm, T_END, "rodas4pw", T_END / round(T_END / step), output_times=[T_END], tangent="laws"
+    )
+    return float(np.abs(found.q[-1] - exact).max())
+
+
+CASE = Definition(
+    name="laws-order",
+    title="A tangent of laws alone: the order of a table",
+    why="Most tables of Rosenbrock's kind owe their order to the exact tangent. With the slopes of "
+    "springs and dampers alone, which cost less, Rodas4 is left with first order, Rodas4P2 and "
+    "Rodas5P with second; runs refuse that. The tables of W-methods, ROS34PW2 and Rodas4PW, keep "
+    "theirs whatever the tangent.",
+    parameter="length of a step", unit="s", low=2e-4, high=0.05, scale=LOG,
+    measured="error of the angles after 0.5 s, rad", limit=1e-5,
+    method=Method("rodas4, tangent of laws", _laws),
+    remedy=Method("rodas4pw, tangent of laws", _whatever), reach=0.05,
+    source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.7; Rang, "
+    "Angermann, BIT 45, 2005 (W-methods)",
+)  # fmt: skip
