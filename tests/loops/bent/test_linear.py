@@ -14,10 +14,12 @@ from scipy.optimize import brentq
 
 import mstmm
 
-from .test_against_tree import SCENES, Scene, opened, slider_crank
+from .test_against_tree import SCENES, Scene, opened, shackled, slider_crank
 
 #: Shapes of every beam; all have EI = 1, 1 kg/m.
 COUNT = 10
+#: Of central differences, s and m.
+STEP = 1e-5
 
 
 def beam(name: str, length: float = 1.0, **more: Any) -> Scene:
@@ -31,8 +33,11 @@ def at_ground(name: str, outboard: str, kind: str, x: float, **more: Any) -> Sce
 
 
 def squares(scene: Scene) -> Array:
-    """(k L)^2 of the motions, which are omega."""
-    return mstmm.compile(mstmm.Scene(gravity=[0, 0, 0], **scene)).modes().omega
+    """(k L)^2 of the motions, which are omega.  Only beams have elastic energy."""
+    modes = mstmm.compile(mstmm.Scene(gravity=[0, 0, 0], **scene)).modes()
+    shares = modes.strain()
+    assert sum(shares[bent["name"]] for bent in scene["beam"]) == pytest.approx(1.0)
+    return modes.omega
 
 
 def roots(equation: Any, starts: list[float]) -> Array:
@@ -48,10 +53,10 @@ ROD = {"axial_stiffness": 1e6, "modes": {"y": COUNT, "axial": 2}}
 @pytest.mark.parametrize(
     ("first", "last", "more", "known", "bound"),
     [
-        ("fixed", "prismatic", {}, CLAMPED, 1e-9),
-        ("fixed", "fixed", ROD, CLAMPED, 1e-9),
+        ("fixed", "prismatic", {}, CLAMPED, 1e-12),
+        ("fixed", "fixed", ROD, CLAMPED, 1e-11),
         ("fixed", "pin", ROD, PROPPED, 2e-5),
-        ("pin", "pin", ROD, HINGED, 1e-7),
+        ("pin", "pin", ROD, HINGED, 1e-9),
     ],
 )
 def test_beams_between_two_hinges_on_the_ground(
@@ -163,3 +168,31 @@ def test_responses_are_those_of_the_matrices() -> None:
     for k, s in enumerate(1j * omega):
         wanted = c @ np.linalg.solve(s * np.eye(len(linear.A)) - linear.A, linear.B) + d
         assert np.abs(found.values[k] - wanted).max() < 1e-10 * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize("make", [slider_crank, shackled])
+def test_matrices_are_slopes_of_accelerations(make: Any) -> None:
+    """Beside rest under weight, by central differences between closed states."""
+    model = mstmm.compile(mstmm.Scene(**make()))
+    linear = model.linearize(inputs=["bar.tip.fy"])
+    loops, q, still = linear.mechanism, linear.state.q, np.zeros(model.nu)
+    n, places, memory = len(linear), list(linear.free), model.looped.start_memory()
+    assert loops is not None
+
+    def beside(x: Array) -> Array:
+        moved = q + model.looped.rates(0.0, q, loops.ways @ x, memory)
+        return model.accelerations(model.assemble(moved, still)[0], still)[places]
+
+    slopes = [(beside(x) - beside(-x)) / (2 * STEP) for x in STEP * np.eye(n)]
+    assert worst(np.array(slopes).T, linear.A[n:, :n]) < 1e-6
+    whole = linear.elastic + linear.geometric + linear.load
+    assert worst(whole, linear.K) < 1e-12
+
+    omega, outputs = np.array([3.0, 40.0]), ["bar.tip.position.y", "wrist.angle_rate"]
+    found = linear.frequency_response(omega, outputs=outputs, structural=0.05)
+    c = linear.output_matrices(outputs)[0]
+    for k, s in enumerate(1j * omega):
+        stiff = linear.K + 0.05j * linear.elastic
+        x = np.linalg.solve(s**2 * linear.M + s * linear.C + stiff, linear.V)
+        wanted = c[:, :n] @ x + c[:, n:] @ (s * x)
+        assert np.abs(found.values[k] - wanted).max() < 1e-9 * np.abs(wanted).max()
