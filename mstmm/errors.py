@@ -6,7 +6,7 @@ found, and one way out.  The command line prints the message alone and exits wit
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 
@@ -18,6 +18,17 @@ class MstmmError(Exception):
 
 class SceneError(MstmmError):
     """A scene (file or Python object) that does not describe a system; names file and key."""
+
+
+class OpenLoop(SceneError):
+    """A loop that cannot close; `gap` is what the row that misses most lacks (m, rad or the unit of
+    a coupling), `pose` the coordinates of the nearest pose, of hinges and shapes by their names."""
+
+    def __init__(
+        self, message: str = "", gap: float = 0.0, pose: Mapping[str, Sequence[float]] | None = None
+    ) -> None:
+        super().__init__(message)
+        self.gap, self.pose = gap, dict(pose or {})
 
 
 class ExpressionError(MstmmError):

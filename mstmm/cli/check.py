@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mstmm.errors import ElementError, MstmmError
+from mstmm.errors import ElementError, MstmmError, OpenLoop
 
 from .options import Json, python_file, quoted
 
@@ -68,6 +68,9 @@ def check(
             message, code = explain(error)
             worst = max(worst, code)
             report = {"ok": False, "message": message, "exit_code": code}
+            if isinstance(error, OpenLoop):
+                report |= {"gap": error.gap, "nearest_pose": error.pose}
+                message = "\n".join([message, *_pose_lines(each, error)])
             complain(message)
         reports.append({"name": each, **report})
     if json:
@@ -198,6 +201,17 @@ def _loop_lines(loops: Loops) -> list[str]:
     if loops.not_unique:
         lines.append(f"  loops: loads that rigid bodies leave open: {loops.open_loads}")
     return lines
+
+
+def _pose_lines(path: str, error: OpenLoop) -> list[str]:
+    """The nearest pose of a loop that stays open, and how to see it."""
+    lines = [
+        f"  nearest pose: {name}: q = {', '.join(f'{x:.6g}' for x in q)}"
+        for name, q in list(error.pose.items())[:_SHOWN]
+    ]
+    more = len(error.pose) - len(lines)
+    lines += [f"  ... and {more} more"] if more > 0 else []
+    return [*lines, f"  mstmm view {quoted(path)} draws it"]
 
 
 def _depth(tree: Topology, depth: dict[int, int], place: int) -> int:

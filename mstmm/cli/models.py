@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from mstmm.errors import NumericalFailure, SceneError
+from mstmm.errors import NumericalFailure, OpenLoop, SceneError
 
 from .options import python_file
 from .progress import waiting
@@ -53,7 +53,10 @@ def compiled(
     except (SceneError, NumericalFailure) as error:
         lines = str(error).splitlines()
         named = (f"{path}: " + line.removeprefix("scene: ") for line in lines)
-        raise SceneError("\n".join(named)) from None
+        told = "\n".join(named)
+        if isinstance(error, OpenLoop):
+            raise OpenLoop(told, error.gap, error.pose) from None
+        raise SceneError(told) from None
     if not np.isfinite(udot).all():
         raise SceneError(f"{path}: the accelerations at the start are not finite")
     return model

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+import mstmm as package
 from cli.commands import Command
 
 
@@ -22,6 +23,32 @@ def test_a_scene_at_its_start_and_moving(mstmm: Command, folder: Path) -> None:
     for name in ("still.png", "moves.png"):
         with Image.open(folder / name) as picture:
             assert picture.size[0] == 1440
+
+
+def test_the_nearest_pose_of_a_loop_that_stays_open(mstmm: Command, folder: Path) -> None:
+    """Two rods of 1 m whose feet are 2.5 m apart: in line, half a metre open; drawn and refused."""
+    rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.01, 0.1, 0.1],
+           "ends": {"tip": [1, 0, 0]}}  # fmt: skip
+    pins = [("ground", "left", 0.4), ("left.tip", "right.tip", 0.0), ("ground", "right", 2.8)]
+    hinges = [
+        {"name": f"pin{k}", "type": "pin", "inboard": inboard, "outboard": outboard, "cut": k == 1,
+         "initial": {"q": q}, "position": [2.5 * (k == 2), 0, 0]}
+        for k, (inboard, outboard, q) in enumerate(pins)
+    ]  # fmt: skip
+    del hinges[1]["position"]
+    bodies = [rod | {"name": name} for name in ("left", "right")]
+    scene = package.Scene(gravity=[0, -9.81, 0], body=bodies, hinge=hinges)
+    (folder / "short.toml").write_text(scene.to_toml())
+    done = mstmm("view", "short.toml", "-o", "short.html")
+    assert done.code == 2 and "the nearest pose leaves 0.5 m" in done.err
+    assert "short.html: the nearest pose" in done.out
+    page = (folder / "short.html").read_text()
+    assert "<title>short: nearest pose, open by 0.5</title>" in page[:4000]
+    done = mstmm("check", "short.toml")
+    assert done.code == 2 and "nearest pose: pin0: q = " in done.err
+    told = json.loads(mstmm("check", "short.toml", "--json").out)["checked"][0]
+    assert abs(told["gap"] - 0.5) < 1e-8
+    assert abs(told["nearest_pose"]["pin0"][0]) < 1e-4
 
 
 def test_a_result(mstmm: Command, folder: Path) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mstmm.errors import MstmmError
+from mstmm.errors import MstmmError, OpenLoop
 
 from ..extras import need_for
 from ..models import compiled, load_method, use_files
@@ -69,14 +69,22 @@ def view(
     for target in targets:
         need_for(target, "--output")
     use_files(hinge or [])
-    result = _result(what, t_end)
-    seen = result.view(title=title_of(Path(what)), trails=tuple(trail or ()), speed=speed)
+    title = title_of(Path(what))
+    try:
+        result, missing = _result(what, t_end), None
+    except OpenLoop as error:
+        result, missing = _nearest(what, error), error
+        title = f"{title}: nearest pose, open by {error.gap:.3g}"
+    seen = result.view(title=title, trails=tuple(trail or ()), speed=speed)
     for target in targets:
-        seen.save(target, moments)
+        seen.save(target, moments, title=missing is not None)
         if not json:
-            terminal.say(f"{target}: {_about(target, result)}")
+            about = "the nearest pose" if missing else _about(target, result)
+            terminal.say(f"{target}: {about}")
     if json:
         terminal.emit_json(made(targets, result))
+    if missing is not None:
+        raise missing
 
 
 def _result(what: str, t_end: float | None) -> Result:
@@ -94,6 +102,13 @@ def _result(what: str, t_end: float | None) -> Result:
     load_method("auto")
     with bar() as progress:
         return model.simulate(t_end, method="auto", rtol=1e-7, atol=1e-10, progress=progress)
+
+
+def _nearest(what: str, error: OpenLoop) -> Result:
+    import mstmm
+    from mstmm.bridge.nearest import nearest
+
+    return nearest(mstmm.load_scene(what), error)
 
 
 def made(targets: Sequence[Path], result: Result) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from collections.abc import Collection
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.errors import SceneError
+from mstmm.errors import OpenLoop, SceneError
 
 from ...pack.loops.variants import held, stiff
 from ...pack.pack import packed_system
@@ -66,7 +66,7 @@ class Assembly:
     def positions(self, q: Array, much: float = 0.0) -> Array:
         """q (nq,) with loops closed, or with gaps that no change closes of up to `much` (m, rad).
 
-        Raises SceneError with the least gap and what was held where there is none near.
+        Raises OpenLoop with the least gap, its pose and what was held where there is none near.
         """
         draw, start = np.random.default_rng(0), q
         nearest, missing = self._nearest(start)
@@ -80,7 +80,8 @@ class Assembly:
                 nearest, missing = trial, after
         if self._largest(missing) <= max(much, _CLOSED):
             return nearest
-        raise SceneError(self._open(missing))
+        gap = self._largest(missing)
+        raise OpenLoop(self._open(missing), gap, self._by_names(nearest))
 
     def _nearest(self, q: Array) -> tuple[Array, Array]:
         """q of the least gap that steps from q lead to, and what the rows lack there."""
@@ -207,6 +208,12 @@ class Assembly:
             f"scene: {self._subject(row)}: the nearest pose leaves "
             f"{self._amount(row, missing, '.7g')}{while_held}; {self._remedy(row)}"
         )
+
+    def _by_names(self, q: Array) -> dict[str, tuple[float, ...]]:
+        """q of hinges and of flexible bodies that have some."""
+        layout = self.calls.engine.packed.layout
+        slots = {**layout.hinges, **layout.modal}
+        return {name: tuple(q[one.q_slice].tolist()) for name, one in slots.items() if one.nq}
 
     def _names(self) -> str:
         """Hinges that are held or driven."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.errors import MstmmError, NumericalFailure, SceneError
+from mstmm.errors import MstmmError, NumericalFailure, OpenLoop, SceneError
 
 from ...pack.loops.variants import LOCKED, keeping, length_of, without
 from ...pack.pack import packed_system
@@ -109,8 +109,9 @@ class Closed:
         length = length_of(packed.system)
         try:
             near = Assembly(engine, q, holds).positions(q, _NEARLY * length)
-        except SceneError as error:
-            raise SceneError(f"{error}{self._too_many(q, holds, free_speeds)}") from None
+        except OpenLoop as error:
+            more = self._too_many(q, holds, free_speeds)
+            raise OpenLoop(f"{error}{more}", error.gap, error.pose) from None
         self._keep(near)
         self.loops, repeating = self._judged(near, free_speeds)
         self._refuse_structure()

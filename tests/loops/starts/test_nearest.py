@@ -10,6 +10,9 @@ import pytest
 from reference.jets import Array
 
 import mstmm
+from mstmm.bridge.nearest import nearest
+from mstmm.errors import OpenLoop
+from mstmm.runtime.result.result import Result
 
 from ..linkages import CRANK, FEET, OBLIQUE, ROCKER, bricard, cranks, four_bar, legs
 from ..scenes import andrews, four_bars
@@ -69,6 +72,16 @@ def gap(model: mstmm.Model, scene: dict[str, Any], q: Array, u: Array) -> float:
     return max(apart)
 
 
+def foot(scene: dict[str, Any], name: str) -> Array:
+    """Where a hinge of the ground is, m."""
+    return np.array(next(h for h in scene["hinge"] if h["name"] == name)["position"], float)
+
+
+def apart(run: Result, one: str, other: str) -> float:
+    """Distance between two ends at the start, m."""
+    return float(np.linalg.norm(run.position(one)[0] - run.position(other)[0]))
+
+
 @pytest.mark.parametrize("cut", ["knee", "tip", "end"])
 @pytest.mark.parametrize("mass", [1e-3, 1.3, 1e3])
 def test_the_least_gap_is_that_of_the_geometry(cut: str, mass: float) -> None:
@@ -83,6 +96,16 @@ def test_the_least_gap_is_that_of_the_geometry(cut: str, mass: float) -> None:
     least = abs(FEET - CRANK * np.exp(2.5j)) - ROCKER - 0.3
     with pytest.raises(mstmm.SceneError, match=f'hinge "{cut}" closes stays open') as caught:
         mstmm.compile(mstmm.Scene(**scene))
+    error = caught.value
+    assert isinstance(error, OpenLoop) and abs(error.gap - least) < 1e-6
+    assert error.pose["foot"] == (2.5,)
+    drawn = nearest(mstmm.Scene(**scene), error)
+    gaps = {
+        "knee": apart(drawn, "crank.tip", "coupler"),
+        "tip": apart(drawn, "coupler.tip", "rocker.tip"),
+        "end": float(np.linalg.norm(drawn.position("rocker")[0] - foot(scene, "end"))),
+    }
+    assert abs(gaps.pop(cut) - least) < 1e-6 and max(gaps.values()) < 1e-12
     told = re.search(r"leaves ([0-9.e-]+) m", str(caught.value))
     assert told and abs(float(told[1]) - least) < 1e-6
     assert '"foot" held' in str(caught.value)

@@ -1,0 +1,47 @@
+"""The nearest pose of a loop that does not close, to look at."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.errors import OpenLoop
+from mstmm.scene import Scene
+from mstmm.scene.checks.topology import build
+
+from .compilation import compile_scene
+
+if TYPE_CHECKING:
+    from mstmm.runtime.result.result import Result
+
+#: What holds or moves nothing that is drawn of bodies at rest: of scenes, and of their hinges.
+_ACTING = ("coupling", "constraint", "event", "load", "spring", "bushing")
+_MOVING = ("law", "drive", "initial", "hold", "cut", "release")
+
+
+def nearest(scene: Scene, error: OpenLoop) -> Result:
+    """The bodies of a scene where `error` says, at rest, without the hinges that close loops."""
+    model = compile_scene(_opened(scene), engine="looped")
+    q, _ = model.initial_state()
+    q = np.array(q)
+    for name, slots in {**model.layout.hinges, **model.layout.modal}.items():
+        if name in error.pose:
+            q[slots.q_slice] = error.pose[name]
+    return model.simulate(0.0, initial=(q, np.zeros(model.nu)))
+
+
+def _opened(scene: Scene) -> Scene:
+    """The bodies and the tree that holds them."""
+    hinges = scene.skeleton.hinges
+    cut = {hinges.name(number) for number in build(scene.skeleton).cut}
+    data = {k: v for k, v in tomllib.loads(scene.to_toml()).items() if k not in _ACTING}
+    data["hinge"] = [
+        {key: value for key, value in hinge.items() if key not in _MOVING}
+        for hinge in data.get("hinge", ())
+        if hinge["name"] not in cut
+    ]
+    for body in (*data.get("beam", ()), *data.get("elastic", ())):
+        body.pop("initial", None)
+    return Scene.from_data(data)
