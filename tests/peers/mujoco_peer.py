@@ -5,7 +5,7 @@ The frame of a MuJoCo body is the outboard end of its hinge.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree
 
@@ -47,8 +47,11 @@ def _joints(hinge: Hinge) -> list[tuple[str, Any]]:
 class MujocoPeer:
     """Forward dynamics and mass matrix of a scene by MuJoCo, in the scene's q and u."""
 
-    def __init__(self, scene: Mapping[str, Any] | Tree) -> None:
-        self.tree = read(scene)
+    def __init__(
+        self, scene: Mapping[str, Any] | Tree, meeting: Sequence[tuple[str, str]] = ()
+    ) -> None:
+        """`meeting`: pairs of ends of bodies that equality constraints keep together."""
+        self.tree, self.meeting = read(scene), meeting
         root = ElementTree.Element("mujoco")
         ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
         ElementTree.SubElement(root, "option", gravity=_text(self.tree.gravity))
@@ -56,6 +59,11 @@ class MujocoPeer:
         for number in self.tree.order:
             hinge = self.tree.hinges[number]
             nodes[hinge.child] = self._body(nodes[hinge.parent], hinge)
+        equality = ElementTree.SubElement(root, "equality")
+        for k in range(len(meeting)):
+            ElementTree.SubElement(
+                equality, "connect", site1=f"{k}:0", site2=f"{k}:1", solimp="0.9999 0.9999 0.001"
+            )
         self.model = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, "unicode"))
         self.data = mujoco.MjData(self.model)
         self.model.dof_armature[:] = self.speeds(
@@ -83,6 +91,11 @@ class MujocoPeer:
             mass=_text(body.mass),
             fullinertia=_text(entries),
         )
+        for k, i in np.ndindex(len(self.meeting), 2):
+            number, end, _ = tree.end(self.meeting[k][i])
+            if number == hinge.child:
+                where = _text(hinge.Rp.T @ (end - hinge.rp))
+                ElementTree.SubElement(node, "site", name=f"{k}:{i}", pos=where)
         for i, (kind, axis) in enumerate(_joints(hinge)):
             joint = ElementTree.SubElement(node, "joint", name=f"{hinge.name}:{i}", type=kind)
             if axis is not None:
