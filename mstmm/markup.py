@@ -1,8 +1,8 @@
-"""Tables and boxes of HTML, with everything in them escaped: for notebooks and for reports."""
+"""What notebooks show: tables and boxes of HTML, escaped, for reports too; bundles of formats."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from html import escape
 
 from .printable import printable
@@ -33,3 +33,23 @@ def bullets(sentences: Iterable[object]) -> str:
 def folded(summary: str, body: str) -> str:
     """What is read by those who ask for it."""
     return f"<details><summary>{text(summary)}</summary>{body}</details>"
+
+
+class Displayed:
+    """What a notebook shows by itself: in one bundle whatever formats its class has."""
+
+    def _plain(self) -> str:
+        """What is shown where nothing but text can be."""
+        return repr(self)
+
+    def _repr_mimebundle_(
+        self, include: Collection[str] | None = None, exclude: Collection[str] | None = None
+    ) -> dict[str, str]:
+        """Formats by their MIME types; of these `include` alone, where it is given."""
+        makers: dict[str, Callable[[], str] | None] = {
+            "text/plain": self._plain,
+            "text/html": getattr(self, "_repr_html_", None),
+            "text/latex": getattr(self, "_repr_latex_", None),
+        }
+        wanted = set(include or makers) - set(exclude or ())
+        return {kind: make() for kind, make in makers.items() if make and kind in wanted}

@@ -8,11 +8,13 @@ number and readable by name (`q.angle`, `p.radius`).
 from __future__ import annotations
 
 from collections.abc import Iterator
+from importlib import import_module
 from typing import ClassVar
 
 import sympy as sp
 
 from mstmm.ir.spec import Param
+from mstmm.markup import Displayed
 
 from .derivation import tilde
 
@@ -47,7 +49,27 @@ def described(what: str, declared: tuple[Param, ...]) -> str:
     return f"{what}: {entries}" if entries else what
 
 
-class Hinge:
+class _Definition(Displayed):
+    """An element shows its equations, which are derived when somebody looks."""
+
+    name: ClassVar[str]
+    title: ClassVar[str] = ""
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.title or self.name}>"
+
+    def _repr_html_(self) -> str:
+        return self._equations("_repr_html_")
+
+    def _repr_latex_(self) -> str:
+        return self._equations("_repr_latex_")
+
+    def _equations(self, how: str) -> str:
+        # by name: pages are made on floors above this one
+        return str(getattr(import_module("mstmm").equations(self), how)())
+
+
+class Hinge(_Definition):
     """Motion of the outboard point P against the inboard point Q (design: one hinge for all).
 
     `frame` says how its frame lies in a scene and `keys` which keys of a scene's hinge it reads
@@ -97,7 +119,7 @@ class Hinge:
         return None
 
 
-class Body:
+class Body(_Definition):
     """A body stated by the force and moment its motion needs at its input end.
 
     `residual` gives [force; moment about the input end] (6 x 1, body axes) that produces linear
@@ -125,7 +147,7 @@ class Body:
         raise NotImplementedError
 
 
-class ForceElement:
+class ForceElement(_Definition):
     """A massless element between two ends, here called `from` (F) and `to` (T).
 
     `wrench` gives force (3 x 1) and moment (3 x 1) on the T end at its point, in F axes, from the

@@ -28,6 +28,7 @@ from ..derive.show.measure import Columns
 from ..derive.show.page import printed
 from ..derive.show.subjects import of_element, view
 from ..errors import ElementError, SceneError
+from ..markup import Displayed
 from ..scene import Scene
 from ..scene.checks.types import types
 from ..scene.load import is_scene_file
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
+class Equations(Displayed):
     """A page of equations: `text`, `latex` (needs amsmath) and `html`; notebooks show it.
 
     Attributes:
@@ -71,6 +72,9 @@ class Equations:
     def html(self) -> str:
         """One page that needs nothing else."""
         return printed(self.title, self.items, "html")
+
+    def _plain(self) -> str:
+        return self.text
 
     def _repr_latex_(self) -> str:
         return self.latex

@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import ConfigDict, ValidationError, model_validator
 
 from ..ir.spec import ElementSpec
+from ..markup import Displayed
 from ..markup import table as html_table
 from ..risk import Risk, sentences
 from .checks import couplings, flexible, types
@@ -30,7 +31,7 @@ from .tables.constants import evaluated
 _source: ContextVar[str] = ContextVar("source", default="scene")
 
 
-class Scene(SceneTables):
+class Scene(SceneTables, Displayed):
     """Everything a simulation needs to know, SI units and radians, frozen.
 
     `gravity` in m/s^2, inertial axes; `constants` are numbers by their names.  Lists keep the order

@@ -14,7 +14,7 @@ from mstmm.arguments import yes_or_no
 from mstmm.arrays import Array, one, pair, real
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import NumericalFailure
-from mstmm.markup import table
+from mstmm.markup import Displayed, table
 from mstmm.risk import Risk
 
 from ..engine.given import GivenInput
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from .session import Session
 
 
-class Model(Linearised):
+class Model(Linearised, Displayed):
     """A scene ready to compute.  Made by `mstmm.compile`.
 
     `q` and `u` hold the hinges in the scene's order (`layout`); SI units and radians; speeds and

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from mstmm.markup import table
+from mstmm.markup import Displayed, table
 from mstmm.risk import Risk, sentences
 
 from ..integrate.reached import ReachedError
@@ -23,7 +23,7 @@ from .verdict import ACCURACY, Verdict
 
 
 @dataclass(frozen=True)
-class Certificate:
+class Certificate(Displayed):
     """What vouches for a run.
 
     Attributes:
@@ -131,6 +131,9 @@ class Certificate:
         rows = self.rows(verdict, warnings)
         width = max(len(name) for name, _ in rows)
         return "\n".join(f"{name.ljust(width)}  {text}" for name, text in rows)
+
+    def _plain(self) -> str:
+        return str(self)
 
     def _repr_html_(self) -> str:
         return table(self.rows())

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mstmm.arguments import path_of
-from mstmm.markup import table
+from mstmm.markup import Displayed, table
 
 from .certificate import Certificate
 from .record import Record
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .view.view import View
 
 
-class Result(Record):
+class Result(Record, Displayed):
     """What a run gave: states, and everything that follows from them, over the sample times.
 
     Arrays have the time as their first axis, SI units, radians; vectors are in inertial axes.

@@ -14,6 +14,7 @@ import pytest
 from view import scenes
 
 import mstmm
+from mstmm.derive.catalogue.registry import builtin_elements
 from mstmm.errors import SceneError
 from mstmm.extras import figures
 
@@ -47,6 +48,47 @@ def test_a_model_and_a_result() -> None:
     assert "201, t = 0 to 2 s" in shown
     assert str(run.certificate.verdict()) in shown
     assert set(cells(run.certificate._repr_html_())) <= set(shown)
+
+
+def element(name: str) -> Any:
+    return next(one for one in builtin_elements() if one.name == name)
+
+
+#: What shows itself, and the formats that it has.
+DISPLAYED: dict[str, tuple[Callable[[], Any], set[str]]] = {
+    "scene": (lambda: mstmm.Scene(**scenes.SCENE), {"text/html"}),
+    "model": (scenes.model, {"text/html"}),
+    "result": (scenes.run, {"text/html"}),
+    "certificate": (lambda: scenes.run().certificate, {"text/html"}),
+    "view": (lambda: scenes.run().view(), {"text/html"}),
+    "equations": (lambda: mstmm.equations("spring"), {"text/html", "text/latex"}),
+    "hinge": (lambda: element("prismatic"), {"text/html", "text/latex"}),
+    "force": (lambda: element("spring"), {"text/html", "text/latex"}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DISPLAYED)
+def test_everything_is_one_bundle_of_its_formats(name: str) -> None:
+    """As notebooks ask for it, which then ask no other method."""
+    make, formats = DISPLAYED[name]
+    shown = make()._repr_mimebundle_(include=None, exclude=None)
+    assert set(shown) == {"text/plain", *formats}
+    assert all(isinstance(one, str) and one for one in shown.values())
+    assert shown["text/html"].startswith("<")
+    assert " object at 0x" not in shown["text/plain"]
+    only = make()._repr_mimebundle_(include=["text/plain", "text/html"], exclude=["text/html"])
+    assert only == {"text/plain": shown["text/plain"]}
+
+
+def test_bundles_say_what_the_pages_say() -> None:
+    certificate = scenes.run().certificate
+    assert certificate._repr_mimebundle_()["text/plain"] == certificate.text()
+    spring = mstmm.equations("spring")
+    shown = element("spring")._repr_mimebundle_()
+    assert shown["text/plain"] == "<Spring: spring-damper-actuator>"
+    assert shown["text/latex"] == spring.latex == spring._repr_mimebundle_()["text/latex"]
+    assert shown["text/html"] == spring._repr_html_()
+    assert spring._repr_mimebundle_()["text/plain"] == spring.text
 
 
 def test_a_view_shows_itself() -> None:

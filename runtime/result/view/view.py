@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from mstmm.arguments import path_of, text_of, texts_of
 from mstmm.arrays import whole
 from mstmm.errors import SceneError
+from mstmm.markup import Displayed
 
 from ...host.files import replacing
 from .choices import Part, together
@@ -30,7 +31,7 @@ ENDINGS = (".html", *STRIPS, *FILMS)
 _INLINE = "480px"
 
 
-class View:
+class View(Displayed):
     """What a run looks like.  In a notebook it shows itself; `save` writes it.
 
     Attributes:
@@ -89,6 +90,9 @@ class View:
         drawn = BytesIO()
         strip(shots_of(self.parts, self.stage, moments), drawn, "png")
         return drawn.getvalue()
+
+    def __repr__(self) -> str:
+        return f"<View: {self.stage.title}>"
 
     def _repr_html_(self) -> str:
         return (
