@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from view import browser, scenes
+from view.blocks import blocks, near
 
 pytestmark = pytest.mark.skipif(browser.PROGRAM is None, reason="Chromium is not installed")
 
@@ -26,18 +27,6 @@ POINT = """(() => {
 })()"""
 
 
-#: Mean colours of 8 by 14 blocks of the scene at its start, free of words: written by looking.
-BLOCKS = Path(__file__).with_name("start.png")
-#: How far blocks of another browser may be from them, of 255: on the average, and one of them.
-MEAN, WORST = 3.0, 40.0
-
-
-def blocks(picture: bytes) -> Image.Image:
-    """The part of a page of 900 by 600 where nothing but the scene is, in blocks of 50 pixels."""
-    seen = Image.open(io.BytesIO(picture)).convert("RGB").crop((180, 190, 880, 590))
-    return seen.resize((14, 8), Image.Resampling.BOX)
-
-
 def test_the_scene_looks_as_it_did(tmp_path: Path) -> None:
     path = tmp_path / "start.html"
     scenes.model().simulate(0.0).view(path)
@@ -45,13 +34,8 @@ def test_the_scene_looks_as_it_did(tmp_path: Path) -> None:
         size = {"width": 900, "height": 600, "deviceScaleFactor": 1, "mobile": False}
         page.ask("Emulation.setDeviceMetricsOverride", **size)
         assert page.wait("document.querySelector('#mstmm div').textContent")
-        known = np.asarray(Image.open(BLOCKS).convert("RGB"), dtype=float)
-        assert page.settled(lambda picture: _near(blocks(picture), known))
-
-
-def _near(seen: Image.Image, known: np.ndarray) -> bool:
-    off = np.abs(np.asarray(seen, dtype=float) - known)
-    return bool(off.mean() < MEAN and off.max() < WORST)
+        free = (180, 190, 880, 590)  # nothing but the scene is there
+        assert page.settled(lambda picture: near(blocks(picture, free, (14, 8)), "start.png"))
 
 
 def test_a_page(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from view import browser, scenes
+from view.blocks import blocks, near
 
 import mstmm
 from mstmm import markup
@@ -53,6 +54,25 @@ def test_opened(page: Path) -> None:
         assert seen.value("document.documentElement.scrollWidth <= innerWidth")
         assert seen.console == []
     assert len(np.unique(picture.reshape(-1, 3) // 16, axis=0)) > 20
+
+
+#: Where the strip of moments is seen, below the words above them.
+STRIP = """(() => {
+  const at = document.querySelector('img').getBoundingClientRect();
+  return [at.left, at.top + 0.2 * at.height, at.right, at.bottom].map(Math.round);
+})()"""
+
+
+@pytest.mark.skipif(browser.PROGRAM is None, reason="Chromium is not installed")
+def test_the_strip_looks_as_it_did(page: Path) -> None:
+    with browser.opened(page) as seen:
+        size = {"width": 1000, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        seen.ask("Emulation.setDeviceMetricsOverride", **size)
+        assert seen.wait("document.querySelector('img') && document.querySelector('img').complete")
+        seen.value("document.querySelector('img').scrollIntoView({block: 'center'})")
+        assert seen.settled(
+            lambda picture: near(blocks(picture, seen.value(STRIP), (18, 4)), "strip.png")
+        )
 
 
 def test_it_tells_how_many_digits_hold_until_when() -> None:
