@@ -45,6 +45,13 @@ def import_robot(
         typer.Option("--hold-mimics", help="Hold joints that go with others where they start, "
                      "instead of coupling them."),
     ] = False,
+    length: Annotated[
+        str,
+        typer.Option("--length", metavar="UNIT", help="The file's lengths: m, cm, mm or in."),
+    ] = "m",
+    mass: Annotated[
+        str, typer.Option("--mass", metavar="UNIT", help="The file's masses: kg, g, t or lb.")
+    ] = "kg",
     json: Json = False,
 ) -> None:  # fmt: skip
     """Write the scene of a robot, and tell what of the file a scene has not."""
@@ -56,6 +63,7 @@ def import_robot(
     found = mstmm.import_robot(
         robot, base=base, merge=not keep_fixed, stops=stops,
         mimics="held" if hold_mimics else "coupled",
+        units={"length": length, "mass": mass},
     )  # fmt: skip
     target.write_text(found.to_toml(), encoding="utf-8")
     if json:

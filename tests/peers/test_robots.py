@@ -14,6 +14,7 @@ import pytest
 import mstmm
 from mstmm.scene.robots.convert import Choices, Imported, converted
 from mstmm.scene.robots.mjcf import read_mjcf
+from mstmm.scene.robots.units import Units, scaled
 from peers.robot_pairs import Pair, apart, imported, pairs, published
 
 #: Speeds of robots whose derivatives are compared: those of larger ones take long to prepare, so of
@@ -178,6 +179,21 @@ def test_joints_in_a_row_anchors_and_references_as_mujoco_has_them(
     for name in ("cart", "plate", "ball", "wing"):
         frame = one.names.get(f"{name}/frame", one.names[name])
         assert place(frame)[0] == pytest.approx(data.body(name).xpos, abs=1e-12)
+
+
+def test_other_units_only_scale_what_has_lengths(tmp_path: Path, rng: np.random.Generator) -> None:
+    path, one = machine(tmp_path)
+    robot = scaled(read_mjcf(str(path), path.name), Units(1e-3, 2e-3), gravity=True)
+    peer, model = mujoco.MjModel.from_xml_path(str(path)), mstmm.compile(one.scene)
+    q, u, data, ours, theirs = states(one, model, peer, rng)
+    rail, sky = (model.layout.hinges[one.names[name]] for name in ("rail", "sky"))
+    q[rail.q] *= 1e-3
+    u[rail.u] *= 1e-3
+    q[sky.q : sky.q + 3] *= 1e-3
+    got = mstmm.compile(converted(robot, Choices()).scene).accelerations(q, u)
+    got[rail.u] *= 1e3
+    wanted = data.qacc[theirs]
+    assert got[ours] == pytest.approx(wanted, rel=1e-10, abs=1e-10 * np.abs(wanted).max())
 
 
 def test_it_runs_as_mujoco_runs_it(tmp_path: Path) -> None:

@@ -16,11 +16,12 @@ from ..rules.inertia import triangle_excess
 from ..rules.messages import near
 from ..rules.values import GROUND
 from ..scene import Scene
-from .masses import joined
+from .masses import joined, without_dust
 from .meshes import Meshes
 from .names import Names
 from .robot import FIXED, NOTHING, Joint, Link, Mimic, Note, Robot
 from .tree import Tree
+from .units import doubts
 
 BASES = (FIXED, "free")
 COUPLED, HELD = MIMICS = ("coupled", "held")
@@ -70,7 +71,9 @@ class Imported:
 
 def converted(robot: Robot, choices: Choices, folder: Path | None = None) -> Imported:
     """The scene of a robot; its meshes are beside it in `folder`.  Raises SceneError."""
+    robot = without_dust(robot)
     tree = Tree(robot)
+    robot = replace(robot, notes=(*robot.notes, *doubts(robot, tree)))
     writer = _Writer(robot, tree, choices)
     if choices.merge and not writer.bodies():
         writer = _Writer(robot, tree, replace(choices, merge=False))
@@ -87,7 +90,16 @@ class _Writer:
     def __init__(self, robot: Robot, tree: Tree, choices: Choices) -> None:
         self.robot, self.tree, self.choices = robot, tree, choices
         self.notes = list(robot.notes)
-        mimics = list(self._known_mimics())
+        if len(tree.roots) > 1:
+            some = ", ".join(map(repr, tree.roots[:4])) + (", ..." if len(tree.roots) > 4 else "")
+            text = f"{len(tree.roots)} of them: {some}; each is held on its own"
+            self.notes.append(Note(robot.where, "trees", text))
+        known = list(self._known_mimics())
+        mimics = list({mimic.of: mimic for mimic in known}.values())
+        for mimic in known:
+            if mimic not in mimics:
+                what = f"of what it mimics the last one counts, not {mimic.other!r}"
+                self._tell(tree.joints[mimic.of], f"joint {mimic.of!r}", what)
         self.held = {joint.name for joint in tree.weightless()}
         for name in sorted(self.held, key=list(tree.joints).index):
             what = "nothing that it carries has mass, so it is held fixed"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from ...errors import SceneError
 from ..files.read import content_of
 from .convert import BASES, COUPLED, MIMICS, Choices, Imported, converted
 from .mjcf import read_mjcf
+from .units import Units, scaled
 from .urdf import read_urdf
 
 #: Endings, and the largest file of each in MB.
@@ -24,6 +26,7 @@ def is_robot(path: str | os.PathLike[str]) -> bool:
 def import_robot(
     path: str | os.PathLike[str], base: str = "fixed", merge: bool = True,
     stops: float | None = None, mimics: str = COUPLED,
+    units: Mapping[str, str] | None = None,
 ) -> Imported:  # fmt: skip
     """The scene of a robot's file, what became of its names, and notes on what differs.
 
@@ -32,8 +35,9 @@ def import_robot(
     base: "fixed" on the ground, or "free".  merge: links on fixed joints become part of the body
     that holds them, and their frames ends of it.  stops: stiffness (N/m or N m/rad) of stops at the
     limits of joints; without it there are none.  mimics: joints that go with others are "coupled"
-    to them, or "held" where they start, which leaves no loop.  Raises SceneError, and
-    EnvironmentFailure where MuJoCo is needed and not there.
+    to them, or "held" where they start, which leaves no loop.  units: those of
+    the file where they are not m and kg, as {"length": "mm", "mass": "g"}; times are in s.  Raises
+    SceneError, and EnvironmentFailure where MuJoCo is needed and not there.
     """
     if base not in BASES:
         raise SceneError(f'base: expected "fixed" or "free", found {base!r:.40}')
@@ -41,6 +45,7 @@ def import_robot(
         raise SceneError(f'mimics: expected "coupled" or "held", found {mimics!r:.40}')
     if stops is not None and not _is_stiffness(stops):
         raise SceneError(f"stops: expected a stiffness above 0 in N m/rad or N/m, found {stops!r}")
+    factors = Units.named(units)
     where, content = content_of(path, ENDINGS, "a robot's file")
     full = Path(os.fsdecode(path)).absolute()
     if full.suffix.lower() == ".urdf":
@@ -49,6 +54,7 @@ def import_robot(
         raise SceneError(f'{where}: base = "free" is for URDF; in MJCF a <freejoint> says so')
     else:
         robot = read_mjcf(str(full), where)
+    robot = scaled(robot, factors, gravity=full.suffix.lower() != ".urdf")
     return converted(robot, Choices(base, merge, stops, mimics), full.parent)
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ...numbers.pose import IN_PLACE, ZERO, Pose
 from ...numbers.rotations import Matrix, Vector, product, transpose
-from .robot import NOTHING, Link
+from ..rules.inertia import is_dust
+from .robot import NOTHING, Link, Note, Robot
 
 
 def joined(parts: Sequence[tuple[Link, Pose]]) -> tuple[float, Vector, Matrix]:
@@ -30,6 +32,25 @@ def joined(parts: Sequence[tuple[Link, Pose]]) -> tuple[float, Vector, Matrix]:
         arm = [place[i] - center[i] for i in range(3)]
         inertia = _plus(inertia, turned, link.mass, arm)
     return mass, center, inertia
+
+
+def without_dust(robot: Robot) -> Robot:
+    """A robot whose links without mass have no inertia that is rounding beside the others'."""
+    entries = {link.name: max(abs(x) for row in link.inertia for x in row) for link in robot.links}
+    largest, mass = max(entries.values(), default=0.0), sum(link.mass for link in robot.links)
+    dust = [
+        link for link in robot.links
+        if link.mass == 0 and entries[link.name] > 0 and is_dust(entries[link.name], largest, mass)
+    ]  # fmt: skip
+    if not dust:
+        return robot
+    what = "its inertia is rounding and it has no mass, so it counts as having neither"
+    notes = (Note(link.where, f"link {link.name!r}", what) for link in dust)
+    names = {link.name for link in dust}
+    links = tuple(
+        replace(link, inertia=NOTHING) if link.name in names else link for link in robot.links
+    )
+    return replace(robot, links=links, notes=(*robot.notes, *notes))
 
 
 def _plus(total: Matrix, inertia: Matrix, mass: float, arm: Sequence[float]) -> Matrix:

@@ -118,7 +118,10 @@ class _Reader:
             keys = {kind.axis: axis} | ({} if kind.unit else {"axis2": perpendicular(axis)})
         if kind.unit:
             keys |= self._law(one, name, kind.unit, limited=given != _UNLIMITED)
-        if kind.unit and (mimic := one.first("mimic")) is not None:
+        mimic = one.first("mimic")
+        if mimic is not None and not kind.unit:
+            self.note(one, f"joint {name!r}", f"its <mimic> is left out: a {given} joint")
+        elif mimic is not None:
             self.mimics.append(Mimic(
                 name, mimic.text("joint"), mimic.number("multiplier", 1.0, "the other's unit"),
                 mimic.number("offset", 0.0, kind.unit),
