@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from pathlib import Path
 
+import pytest
 from robots.test_urdf import ARM
 
 from cli.commands import Command
@@ -62,3 +64,13 @@ def test_nothing_is_written_over_without_being_named(mstmm: Command) -> None:
     assert Path("arm.toml").read_text() == scene and Path("arm.urdf").read_text() == ARM
     assert mstmm("import", "arm.urdf", "--output", "arm.toml").code == 0
     assert Path("arm.toml").read_text() != scene
+
+
+def test_lengths_and_masses_in_other_units(mstmm: Command) -> None:
+    Path("arm.urdf").write_text(ARM)
+    assert mstmm("import", "arm.urdf", "--length", "mm", "--mass", "g").code == 0
+    (body, *_) = tomllib.loads(Path("arm.toml").read_text())["body"]
+    assert body["mass"] == pytest.approx(0.0025)  # 2 and 0.5 g, on a flange 0.6 mm off
+    assert body["ends"]["tool"]["position"][0] == pytest.approx(0.0006)
+    done = mstmm("import", "arm.urdf", "-o", "b.toml", "--length", "furlong")
+    assert done.code == 2 and "expected one of m, cm, mm, in" in done.err
