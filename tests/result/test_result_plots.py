@@ -65,7 +65,7 @@ def test_of_many_hinges_those_are_drawn_that_move_most() -> None:
         values = run.quantity(candidate.name).values
         assert candidate.moved == np.ptp(values) and candidate.unit == "rad"
     (panel,) = run.plot().axes
-    assert panel.get_title("left") == "angle of 6 hinges (rad)" and len(panel.lines) == 7
+    assert panel.get_title("left") == "angle of 6 hinges (rad)" and len(panel.lines) == 6
     told = panel.get_legend().get_texts()[-1].get_text().replace("\n", " ")
     assert told == chosen.more and chosen.other in chosen.sentence
 
@@ -120,7 +120,10 @@ def test_runs_over_each_other_and_axes_of_others(run: Result, tmp_path: Path) ->
     assert panel.lines[1].get_ydata()[-1] == loose.energy()[-1]
     both = run.plot("elbow.angle1", "elbow.angle2", beside={"loose": loose}).axes[0]
     names = [x.get_text() for x in both.get_legend().get_texts()]
-    assert names[1] == "elbow.angle2, this run" and names[3] == "elbow.angle2, loose"
+    assert names == ["elbow.angle1", "elbow.angle2", "this run", "loose"]
+    dashes = [line.get_linestyle() for line in both.get_legend().get_lines()]
+    assert dashes == ["-", "-", "-", "--"] and both.lines[2].get_linestyle() == "--"
+    assert both.lines[2].get_label() == "elbow.angle1, loose"
     colours = [line.get_color() for line in both.lines]
     assert colours[:2] == colours[2:] and colours[0] != colours[1]
     mine = Figure().subplots(2)
@@ -144,7 +147,7 @@ def test_names_and_runs_that_are_none(run: Result) -> None:
 def test_what_one_of_several_runs_lacks_is_said(run: Result) -> None:
     other = mstmm.compile(motor("1")).simulate(1.0)
     panel = run.plot("elbow.angle1", "motor.angle", beside={"other": other}).axes[0]
-    assert len(panel.lines) == 3
+    assert len(panel.lines) == 2
     told = " ".join(panel.get_legend().get_texts()[-1].get_text().split())
     assert told == "this run has no motor.angle; other has no elbow.angle1"
     with pytest.raises(mstmm.SceneError, match=r'did you mean "elbow\.angle1"'):

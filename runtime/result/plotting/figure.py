@@ -46,8 +46,9 @@ _STYLE: dict[str, Any] = {
 #: Inches of a panel of curves, and more of one that has both axes to one scale.
 _HEIGHT, _EQUAL = 2.3, 0.9
 
-#: How curves of equal colour differ.
+#: How curves of equal colour differ, and points; the colour of runs in a legend of both.
 _STYLES = ("-", (0, (5, 1.6)), (0, (1.2, 1.4)), (0, (6, 1.5, 1.2, 1.5)))
+_MARKS, _RUN = ("o", "s", "^", "D"), "#555555"
 
 #: Amplitudes below this part of the largest are rounding and left out of sight.
 _FLOOR = 1e-6
@@ -208,20 +209,46 @@ def _draw(panel: Panel, figure: Any, axis: Any) -> None:
         axis.set_aspect("equal", "datalim")
     elif (ends := steady(panel)) is not None:
         axis.set_ylim(*ends)
-    if panel.more:
-        axis.plot([], [], " ", label=_folded(panel.more))
     if len(panel.traces) > 1 or panel.more:
-        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), handlelength=1.8)
+        axis.legend(handles=_entries(axis, panel), loc="upper left", bbox_to_anchor=(1.0, 1.0),
+                    handlelength=1.8)  # fmt: skip
+
+
+def _entries(axis: Any, panel: Panel) -> list[Any]:
+    """Of the legend: every curve, or every column by its colour and then every run by its dashes,
+    and what was left out."""
+    from matplotlib.lines import Line2D
+
+    found: list[Any] = axis.get_legend_handles_labels()[0]
+    if all(trace.run for trace in panel.traces):
+        by_column = {trace.column: _look(replace(trace, style=0)) for trace in panel.traces}
+        by_run = {trace.run: _look(replace(trace, colour=0)) for trace in panel.traces}
+        found = [Line2D([], [], label=column, **look) for column, look in by_column.items()]
+        found += [
+            Line2D([], [], label=run, **look | {"color": _RUN}) for run, look in by_run.items()
+        ]
+    if panel.more:
+        found.append(Line2D([], [], linestyle=" ", label=_folded(panel.more)))
+    return found
 
 
 def _curve(axis: Any, trace: Trace) -> None:
-    colour = _COLOURS[trace.colour % len(_COLOURS)]
-    turn = trace.style + trace.colour // len(_COLOURS)
-    axis.plot(trace.x, trace.y, label=trace.label, color=colour,
-              linestyle=_STYLES[turn % len(_STYLES)], marker="o" if len(trace.x) == 1 else None,
-              )  # fmt: skip
+    look = _look(trace)
+    axis.plot(trace.x, trace.y, label=trace.label, **look)
     if trace.low is not None and trace.high is not None:
-        axis.fill_between(trace.x, trace.low, trace.high, color=colour, alpha=0.2, linewidth=0)
+        axis.fill_between(
+            trace.x, trace.low, trace.high, color=look["color"], alpha=0.2, linewidth=0
+        )
+
+
+def _look(trace: Trace) -> dict[str, Any]:
+    """Colour and dashes of a curve, or the mark of one that is a point."""
+    turn = trace.style + trace.colour // len(_COLOURS)
+    return {
+        "color": _COLOURS[trace.colour % len(_COLOURS)],
+        "linestyle": _STYLES[turn % len(_STYLES)],
+        "marker": _MARKS[turn % len(_MARKS)] if len(trace.x) == 1 else None,
+    }
 
 
 def _amplitudes(axis: Any, panel: Panel) -> None:

@@ -29,7 +29,8 @@ _FLAT = 1e-3
 class Trace:
     """A curve through x, y (n,); `colour` and `style` are numbers from 0 on that tell it apart.
 
-    `low` and `high` (n,) are the edges of a band around it, None where there is none.
+    `low` and `high` (n,) are the edges of a band around it, None where there is none.  Where curves
+    of several runs stand for several columns, `column` and `run` say which.
     """
 
     label: str
@@ -39,6 +40,8 @@ class Trace:
     style: int = 0
     low: Array | None = None
     high: Array | None = None
+    column: str = ""
+    run: str = ""
 
 
 @dataclass(frozen=True)
@@ -126,11 +129,15 @@ def _panel(runs: Mapping[str, Shown], group: Chosen, wanted: Wanted) -> Panel:
                 lacking.append(f"{run_label} has no {name}")
                 continue
             for k, (x, y) in enumerate(_drawn(run, quantity, wanted)):
-                label = labels[place + k]
-                if len(runs) > 1:
-                    label = run_label if alone else f"{label}, {run_label}"
-                look = (number, 0) if alone else (place + k, number)
-                traces.append(Trace(label, x, y, *look))
+                column = labels[place + k]
+                if len(runs) == 1:
+                    trace = Trace(column, x, y, number if alone else place + k)
+                elif alone:
+                    trace = Trace(run_label, x, y, number)
+                else:
+                    whole = f"{column}, {run_label}"
+                    trace = Trace(whole, x, y, place + k, number, column=column, run=run_label)
+                traces.append(trace)
     more = "; ".join(filter(None, (group.more, *lacking)))
     title, below, alike = _titles(quantities, runs, wanted)
     notes = (group.sentence, *lacking, *(f"{x.name}: {x.note}" for x in quantities if x.note))
