@@ -70,6 +70,9 @@ _WAYS_OUT = {
     '"': "an expression holds no text",
 }
 
+#: Longer expressions are shown around the fault alone.
+_SHOWN = 80
+
 
 def marked(text: str, position: int) -> str:
     """A place of an expression: its number, and the piece around it with an arrow."""
@@ -115,6 +118,13 @@ class Name:
     def quantity(self) -> str:
         """Last part: t, q, u, x, y, z, vx, vy, vz or the name of a parameter."""
         return self.parts[-1]
+
+
+def around(text: str, name: Name) -> str:
+    """The expression around a name, for the end of a message: whole unless it is long."""
+    if text == name.text:
+        return ""
+    return f" (in {text!r})" if len(text) <= _SHOWN else f" ({marked(text, name.position)})"
 
 
 @dataclass(frozen=True)

@@ -228,7 +228,9 @@ BAD: list[tuple[Data, str]] = [
     (one(law=3), "law: expected a table, found 3"),
     # drives and release
     (one(drive="sin(t"), "drive: this parenthesis is never closed"),
-    (one(drive="q"), "drive: a drive depends on t alone, found 'q'"),
+    (one(drive="q"), "drive: a drive depends on t alone, found 'q'; use law.effort"),
+    (one(drive="0.1*q + t"), "found 'q' (in '0.1*q + t'); use law.effort"),
+    (one(drive="+".join(f"sin({k}*t)" for k in range(20)) + "+q"), "*t)+ -->q); use law.effort"),
     (one(drive="t + other.q"), "found 'other.q'"),
     (one(drive=["t", "t"]), "drive: expected 1 entry for a pin hinge: angle (rad), found 2"),
     (one(drive="sqrt(t)"), "is not finite at t = 0"),

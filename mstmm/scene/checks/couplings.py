@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from ...expression.drive import motion_at
 from ...expression.expression import Expression, Name
+from ...expression.parser import around
 from ...expression.slope import parted, slopes
 from ..rules.messages import Problem
 from ..rules.values import Location, found
@@ -48,9 +49,10 @@ def _right_side(coupling: Coupling, place: Location) -> Iterator[Problem]:
     equals = coupling.equals
     if equals is None:
         return
-    others = [name.text for name in equals.names if name.text != "t"]
+    others = [name for name in equals.names if name.text != "t"]
     if others:
-        yield place, f"it depends on t alone, found {others[0]!r}; write that in the coupling"
+        named = f"{others[0].text!r}{around(equals.text, others[0])}"
+        yield place, f"it depends on t alone, found {named}; write that in the coupling"
     else:
         yield from unsmooth(equals, place)
 

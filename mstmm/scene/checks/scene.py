@@ -9,7 +9,7 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 from ...expression.expression import Expression
-from ...expression.parser import Name, marked
+from ...expression.parser import around
 from ...risk import Risk
 from ..rules.inertia import negative_moment, triangle_excess
 from ..rules.messages import MAX_PROBLEMS, TABLES, Problem, near
@@ -169,8 +169,6 @@ def _inertias(scene: SceneTables) -> Iterator[Problem]:
             )
 
 
-#: Characters of an expression up to which a message quotes all of it.
-_SHOWN = 80
 _ACCEPTED = "allow_unphysical_inertia = true"
 
 
@@ -232,11 +230,4 @@ def _names(expression: Expression, scope: Scope, place: Location) -> Iterator[Pr
     for name in expression.names:
         message = problem_with(name, scope)
         if message is not None:
-            yield place, message + _context(expression.text, name)
-
-
-def _context(text: str, name: Name) -> str:
-    """The expression around a name, whole unless it is long."""
-    if text == name.text:
-        return ""
-    return f" (in {text!r})" if len(text) <= _SHOWN else f" ({marked(text, name.position)})"
+            yield place, message + around(expression.text, name)

@@ -9,6 +9,7 @@ from typing import Any, TypeGuard
 from ...errors import ExpressionError
 from ...expression.drive import jump, motion_at
 from ...expression.expression import Expression
+from ...expression.parser import around
 from ...ir.facts import HingeFacts, effort_unit
 from ...numbers.rotations import cross, norm, perpendicular, unit
 from ..rules import written
@@ -234,13 +235,13 @@ def _drive(
         if entry is None:
             continue
         place: Location = ("drive", k) if len(drive) > 1 else ("drive",)
-        others = [n.text for n in entry.names if n.text != "t" and n.text not in written.inputs()]
+        others = [n for n in entry.names if n.text != "t" and n.text not in written.inputs()]
         if others:
             inputs = " and inputs" if written.inputs() else ""
             problems.append((
                 place,
-                f"a drive depends on t{inputs} alone, found {others[0]!r}; use law.effort for "
-                "feedback",
+                f"a drive depends on t{inputs} alone, found {others[0].text!r}"
+                f"{around(entry.text, others[0])}; use law.effort for feedback",
             ))  # fmt: skip
         elif entry.depends_on_time_only:
             problems += unsmooth(entry, place)
