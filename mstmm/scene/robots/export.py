@@ -60,8 +60,6 @@ def export_robot(scene: Scene, name: str = "robot") -> Exported:
     Raises SceneError for closed loops, flexible bodies, bodies of users' types and hinges that URDF
     does not have.
     """
-    from ..scene import Scene
-
     if not isinstance(scene, Scene):
         raise SceneError(f"{short(scene)}: expected a Scene; mstmm.load_scene reads a file")
     if not isinstance(name, str) or not name.isprintable():
