@@ -1,7 +1,7 @@
 """Builds `mstmm.generated._kernels` from the C of several rooms; also reads its declarations.
 
 setup.py executes this file inside pip's build isolation, where mstmm cannot be imported: it uses
-the standard library and cffi alone, and paths relative to the project's root.
+the standard library, cffi and the headers of numpy, and paths relative to the project's root.
 
 The C is generated (elements and kernels) and written by hand (the engine, the integration).  What
 Python may call is written once, in the headers of both, between the markers `/* cdef begin */` and
@@ -23,6 +23,7 @@ GENERATED = Path("generated")
 #: Folders of C that the module is built from, and a folder of which it includes text.
 FOLDERS = (
     GENERATED, Path("runtime/engine/c"), Path("runtime/integrate/c"), Path("runtime/classical/c"),
+    Path("runtime/engine/states/c"),
 )  # fmt: skip
 PASTED = Path("templates")
 
@@ -102,6 +103,8 @@ def written_by_hand(root: Path) -> list[Path]:
 
 def ffibuilder() -> FFI:
     """The extension module of the prebuilt kernels; called by setup.py, in the project's root."""
+    import numpy as np  # its headers, when the module is built
+
     if not any(GENERATED.glob("*.c")):
         raise FileNotFoundError(f"{GENERATED}/ holds no C source; run `python -m mstmm generate`")
     sources = [source for folder in FOLDERS for source in sorted(folder.glob("*.c"))]
@@ -115,7 +118,7 @@ def ffibuilder() -> FFI:
         "\n".join([*(f'#include "{header.name}"' for header in found), identity]),
         sources=[source.as_posix() for source in sources],
         depends=[path.as_posix() for path in (*found, *sorted(PASTED.glob("*.c")))],
-        include_dirs=[folder.as_posix() for folder in (*FOLDERS, PASTED)],
+        include_dirs=[*(folder.as_posix() for folder in (*FOLDERS, PASTED)), np.get_include()],
         extra_compile_args=[*COMPILE_ARGS, *WARNING_ARGS],
         libraries=["m"],
         py_limited_api=True,

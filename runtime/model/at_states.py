@@ -49,8 +49,11 @@ class AtStates(Moving):
         Raises SceneError for a shape that does not fit, NumericalFailure naming the state and the
         hinge whose motion is undetermined.
         """
-        if type(t) is float and threads is None:
-            found = self._alone.accelerations(t, q, u, efforts)
+        if threads is None:
+            alone = self._alone
+            if alone.library is not self.fusion.library:
+                alone.renew()
+            found: Array | None = alone.accelerations(t, q, u, efforts)
             if found is not None:
                 return found if out is None else into(out, found)
         from ..engine.states.many import States, accelerations
@@ -60,12 +63,6 @@ class AtStates(Moving):
         states = States(lead, given[0], given[1], given[2], given[3] if extra else None)
         udot = accelerations(self.looped, self.fusion, states, threads)
         return into(out, udot.reshape(*lead, self.nu))
-
-    @cached_property
-    def _alone(self) -> Alone:
-        from ..engine.states.alone import Alone
-
-        return Alone(self.looped, self.fusion)
 
     def inverse_dynamics(
         self,
@@ -96,7 +93,11 @@ class AtStates(Moving):
             return into(out, actuated(self, q, u, udot, t, actuators))
         if actuators is not None:
             raise SceneError("actuators: no loop is closed in this scene, so that all speeds act")
-        if type(t) is float and (found := self._alone.efforts(t, q, u, udot)) is not None:
+        alone = self._alone
+        if alone.inverse is None or alone.inverse is not self.fusion.inverse:
+            alone.seek()
+        found: Array | None = alone.efforts(t, q, u, udot)
+        if found is not None:
             return found if out is None else into(out, found)
         engine = self.looped
         memory, nu = engine.start_memory(), self.nu
@@ -130,7 +131,7 @@ class AtStates(Moving):
         speeds do not decide the others.
         """
         if self.freedom is None and not self.layout.modal:
-            alone = self._held.efforts(0.0, q, *self._still)
+            alone: Array | None = self._held.efforts(0.0, q, *self._still)
             if alone is not None:
                 return alone if out is None else into(out, alone)
         lead, (states,) = batch(("q", q, self.nq))
@@ -167,8 +168,12 @@ class AtStates(Moving):
         speeds do not decide the others.
         """
         if self.freedom is None:
-            if (alone := self._alone.mass_matrix(q)) is not None:
-                return alone if out is None else into(out, alone)
+            alone = self._alone
+            if alone.inverse is None or alone.inverse is not self.fusion.inverse:
+                alone.seek()
+            matrix: Array | None = alone.mass(q)
+            if matrix is not None:
+                return matrix if out is None else into(out, matrix)
             refuse_dense(self.nu, "the mass matrix")
         lead, (states,) = batch(("q", q, self.nq))
         if self.freedom is not None:

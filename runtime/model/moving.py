@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arrays import Array, batch, into, row
+from mstmm.arrays import Array, batch, into
 from mstmm.errors import NumericalFailure
 
 from ..engine.compiled import Compiled
 from ..engine.shown import COLUMNS, SUMS
 
 if TYPE_CHECKING:
-    from ..engine.states.kinematics import Kinematics, Names
+    from ..engine.states.alone import Alone
+    from ..engine.states.kinematics import Brackets, Kinematics, Names
     from .derivatives import Differentiation
 
 _AXES = slice(15, 24)
@@ -36,11 +37,17 @@ class Moving(Compiled):
         Raises SceneError, here and below, for a shape that does not fit and for a body or an end
         that there is not, with the nearest name.
         """
-        return into(out, self._places(q, of)[..., COLUMNS["position"]])
+        found = self._kinematics.call("places", of)(q)
+        if found is None:
+            found = self._places(q, of)[..., COLUMNS["position"]]
+        return into(out, found)
 
     def poses(self, q: ArrayLike, of: Names, *, out: Array | None = None) -> Array:
         """Places and axes (..., 4, 4): the matrix that takes [x, y, z, 1] from the axes of the body
         or end to inertial ones."""
+        alone: Array | None = self._kinematics.call("poses", of)(q)
+        if alone is not None:
+            return into(out, alone)
         points = self._places(q, of)
         found = np.zeros((*points.shape[:-1], 4, 4))
         found[..., :3, :3] = points[..., _AXES].reshape(*points.shape[:-1], 3, 3)
@@ -49,9 +56,6 @@ class Moving(Compiled):
         return into(out, found)
 
     def _places(self, q: ArrayLike, of: Names) -> Array:
-        alone = row(q, self.nq)
-        if alone is not None:
-            return self._shaped((), of, self._kinematics.at_rest(of, alone))
         lead, (states,) = batch(("q", q, self.nq))
         return self._shaped(lead, of, self._kinematics.still(of, states))
 
@@ -59,15 +63,17 @@ class Moving(Compiled):
         self, q: ArrayLike, u: ArrayLike, of: Names, *, out: Array | None = None
     ) -> Array:
         """Velocity (m/s), then angular velocity (rad/s), (..., 6), at q (..., nq), u (..., nu)."""
-        lead, states = batch(("q", q, self.nq), ("u", u, self.nu))
-        return into(out, self._shaped(lead, of, self._kinematics.moving(of, *states)))
+        found = self._kinematics.call("velocities", of)(q, u)
+        if found is None:
+            lead, states = batch(("q", q, self.nq), ("u", u, self.nu))
+            found = self._shaped(lead, of, self._kinematics.moving(of, *states))
+        return into(out, found)
 
     def jacobian(self, q: ArrayLike, of: Names, *, out: Array | None = None) -> Array:
         """J (..., 6, nu) with `velocities` = J u; of the tree, where loops are closed."""
-        alone = row(q, self.nq)
+        alone: Array | None = self._kinematics.call("jacobian", of)(q)
         if alone is not None:
-            found = self._kinematics.jacobian(of, alone)
-            return into(out, found[0] if isinstance(of, str) else found)
+            return into(out, alone)
         lead, (states,) = batch(("q", q, self.nq))
         rows = [self._kinematics.jacobian(of, state) for state in states]
         return into(out, self._shaped(lead, of, np.array(rows)))
@@ -77,6 +83,9 @@ class Moving(Compiled):
     ) -> Array:
         """dJ/dt (..., 6, nu) along u: accelerations of the point and of its turn are
         J udot + (dJ/dt) u.  Exact, no differences."""
+        alone: Array | None = self._kinematics.call("jacobian_rate", of)(q, u)
+        if alone is not None:
+            return into(out, alone)
         lead, (states, speeds) = batch(("q", q, self.nq), ("u", u, self.nu))
         turning = [self._turning(*one_state) for one_state in zip(states, speeds, strict=True)]
         rows = [
@@ -94,7 +103,10 @@ class Moving(Compiled):
 
         Raises NumericalFailure where `accelerations` does.
         """
-        return into(out, np.asarray(self._sums(q, u, t)[..., SUMS["energy"][2]].sum(axis=-1)))
+        found = self._alone.energy(t, q, u)
+        if found is None:
+            found = np.asarray(self._sums(q, u, t)[..., SUMS["energy"][2]].sum(axis=-1))
+        return into(out, found)
 
     def energies(self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0) -> dict[str, Array]:
         """The three parts of `energy`, (...) each in J: kinetic, gravity, springs."""
@@ -109,13 +121,17 @@ class Moving(Compiled):
     ) -> Array:
         """Momentum in kg*m/s, then angular momentum about the inertial origin in kg*m2/s, (..., 6);
         see `energy`."""
-        return into(out, self._sums(q, u, t)[..., _MOMENTA])
+        found = self._alone.momentum(t, q, u)
+        return into(out, self._sums(q, u, t)[..., _MOMENTA] if found is None else found)
 
     def integrate(
         self, q: ArrayLike, u: ArrayLike, dt: ArrayLike, *, out: Array | None = None
     ) -> Array:
         """q + N(q) u dt (..., nq) of qdot = N(q) u: coordinates after dt (s) at steady rates;
         quaternions turn at a steady angular velocity and stay units."""
+        alone: Array | None = self._alone.moved(dt, q, u)
+        if alone is not None:
+            return into(out, alone)
         lead, (states, speeds, times) = batch(
             ("q", q, self.nq), ("u", u, self.nu), ("dt", dt, None)
         )
@@ -155,7 +171,7 @@ class Moving(Compiled):
         """The rate of increments by themselves (nu, nu); None where rates are the speeds."""
         if self._straight:
             return None
-        if not all(hinge.straight or hinge.steady for hinge in self.layout.hinges.values()):
+        if not self._steady:
             return self._differentiated_by(()).turning(q, u)
         return np.tensordot(u[self._curved], self._brackets, 1)
 
@@ -172,6 +188,19 @@ class Moving(Compiled):
         q[self._quaternions] = 1.0
         by = self._differentiated_by(())
         return np.array([by.turning(q, unit) for unit in units])
+
+    def _bracket_entries(self) -> Brackets | None:
+        """The same entry by entry, (by, row, column, value); None where places change it."""
+        if self._straight:
+            return []
+        if not self._steady:
+            return None
+        where = np.argwhere(self._brackets).tolist()
+        return [(self._curved[k], i, j, float(self._brackets[k, i, j])) for k, i, j in where]
+
+    @cached_property
+    def _steady(self) -> bool:
+        return all(hinge.straight or hinge.steady for hinge in self.layout.hinges.values())
 
     @cached_property
     def _straight(self) -> bool:
@@ -199,4 +228,10 @@ class Moving(Compiled):
         from ..engine.references import References
         from ..engine.states.kinematics import Kinematics
 
-        return Kinematics(self.looped, References(self.scene.skeleton))
+        return Kinematics(self.looped, References(self.scene.skeleton), self._bracket_entries)
+
+    @cached_property
+    def _alone(self) -> Alone:
+        from ..engine.states.alone import Alone
+
+        return Alone(self.looped, self.fusion)

@@ -11,6 +11,8 @@ import pytest
 
 import mstmm
 from mstmm import NumericalFailure, SceneError
+from mstmm.runtime.engine.states.alone import MOST, Alone
+from mstmm.runtime.kernels.prepared import prepared
 
 ROD: dict[str, Any] = {
     "mass": 1.2, "center_of_mass": [0.5, 0.1, 0], "inertia": [0.02, 0.08, 0.09, 0.002, 0, 0.001],
@@ -60,6 +62,45 @@ def test_a_state_alone_has_the_numbers_it_has_among_others(engine: str) -> None:
     assert np.array_equal(one.mass_matrix(q), one.mass_matrix(q[None])[0])
 
 
+def test_points_and_sums_alone_are_those_among_others() -> None:
+    """A call of its own for one state, and arrays for several: two ways to the same numbers."""
+    one, (q, u, *_) = model("looped"), state(5)
+    for of in ("d.tip", ["d.tip", "a", "ground"]):
+        asked: tuple[tuple[Any, ...], ...] = (
+            (one.positions, q), (one.poses, q), (one.velocities, q, u), (one.jacobian, q),
+            (one.jacobian_rate, q, u),
+        )  # fmt: skip
+        for call, *at in asked:
+            found, many = call(*at, of), call(*(row[None] for row in at), of)[0]
+            assert found.shape == many.shape
+            assert np.allclose(found, many, rtol=1e-12, atol=1e-14), (call, of)
+    for call, *at in ((one.energy, q, u, 0.7), (one.momentum, q, u, 0.7)):
+        found, many = call(*at), call(q[None], u[None], 0.7)[0]
+        assert found.shape == many.shape and np.array_equal(found, many), call
+    turned = 3.0 * q  # quaternions of any length
+    assert np.allclose(
+        one.integrate(turned, u, 0.2), one.integrate([turned], u, 0.2)[0], rtol=1e-14
+    )
+
+
+def test_large_scenes_let_other_threads_run() -> None:
+    rods = [ROD | {"name": f"r{k}"} for k in range(MOST + 1)]
+    pins = [
+        {"name": f"h{k}", "type": "pin", "inboard": f"r{k - 1}.tip" if k else "ground",
+         "outboard": f"r{k}", "axis": [k % 2, 1 - k % 2, 0]}
+        for k in range(MOST + 1)
+    ]  # fmt: skip
+    scene = mstmm.Scene(gravity=[0, 0, -9.81], body=rods, hinge=pins)
+    one, rng = mstmm.compile(scene, engine="looped"), np.random.default_rng(6)
+    q, u = rng.uniform(-0.1, 0.1, (2, one.nu))
+    with ThreadPoolExecutor(2) as pool:
+        alone = list(pool.map(lambda _: one.accelerations(q, u), range(4)))
+    assert all(np.array_equal(found, one.accelerations(q[None], u)[0]) for found in alone)
+    asked = np.ones(one.nu)
+    assert np.array_equal(one.inverse_dynamics(q, u, asked), one.inverse_dynamics([q], u, asked)[0])
+    assert np.array_equal(one.jacobian(q, "r9"), one.jacobian(q[None], "r9")[0])
+
+
 def test_the_mass_matrix_gives_what_inverse_dynamics_asks() -> None:
     one, (q, _, _, asked) = model("looped"), state(2)
     still, driven = np.zeros(one.nu), one.layout.hinges["four"]
@@ -107,3 +148,50 @@ def test_threads_do_not_meet() -> None:
 
     with ThreadPoolExecutor(4) as pool:
         assert all(pool.map(again, range(400)))
+
+
+def alone() -> Alone:
+    return model("looped")._alone
+
+
+def test_it_takes_rows_of_doubles_and_nothing_else() -> None:
+    calls, (q, u, push, _) = alone(), state(1)
+    assert calls.accelerations(0.0, q, u, None).shape == push.shape
+    read_only = q.copy()
+    read_only.flags.writeable = False
+    assert calls.mass(read_only) is not None
+    odd = np.zeros(8 * len(q) + 1, dtype=np.uint8)[1:].view(np.float64)  # not aligned
+    others: tuple[Any, ...] = (
+        q[:-1], q[None], q.tolist(), q.astype(np.float32), q.astype(">f8"), np.ma.array(q),
+        np.repeat(q, 2)[::2], odd, None, 1.0,
+    )  # fmt: skip
+    for other in others:
+        assert calls.mass(other) is None, other
+    assert calls.accelerations(0, q, u, None) is None  # no float
+    assert calls.efforts(0.0, q, u, None) is None  # not optional
+    assert calls.accelerations(float("nan"), q, u, None) is None
+
+
+def test_it_counts_what_it_is_given() -> None:
+    with pytest.raises(TypeError, match="expected 1 arguments"):
+        alone().mass()
+    with pytest.raises(TypeError, match="expected 4 arguments"):
+        alone().accelerations(0.0, np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("widths", "shapes", "said"),
+    [([1] * 5, [()], "at most 4"), ([1], [], "1 to 8"), ([1], [(1, 1, 1, 1)], "at most 3")],
+)
+def test_it_has_bounds(widths: list[int], shapes: list[tuple[int, ...]], said: str) -> None:
+    record = model("looped").looped.ffi.new("mstmm_alone *")
+    with pytest.raises(ValueError, match=said):
+        prepared("mstmm_alone_mass", record, widths, *shapes)
+
+
+def test_answers_are_arrays_of_their_own() -> None:
+    calls, (q, *_) = alone(), state(2)
+    first = calls.mass(q)
+    kept = first.copy()
+    calls.mass(q + 1.0)
+    assert np.array_equal(first, kept) and first.flags.owndata

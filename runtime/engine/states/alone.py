@@ -6,16 +6,27 @@ import threading
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from mstmm.arrays import Array, row
-
+from ...kernels.fused import FusedLibrary
+from ...kernels.prepared import Call, nothing, prepared
 from ..code import Fusing
 from ..engine import Engine
 from ..live import LiveInputs
 
-#: Mass matrices of more speeds take so long that nothing is kept for them.
-_MOST_KEPT = 100
+#: Scenes of more bodies or speeds take so long that other threads are let run meanwhile, each with
+#: a record of its own; and their mass matrix so long that nothing is kept for it.
+MOST = 100
+
+#: Code of the scene: that of accelerations, that of inverse dynamics and the mass matrix.
+Libraries = tuple[FusedLibrary | None, FusedLibrary | None]
+#: What a record answers.
+_CALLS = ("accelerations", "efforts", "mass", "energy", "momentum", "moved")
+
+
+def small(engine: Engine) -> bool:
+    """Whether a call takes so short a time that no other thread has to run meanwhile."""
+    return engine.packed.topology.count <= MOST and engine.nu <= MOST
 
 
 class Alone:
@@ -23,111 +34,122 @@ class Alone:
 
     They give None where a state is none of these, or where something fails: the general way then
     serves it, or says what is wrong.  Safe to call from several threads.
+
+    Attributes:
+        accelerations: (t, q, u, efforts or None) -> udot (nu,).
+        efforts: (t, q, u, udot) -> those beyond the efforts of laws (nu,).
+        mass: (q) -> (nu, nu), where no body is flexible.
+        energy: (t, q, u) -> (); momentum: (t, q, u) -> (6,).
+        moved: (dt, q, u) -> (nq,), where no body is flexible.
+        library, inverse: code of the scene behind them; `renew` where the fusion has other.
     """
+
+    accelerations: Call
+    efforts: Call
+    mass: Call
+    energy: Call
+    momentum: Call
+    moved: Call
 
     def __init__(self, engine: Engine, fusion: Fusing) -> None:
         self._engine, self._fusion = engine, fusion
-        self._nq, self._nu = engine.nq, engine.nu
         self._local = threading.local()
-        self._none = engine.ffi.NULL
-        self._accelerations = engine.lib.mstmm_alone_accelerations
-        self._efforts = engine.lib.mstmm_alone_efforts
-        self._mass = engine.lib.mstmm_alone_mass
-        self._kept = not engine.packed.layout.modal and engine.nu <= _MOST_KEPT
         self._asked = 0
+        self.renew()
 
-    def accelerations(
-        self, t: float, q: ArrayLike, u: ArrayLike, efforts: ArrayLike | None
-    ) -> Array | None:
-        """udot (nu,), a new array."""
-        at, speeds = row(q, self._nq), row(u, self._nu)
-        extra = self._none if efforts is None else row(efforts, self._nu)
-        if at is None or speeds is None or extra is None:
-            return None
-        made = self._made()
-        if self._accelerations(made.record, t, at, speeds, extra):
-            return None
-        return made.found.copy()
+    def renew(self) -> None:
+        """Go by the code that there is of the scene."""
+        by = self._fusion.library, self._fusion.inverse
+        record = _Record(self._engine, self._fusion, by) if small(self._engine) else None
+        for name in _CALLS:
+            setattr(self, name, self._of_thread(name) if record is None else getattr(record, name))
+        self.library, self.inverse = by
 
-    def efforts(self, t: float, q: ArrayLike, u: ArrayLike, udot: ArrayLike) -> Array | None:
-        """Efforts (nu,) beyond those of laws that give udot, a new array."""
-        at, speeds, rates = row(q, self._nq), row(u, self._nu), row(udot, self._nu)
-        if at is None or speeds is None or rates is None:
-            return None
-        made = self._made(inverse=True)
-        if self._efforts(made.record, t, at, speeds, rates):
-            return None
-        return made.found.copy()
-
-    def mass_matrix(self, q: ArrayLike) -> Array | None:
-        """(nu, nu), a new array, where no body is flexible."""
-        at = row(q, self._nq) if self._kept else None
-        if at is None:
-            return None
-        made = self._made(inverse=True)
-        if self._mass(made.record, at):
-            return None
-        return made.matrix.copy()
-
-    def _made(self, inverse: bool = False) -> _Record:
-        """This thread's record, made again when there is more code of the scene."""
-        fusion = self._fusion
-        if inverse and fusion.inverse is None:
-            self._ask()
-        try:
-            made: _Record = self._local.made
-            if made.library is fusion.library and made.inverse is fusion.inverse:
-                return made
-        except AttributeError:
-            pass
-        self._local.made = made = _Record(self._engine, fusion, self._kept)
-        return made
-
-    def _ask(self) -> None:
+    def seek(self) -> None:
         """Look for code of inverse dynamics at the first call, and at those numbers that double."""
-        self._asked += 1
-        if self._asked & (self._asked - 1) == 0:
-            self._fusion.ready_inverse(self._asked)
+        fusion = self._fusion
+        if fusion.inverse is None:
+            self._asked += 1
+            if self._asked & (self._asked - 1) == 0:
+                fusion.ready_inverse(self._asked)
+        if self.inverse is not fusion.inverse:
+            self.renew()
+
+    def _of_thread(self, name: str) -> Call:
+        """The call of the record that each thread has for itself."""
+
+        def call(*given: Any) -> Any:
+            return getattr(self._made(), name)(*given)
+
+        return call
+
+    def _made(self) -> _Record:
+        """This thread's record, made again when there is more code of the scene."""
+        by = self.library, self.inverse
+        made: _Record | None = getattr(self._local, "made", None)
+        if made is None or made.by != by:
+            made = self._local.made = _Record(self._engine, self._fusion, by, released=True)
+        return made
 
 
 class _Record:
-    """The record of one thread, with all that it points to.
+    """The calls of `Alone`, with all that they work on; `by`: the code of the scene behind them."""
 
-    Attributes:
-        record: for C.
-        library, inverse: code of the scene that it knows.
-        found, matrix: (nu,), (nu, nu), written by calls.
-    """
-
-    __slots__ = ("_pointed", "found", "inverse", "library", "matrix", "record")
-
-    def __init__(self, engine: Engine, fusion: Fusing, kept: bool) -> None:
+    def __init__(
+        self, engine: Engine, fusion: Fusing, by: Libraries, released: bool = False
+    ) -> None:
         nq, nu = engine.nq, engine.nu
-        self.library, self.inverse = fusion.library, fusion.inverse
-        self.found, self.matrix = np.empty(nu), np.empty((nu, nu) if kept else (0, 0))
-        self.record = record = engine.ffi.new("mstmm_alone *")
-        record.model, record.workspace = engine.packed.model, engine.workspace()
-        record.inertia = engine.inertia_alone.packed.model
-        fused = self.library is not None or self.inverse is not None
+        self._ffi, self.by = engine.ffi, by
+        ffi = engine.ffi
+        self._record = record = ffi.new("mstmm_alone *")
+        record.model, record.inertia = engine.packed.model, engine.inertia_alone.packed.model
+        fused = any(one is not None for one in self.by)
         p = np.array(fusion.numbers) if fused else np.zeros(0)
-        arrays = (
-            p, engine.start_memory(), np.zeros(nu), np.empty(nq), np.empty(2 * nu), self.found,
-            self.matrix.reshape(-1),
-        )  # fmt: skip
+        arrays = p, engine.start_memory(), np.zeros(nu), np.empty(nq), np.empty(2 * nu)
         self._pointed: list[Any] = [engine.pointer(array) for array in arrays]
-        (record.p, record.memory, record.none, record.qdot, record.work, record.found,
-         record.matrix) = self._pointed  # fmt: skip
+        record.p, record.memory, record.none, record.qdot, record.work = self._pointed
+        if released:
+            record.workspace = engine.workspace()
+        else:  # that of a thread is in use while others call
+            self._point("workspace", "real[]", np.zeros(engine.packed.workspace))
         record.fused, record.inverse = (
-            engine.ffi.NULL if one is None else one.descriptor
-            for one in (self.library, self.inverse)
+            ffi.NULL if one is None else one.descriptor for one in self.by
         )
+        fours = [int(k) for group in engine.packed.layout.groups for k in group.quaternions()]
+        record.n_quaternions = len(fours)
+        self._point("quaternions", "int[]", np.array(fours, dtype=np.int32))
         if fused:
             self._follow(engine, LiveInputs(engine.packed.system, fusion.inputs))
+        self._prepare(engine, released)
+
+    def _prepare(self, engine: Engine, released: bool) -> None:
+        nq, nu = engine.nq, engine.nu
+
+        def call(name: str, widths: tuple[int, ...], shape: tuple[int, ...], **how: bool) -> Call:
+            return prepared(
+                f"mstmm_alone_{name}", self._record, widths, shape, released=released,
+                kept=(engine, self.by, self._pointed), **how,
+            )  # fmt: skip
+
+        self.accelerations = call(
+            "accelerations", (nq, nu, nu), (nu,), numbered=True, optional=True
+        )
+        self.efforts = call("efforts", (nq, nu, nu), (nu,), numbered=True)
+        self.energy = call("energy", (nq, nu), (), numbered=True)
+        self.momentum = call("momentum", (nq, nu), (6,), numbered=True)
+        rigid = not engine.packed.layout.modal
+        self.mass = call("mass", (nq,), (nu, nu)) if rigid and nu <= MOST else nothing
+        self.moved = call("moved", (nq, nu), (nq,), numbered=True) if rigid else nothing
+
+    def _point(self, name: str, kind: str, array: NDArray[Any]) -> None:
+        pointer = self._ffi.from_buffer(kind, array)
+        self._pointed.append(pointer)
+        setattr(self._record, name, pointer)
 
     def _follow(self, engine: Engine, live: LiveInputs) -> None:
         if live.varies:
             places: NDArray[np.int32] = live.places
-            to = self.record.live
+            to = self._record.live
             to.n, to.inputs = len(places), engine.packed.model.inputs
             to.places = place = engine.ffi.from_buffer("int[]", places)
             self._pointed.append(place)

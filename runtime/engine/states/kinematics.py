@@ -7,19 +7,22 @@ are left out, so that no motion has to be determined.
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from mstmm.arrays import Array, numbers
+from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.scene import split
 
+from ...kernels.prepared import Call, nothing, prepared
 from ..calls import Probe
 from ..engine import Engine
 from ..references import References
 from ..shown import COLUMNS
+from .alone import small
 
 #: Columns of a probe: velocity and angular velocity, acceleration and angular acceleration.
 _MOVES = [*range(3, 6), *range(9, 12)]
@@ -30,58 +33,93 @@ _TURNS = COLUMNS["angular_velocity"]
 Names = str | Sequence[str]
 
 
+#: What a call of `Kinematics.call` reads, q or q and u, and what it answers of a point.
+_SHAPES: dict[str, tuple[bool, tuple[int, ...]]] = {
+    "places": (False, (3,)), "poses": (False, (4, 4)), "velocities": (True, (6,)),
+    "jacobian": (False, (6,)), "jacobian_rate": (True, (6,)),
+}  # fmt: skip
+
+#: (by, row, column, value): increments turn by themselves, the rate of `row` by `column` being
+#: value times the speed `by`.
+Brackets = list[tuple[int, int, int, float]]
+
+
 class Kinematics:
     """Calls on one packed scene.  Safe to make from several threads.
 
-    Rows of states are arrays (n, nq), (n, nu), or the bytes of one.
+    Rows of states are arrays (n, nq), (n, nu).  `brackets` are those of the increments, None where
+    they change with the state.
     """
 
-    def __init__(self, engine: Engine, references: References) -> None:
+    def __init__(
+        self, engine: Engine, references: References, brackets: Callable[[], Brackets | None]
+    ) -> None:
         self._engine, self._references = engine.inertia_alone, references
+        self._brackets, self._bends = brackets, bool(engine.packed.layout.modal)
         self._known = dict[Names, tuple[Any, int]]()
+        self._calls = dict[tuple[str, Names], Call]()
         self._local = threading.local()
-        self._still = np.zeros(engine.nu).tobytes()
-        self._bends = bool(engine.packed.layout.modal)
-        lib = engine.lib
-        self._points, self._rows = lib.mstmm_moving_points, lib.mstmm_jacobians
-        self._numbers, self._no_number = int(lib.MSTMM_PROBE_NUMBERS), int(lib.MSTMM_NO_NUMBER)
+        self._numbers = int(engine.lib.MSTMM_PROBE_NUMBERS)
 
-    def points(self, of: Names, n: int, q: Any, u: Any, udot: Any) -> Array:
+    def call(self, kind: str, of: Names) -> Call:
+        """The call on one state, q (nq,) or q and u (nu,), that answers "places", "poses",
+        "velocities", "jacobian" or "jacobian_rate" of bodies or ends."""
+        key = of if isinstance(of, str) else tuple(of)
+        found = self._calls.get((kind, key))
+        if found is None:
+            found = self._calls[kind, key] = self._prepared(kind, key)
+        return found
+
+    def _prepared(self, kind: str, of: Names) -> Call:
+        engine, (probes, count) = self._engine, self._probes(of)
+        by_speeds = kind.startswith("jacobian")
+        brackets = self._brackets() if kind == "jacobian_rate" and not self._bends else []
+        if brackets is None or not small(engine) or (by_speeds and self._bends):
+            return nothing
+        moving, shape = _SHAPES[kind]
+        several = () if isinstance(of, str) else (count,)
+        record = _Points(engine, self._room, probes, count, brackets)
+        return prepared(
+            f"mstmm_points_{kind}", record.record, (engine.nq, engine.nu)[: 1 + moving],
+            (*several, *shape, *((engine.nu,) if by_speeds else ())), kept=record,
+        )  # fmt: skip
+
+    @cached_property
+    def _room(self) -> Any:
+        """A workspace that all of these calls use, of which one at a time runs."""
+        return self._engine.pointer(np.zeros(self._engine.packed.workspace))
+
+    def points(self, of: Names, q: Array, u: Array, udot: Array) -> Array:
         """(n, k, 24): motion of k bodies or ends, see `Observation`."""
         probes, count = self._probes(of)
-        found = np.empty((n, count, self._numbers))
-        given = (self._bytes(x) for x in (q, u, udot))
-        self._call(self._points, n, *given, count, probes, self._engine.pointer(found))
+        found = np.empty((len(q), count, self._numbers))
+        given = (self._engine.pointer(x) for x in (q, u, udot))
+        self._run("moving_points", len(q), *given, count, probes, self._engine.pointer(found))
         return found
 
     def still(self, of: Names, q: Array) -> Array:
         """`points` of n states at rest."""
-        nothing = np.zeros((len(q), self._engine.nu))
-        return self.points(of, len(q), q, nothing, nothing)
-
-    def at_rest(self, of: Names, q: bytes) -> Array:
-        """`points` of one state at rest."""
-        return self.points(of, 1, q, self._still, self._still)
+        rest = np.zeros((len(q), self._engine.nu))
+        return self.points(of, q, rest, rest)
 
     def moving(self, of: Names, q: Array, u: Array) -> Array:
         """(n, k, 6): velocity and angular velocity, inertial axes."""
-        return self.points(of, len(q), q, u, np.zeros(u.shape))[..., _MOVES]
+        return self.points(of, q, u, np.zeros(u.shape))[..., _MOVES]
 
-    def jacobian(self, of: Names, q: Any) -> Array:
+    def jacobian(self, of: Names, q: Array) -> Array:
         """(k, 6, nu) of one state: what each speed adds to `moving`."""
         if self._bends:
             return self._by_units(of, q)
         probes, count = self._probes(of)
         found = np.empty((count, 6, self._engine.nu))
-        self._call(self._rows, self._bytes(q), count, probes, self._engine.pointer(found))
+        self._run("jacobians", self._engine.pointer(q), count, probes, self._engine.pointer(found))
         return found
 
-    def _by_units(self, of: Names, q: Any) -> Array:
+    def _by_units(self, of: Names, q: Array) -> Array:
         """The same by one speed after the other, modes among them."""
         nu = self._engine.nu
-        row = np.frombuffer(q) if isinstance(q, bytes) else q
-        many, units = np.tile(row, (nu, 1)), np.eye(nu)
-        return np.moveaxis(self.points(of, nu, many, units, np.zeros((nu, nu)))[..., _MOVES], 0, -1)
+        many, units = np.tile(q, (nu, 1)), np.eye(nu)
+        return np.moveaxis(self.points(of, many, units, np.zeros((nu, nu)))[..., _MOVES], 0, -1)
 
     def jacobian_rate(self, of: Names, q: Array, u: Array, turning: Array | None) -> Array:
         """(k, 6, nu) of one state: the rate of `jacobian` along speeds u (nu,).
@@ -95,7 +133,7 @@ class Kinematics:
         size = max(1.0, float(np.abs(u).max(initial=0.0)))
         steps = size * np.eye(nu)
         speeds = np.concatenate([u + steps, u - steps])
-        own = self.points(of, 2 * nu, np.tile(q, (2 * nu, 1)), speeds, np.zeros((2 * nu, nu)))
+        own = self.points(of, np.tile(q, (2 * nu, 1)), speeds, np.zeros((2 * nu, nu)))
         own = own[..., _GAINS]
         found = np.moveaxis(own[:nu] - own[nu:], 0, -1) / (4 * size)
         jacobian = self.jacobian(of, q)
@@ -118,15 +156,10 @@ class Kinematics:
             known = self._known[key] = self._engine.probes(places), len(places)
         return known
 
-    def _bytes(self, rows: Any) -> Any:
-        return rows if isinstance(rows, bytes) else self._engine.pointer(rows)
-
-    def _call(self, function: Any, *given: Any) -> None:
+    def _run(self, function: str, *given: Any) -> None:
         made = self._made()
-        code = function(made.record, *given, made.failure)
-        if code == self._no_number:  # of one state, which nobody has looked at
-            numbers("q", np.frombuffer(next(x for x in given if isinstance(x, bytes))))
-        if code:
+        run = getattr(self._engine.lib, f"mstmm_{function}")
+        if run(made.record, *given, made.failure):
             raise NumericalFailure(self._engine.failure_text(made.failure, 0.0))
 
     def _made(self) -> _Record:
@@ -143,9 +176,32 @@ class _Record:
     __slots__ = ("_pointed", "failure", "record")
 
     def __init__(self, engine: Engine) -> None:
-        self.record = record = engine.ffi.new("mstmm_kinematics *")
+        self.record = engine.ffi.new("mstmm_kinematics *")
         self.failure = engine.ffi.new("mstmm_failure *")
-        arrays = engine.start_memory(), np.zeros(engine.nu), np.empty(engine.nu)
-        self._pointed = [engine.pointer(array) for array in arrays]
-        record.model, record.workspace = engine.packed.model, engine.workspace()
-        record.memory, record.none, record.work = self._pointed
+        self._pointed = _fill(self.record, engine, engine.workspace())
+
+
+class _Points:
+    """What C works with where the same bodies or ends are asked for again and again."""
+
+    def __init__(
+        self, engine: Engine, room: Any, probes: Any, count: int, brackets: Brackets
+    ) -> None:
+        nu, bodies = engine.nu, engine.packed.topology.count
+        self.record = record = engine.ffi.new("mstmm_points *")
+        pointed = [engine.pointer(np.empty(size)) for size in (nu, 6 * nu)]
+        record.speeds, record.rows = pointed
+        way = engine.ffi.from_buffer("int[]", np.empty(bodies, dtype=np.int32))
+        turns = engine.ffi.new("mstmm_bracket[]", brackets)
+        record.n_probes, record.probes, record.way = count, probes, way
+        record.n_brackets, record.brackets = len(brackets), turns
+        self._pointed = *pointed, probes, way, turns, *_fill(record.at, engine, room), room, engine
+
+
+def _fill(record: Any, engine: Engine, workspace: Any) -> list[Any]:
+    """Fill `mstmm_kinematics`; what it points to."""
+    arrays = engine.start_memory(), np.zeros(engine.nu), np.empty(engine.nu)
+    pointed = [engine.pointer(array) for array in arrays]
+    record.model, record.workspace = engine.packed.model, workspace
+    record.memory, record.none, record.work = pointed
+    return pointed
