@@ -141,23 +141,6 @@ def columns(name: str, value: ArrayLike, width: int) -> tuple[bool, Array]:
     return False, array
 
 
-def plain(value: ArrayLike, width: int) -> TypeGuard[Array]:
-    """Whether it is one state as C reads it, which most calls give: so many doubles in a row."""
-    return (
-        type(value) is np.ndarray
-        and value.dtype is _DOUBLE
-        and value.shape == (width,)
-        and value.flags.c_contiguous
-    )
-
-
-def row(value: ArrayLike, width: int) -> bytes | None:
-    """The same state's numbers as C reads them, a copy; None where it is no such state."""
-    if type(value) is np.ndarray and value.dtype is _DOUBLE and value.shape == (width,):
-        return value.tobytes()
-    return None
-
-
 #: How many numbers there are per state: one, a row of so many, or an array of such a shape.
 Width = int | tuple[int, int] | None
 

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from mstmm.arrays import Array
 
 from ..kernels.fused import FusedLibrary
+from ..kernels.prepared import Call as Prepared
+from ..kernels.prepared import prepared
 from .code import Fusing
 from .engine import Engine
 from .live import LiveInputs
@@ -119,8 +121,9 @@ class Call:
         self, engine: Engine, library: FusedLibrary, numbers: Array, live: LiveInputs, n: int
     ) -> None:
         self._ffi, self._lib, self._n, self._nu = engine.ffi, engine.lib, n, engine.nu
+        room = n * (n + engine.lib.MSTMM_TILE_COLUMNS)
         p, memory, none = np.array(numbers), engine.start_memory(), np.zeros(engine.nu)
-        self._kept = library, live, *map(engine.pointer, (p, memory, none, np.empty(n * n)))
+        self._kept = library, live, *map(engine.pointer, (p, memory, none, np.empty(room)))
         self._real = engine.ffi.typeof("double[]")
         self._record = record = engine.ffi.new("mstmm_linear_code *")
         record.fused, record.n = library.descriptor, n
@@ -130,6 +133,18 @@ class Call:
             record.live.n, record.live.inputs = len(live.places), engine.packed.model.inputs
             record.live.places = engine.ffi.from_buffer("int[]", self._places)
         self._numbers = int(engine.lib.mstmm_linear_numbers(record))
+        self.derivatives = self._prepared(engine, self._numbers)
+
+    def _prepared(self, engine: Engine, numbers: int) -> Prepared:
+        """A call on t, q (nq,) and u (nu,) of a scene without drives: udot, its slopes -M^-1 K,
+        -M^-1 C, M^-1 and -M^-1 r_t, G, and 1."""
+        n, record = self._n, engine.ffi.new("mstmm_linear_alone *")
+        record.code, record.efforts = self._record[0], self._no_efforts
+        record.found = found = engine.pointer(np.empty(numbers))
+        return prepared(
+            "mstmm_linear_derivatives", record, (engine.nq, engine.nu), (engine.nu,),
+            (n, n), (n, n), (n, n), (n,), (n, n), (n, n), numbered=True, kept=(self._kept, found),
+        )  # fmt: skip
 
     def at(self, t: float, q: Array, u: Array) -> About | None:
         """See `Slopes.at`."""

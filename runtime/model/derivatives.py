@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arrays import Array, batch, plain
+from mstmm.arrays import Array, batch
 from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.live import LiveInputs
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 #: What code of linear equations saves a state beside directions one by one, in what it saves where
 #: a model is made linear; measured.
 _SAVED = 10.0
+#: What that code finds, in its order.
+_FOUND = ("udot", "q", "u", "efforts", "t", "rate_q", "rate_u")
 #: More bodies than this are not differentiated: work and results grow with their square.
 MOST_BODIES = 1000
 
@@ -99,7 +101,7 @@ class Differentiation:
         """`Model.derivatives`; `accelerations` gives those of all its states, or refuses them."""
         nq, nu, names = self._model.nq, self._model.nu, self.names
         if self._undriven and type(t) is float and efforts is None:
-            one = self._one(t, q, u) if plain(q, nq) and plain(u, nu) else None
+            one = self._one(t, q, u)
             if one is not None:
                 return one
         lead, (coordinates, speeds, times, extra) = batch(
@@ -120,20 +122,15 @@ class Differentiation:
             **{name: shaped(name, nu, nu) for name in ("q", "u", "efforts", "rate_q", "rate_u")},
         )
 
-    def _one(self, t: float, q: Array, u: Array) -> Derivatives | None:
+    def _one(self, t: float, q: ArrayLike, u: ArrayLike) -> Derivatives | None:
         """Those of one state by the code of its linear equations; None where there is no such code,
         or where it finds none: then the other way says why."""
         call = self._model.slopes.call(_SAVED)
-        found = None if call is None else call.with_slopes(t, q, u)
+        found = None if call is None else call.derivatives(t, q, u)
         if found is None:
             return None
-        about, slopes = found
-        n = len(slopes)
         made = object.__new__(Derivatives)  # a frozen one is filled field by field otherwise
-        made.__dict__.update(
-            udot=about.a, q=slopes[:, :n], u=slopes[:, n : 2 * n], efforts=slopes[:, 2 * n : -1],
-            t=slopes[:, -1], rate_q=about.G, rate_u=self._units.copy(), parameters={},
-        )  # fmt: skip
+        made.__dict__.update(zip(_FOUND, found, strict=True), parameters={})
         return made
 
     def _all_at_once(self, t: Array, q: Array, u: Array, efforts: Array) -> dict[str, Array] | None:

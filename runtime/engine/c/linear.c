@@ -2,6 +2,7 @@
 #include "linear.h"
 
 #include "finite.h"
+#include "wide.h"
 
 #include <string.h>
 
@@ -46,21 +47,6 @@ int mstmm_linear_swept(mstmm_tangent *at, real t, const real *q, const real *u, 
     return code;
 }
 
-typedef real two_reals __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
-
-/* to -= factor from, of m numbers */
-static void take_away(int m, real factor, const real *restrict from, real *restrict to)
-{
-    int c = 0;
-    for (; c + 4 <= m; c += 4) {
-        const two_reals *other = (const two_reals *)(from + c);
-        two_reals *own = (two_reals *)(to + c);
-        own[0] -= factor * other[0];
-        own[1] -= factor * other[1];
-    }
-    for (; c < m; c++) to[c] -= factor * from[c];
-}
-
 /* M = L^T D L from the last speed to the first, which leaves zeros between branches of a tree what
  * they are (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 6.5).  Below the diagonal
  * `factors` gets L, on it 1 / D. */
@@ -74,27 +60,123 @@ static int factored(int n, const real *restrict mass, real *restrict factors)
         for (int i = k - 1; i >= 0; i--) {
             const real scaled = last[i] * last[k];
             if (scaled == 0) continue;
-            take_away(i + 1, scaled, last, factors + n * i);
+            for (int j = 0; j <= i; j++) factors[n * i + j] -= scaled * last[j];
             last[i] = scaled;
         }
     }
     return 0;
 }
 
-/* rows (n x m) become M^-1 rows; `factors` are n x n numbers of room. */
-static int divide_by_mass(int n, int m, const real *restrict mass, real *restrict rows,
-                          real *restrict factors)
+/* Columns that are solved at a time, which stay in registers; and those of a call, taken together:
+ * `to` (rows `stride` apart) becomes -M^-1 from (n x width), M^-1 where there is none. */
+enum { TILE = MSTMM_TILE_COLUMNS };
+typedef struct {
+    const real *from;
+    int width, stride;
+    real *to;
+} columns;
+
+/* The next `width` columns from `first` on, side by side in rows of a tile. */
+static void laid_out(int n, const columns *of, int first, int width, real *tile)
 {
-    if (factored(n, mass, factors)) return 1;
-    for (int i = n - 1; i >= 0; i--)
-        for (int j = 0; j < i; j++)
-            if (factors[n * i + j] != 0)
-                take_away(m, factors[n * i + j], rows + m * i, rows + m * j);
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < width; k++)
+            tile[TILE * i + k] =
+                of->from ? -of->from[of->width * i + first + k] : (real)(i == first + k);
+}
+
+static void taken_back(int n, const columns *of, int first, int width, const real *tile)
+{
+    for (int i = 0; i < n; i++)
+        memcpy(of->to + of->stride * i + first, tile + TILE * i, (size_t)width * sizeof(real));
+}
+
+/* Four numbers: of longer vectors compilers for shorter registers make detours over memory. */
+typedef real quad __attribute__((vector_size(4 * sizeof(real)), aligned(sizeof(real)), may_alias));
+
+/* A row of a tile, by name so that it stays in registers. */
+typedef struct {
+    quad a, b, c, d, e, f, g, h;
+} row;
+_Static_assert(sizeof(row) == TILE * sizeof(real), "a row is as wide as a tile");
+
+MSTMM_INLINE void take_row(row *own, real times, const real *other)
+{
+    const quad factor = {times, times, times, times}, *from = (const quad *)other;
+    own->a -= factor * from[0];
+    own->b -= factor * from[1];
+    own->c -= factor * from[2];
+    own->d -= factor * from[3];
+    own->e -= factor * from[4];
+    own->f -= factor * from[5];
+    own->g -= factor * from[6];
+    own->h -= factor * from[7];
+}
+
+MSTMM_INLINE void get_row(row *own, real times, const real *of)
+{
+    const quad factor = {times, times, times, times}, *from = (const quad *)of;
+    own->a = factor * from[0], own->b = factor * from[1];
+    own->c = factor * from[2], own->d = factor * from[3];
+    own->e = factor * from[4], own->f = factor * from[5];
+    own->g = factor * from[6], own->h = factor * from[7];
+}
+
+MSTMM_INLINE void put_row(const row *own, real *to)
+{
+    quad *into = (quad *)to;
+    into[0] = own->a, into[1] = own->b, into[2] = own->c, into[3] = own->d;
+    into[4] = own->e, into[5] = own->f, into[6] = own->g, into[7] = own->h;
+}
+
+MSTMM_WIDE static void solve_tile(int n, const real *restrict factors, real *restrict tile)
+{
+    row own;
+    for (int j = n - 1; j >= 0; j--) {
+        get_row(&own, 1, tile + TILE * j);
+        for (int i = n - 1; i > j; i--)
+            if (factors[n * i + j] != 0) take_row(&own, factors[n * i + j], tile + TILE * i);
+        put_row(&own, tile + TILE * j);
+    }
     for (int i = 0; i < n; i++) {
-        for (int c = 0; c < m; c++) rows[m * i + c] *= factors[n * i + i];
+        get_row(&own, factors[n * i + i], tile + TILE * i);
         for (int j = 0; j < i; j++)
-            if (factors[n * i + j] != 0)
-                take_away(m, factors[n * i + j], rows + m * j, rows + m * i);
+            if (factors[n * i + j] != 0) take_row(&own, factors[n * i + j], tile + TILE * j);
+        put_row(&own, tile + TILE * i);
+    }
+}
+
+/* As many columns as a tile holds, laid out there or taken back from it, from column `first` of
+ * *all on; returns where the next ones begin. */
+static const columns *moved(int n, const columns *all, const columns *end, int *first, int back,
+                            real *tile)
+{
+    for (int used = 0; all < end && used < TILE;) {
+        const int left = all->width - *first, room = TILE - used;
+        const int width = left < room ? left : room;
+        if (back)
+            taken_back(n, all, *first, width, tile + used);
+        else
+            laid_out(n, all, *first, width, tile + used);
+        used += width;
+        *first += width;
+        if (*first == all->width) all++, *first = 0;
+    }
+    return all;
+}
+
+/* All columns by the mass matrix (n x n); `work` as mstmm_linear_code has it. */
+static int divide_by_mass(int n, const real *mass, int count, const columns *all, real *work)
+{
+    const columns *end = all + count;
+    real *tile = work + n * n;
+    int first = 0, behind = 0;
+    if (factored(n, mass, work)) return 1;
+    memset(tile, 0, (size_t)(TILE * n) * sizeof(real));
+    while (all < end) {
+        moved(n, all, end, &first, 0, tile);
+        solve_tile(n, work, tile);
+        all = moved(n, all, end, &behind, 1, tile);
     }
     return 0;
 }
@@ -104,15 +186,10 @@ int mstmm_state_matrix(const mstmm_linear_code *code, const real *found, int tur
     const int n = code->n;
     const real *M = found + code->fused->nu, *C = M + n * n, *K = C + n * n, *G = K + n * n;
     real *below = matrix + 2 * n * n;
+    const columns both[] = {{K, n, 2 * n, below}, {C, n, 2 * n, below + n}};
     memset(matrix, 0, 2 * (size_t)(n * n) * sizeof(real));
-    for (int i = 0; i < n; i++) {
-        matrix[2 * n * i + n + i] = 1;
-        for (int j = 0; j < n; j++) {
-            below[2 * n * i + j] = -K[n * i + j];
-            below[2 * n * i + n + j] = -C[n * i + j];
-        }
-    }
-    const int singular = divide_by_mass(n, 2 * n, M, below, code->work);
+    for (int i = 0; i < n; i++) matrix[2 * n * i + n + i] = 1;
+    const int singular = divide_by_mass(n, M, 2, both, code->work);
     /* x'' = G x' + u', where u' goes with u = x' - G x. */
     for (int i = 0; turning && i < n; i++) {
         real *by_x = below + 2 * n * i, *by_rate = by_x + n;
@@ -128,15 +205,28 @@ int mstmm_accelerations_about(const mstmm_linear_code *code, real t, const real 
 {
     const int n = code->n, width = 3 * n + 1;
     const real *M = found + code->fused->nu, *C = M + n * n, *K = C + n * n, *r_t = K + 2 * n * n;
-    if (mstmm_linear_at(code, t, q, u, efforts, found)) return 1;
-    for (int i = 0; i < n; i++) {
-        real *right = slopes + i * width;
-        for (int j = 0; j < n; j++) {
-            right[j] = -K[n * i + j];
-            right[n + j] = -C[n * i + j];
-            right[2 * n + j] = i == j;
-        }
-        right[3 * n] = -r_t[i];
-    }
-    return divide_by_mass(n, width, M, slopes, code->work) || !mstmm_finite(n * width, slopes);
+    const columns all[] = {{K, n, width, slopes}, {C, n, width, slopes + n},
+                           {NULL, n, width, slopes + 2 * n}, {r_t, 1, width, slopes + 3 * n}};
+    return mstmm_linear_at(code, t, q, u, efforts, found)
+           || divide_by_mass(n, M, 4, all, code->work) || !mstmm_finite(n * width, slopes);
+}
+
+int mstmm_linear_derivatives(const void *record, real t, const real *const *rows,
+                             real *const *answers)
+{
+    const mstmm_linear_alone *alone = record;
+    const mstmm_linear_code *code = &alone->code;
+    const int n = code->n, nu = code->fused->nu, square = n * n;
+    const real *M = alone->found + nu, *C = M + square, *K = C + square, *G = K + square;
+    const columns all[] = {{K, n, n, answers[1]}, {C, n, n, answers[2]}, {NULL, n, n, answers[3]},
+                           {G + square, 1, 1, answers[4]}};
+    int failed = mstmm_linear_at(code, t, rows[0], rows[1], alone->efforts, alone->found)
+                 || divide_by_mass(n, M, 4, all, code->work) || !mstmm_finite(n, answers[4]);
+    for (int k = 1; !failed && k < 4; k++) failed = !mstmm_finite(square, answers[k]);
+    if (failed) return 1;
+    memcpy(answers[0], alone->found, (size_t)nu * sizeof(real));
+    memcpy(answers[5], G, (size_t)square * sizeof(real));
+    memset(answers[6], 0, (size_t)square * sizeof(real));
+    for (int i = 0; i < n; i++) answers[6][i * n + i] = 1;
+    return 0;
 }

@@ -9,15 +9,25 @@
 #include "tangent.h"
 
 /* cdef begin */
+/* Columns that are solved at a time. */
+#define MSTMM_TILE_COLUMNS 32
+
 /* Code of a scene, of which n speeds are imposed by nobody; everything is the caller's. */
 typedef struct {
     const mstmm_fused *fused;
     mstmm_live_inputs live;
     real *p; /* written anew by live inputs */
     const real *memory;
-    real *work; /* n n */
+    real *work; /* n n + MSTMM_TILE_COLUMNS n */
     int n;
 } mstmm_linear_code;
+
+/* One of them, with room for what comes before the answers. */
+typedef struct {
+    mstmm_linear_code code;
+    const real *efforts; /* nu zeros */
+    real *found;         /* mstmm_linear_numbers */
+} mstmm_linear_alone;
 
 /* Numbers that it finds: udot (nu), M, C, K, G (n x n each), r_t (n), qdot (nq). */
 int64_t mstmm_linear_numbers(const mstmm_linear_code *code);
@@ -33,6 +43,10 @@ int mstmm_linear_swept(mstmm_tangent *at, real t, const real *q, const real *u, 
  * -M^-1 r_t.  Neither is meant either where M is not positive definite. */
 int mstmm_accelerations_about(const mstmm_linear_code *code, real t, const real *q, const real *u,
                               const real *efforts, real *found, real *slopes);
+/* The same of scenes without drives, called as alone.h tells: of q and u, udot, the four slopes each
+ * by itself, G and, of du by u, 1.  The record is mstmm_linear_alone. */
+int mstmm_linear_derivatives(const void *record, real t, const real *const *rows,
+                             real *const *answers);
 /* d/dt (x, x') = matrix (2n x 2n) (x, x') of what mstmm_linear_at found, x' = G x + du where
  * `turning`, else du.  Returns 1 where M is not positive definite, or a number not finite. */
 int mstmm_state_matrix(const mstmm_linear_code *code, const real *found, int turning, real *matrix);
