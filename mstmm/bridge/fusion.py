@@ -215,8 +215,9 @@ class Fusion:
             return found
         recipe = self._recipe(part)
         try:
-            if build or find(recipe) is not None:
-                found, built = opened(recipe, open_library)
+            known = None if build else find(recipe)
+            if build or known is not None:
+                found, built = opened(recipe, open_library, known=known)
                 self.note = _note(built)
         except EnvironmentFailure:
             if build:
@@ -265,9 +266,10 @@ class Fusion:
             "abi": str(columns_abi.ABI), "printers": _printers_hash(), "kernels": _manifest_hash(),
         }  # fmt: skip
         recipe = Recipe("columns", identity, sources, FLAGS, (columns_abi.SYMBOL,), TUNING)
-        if not build and find(recipe) is None:
+        known = None if build else find(recipe)
+        if not build and known is None:
             return None
-        return opened(recipe, open_columns)[0]
+        return opened(recipe, open_columns, known=known)[0]
 
     def solution(self, build: bool) -> ColumnsLibrary | None:
         """The library that solves with the scene's mass matrix, which is that of a tree; errors as

@@ -83,15 +83,21 @@ def library(recipe: Recipe, *, timeout: float | None = None) -> Built:
 
 
 def opened(
-    recipe: Recipe, opener: Callable[[Path, str], T], *, timeout: float | None = None
+    recipe: Recipe,
+    opener: Callable[[Path, str], T],
+    *,
+    known: Built | None = None,
+    timeout: float | None = None,
 ) -> tuple[T, Built]:
     """`opener(path, key)` of the recipe's library; one that it refuses is built again, once.
+
+    `known` is what `find` has just found of it, which is not looked for again.
 
     The opener raises OSError (it cannot be loaded) or EnvironmentFailure (its ABI number or key
     are not the expected ones) after closing what it opened.  Raises EnvironmentFailure if the
     library built afresh is refused too.
     """
-    built = library(recipe, timeout=timeout)
+    built = library(recipe, timeout=timeout) if known is None else known
     try:
         return opener(built.path, built.key), built
     except (OSError, EnvironmentFailure) as error:

@@ -7,7 +7,6 @@ parent's; <inertial> has a frame of its own, about whose origin the inertia is.
 from __future__ import annotations
 
 from collections import Counter
-from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
 from ...errors import SceneError
@@ -228,7 +227,7 @@ def _solid(one: Element) -> dict[str, Any] | None:
 
 def _mesh(file: str, scale: Vector | tuple[float, ...]) -> dict[str, Any] | None:
     """A mesh, wherever it is; None of one that is in a format that is not read, or squeezed."""
-    readable = file.lower().endswith((".stl", ".obj")) and ".." not in PurePosixPath(file).parts
+    readable = file.lower().endswith((".stl", ".obj")) and ".." not in file.split("/")
     if not readable or len(set(scale)) != 1 or scale[0] <= 0:
         return None
     return {"type": "mesh", "file": file} | ({"scale": scale[0]} if scale[0] != 1 else {})
