@@ -1,6 +1,6 @@
 """Robots in URDF: accelerations in C, single calls, a hundred steps, from the file to an answer.
 
-    python benchmarks/robots/run.py [--quick] [--plot]
+    python benchmarks/robots/run.py [--quick] [--plot] [--only single first]
 
 Needs pin, mujoco and example-robot-data.  CPU time in alternating rounds of one process, the least
 of the rounds; code of the scenes is compiled before.
@@ -20,7 +20,7 @@ from __future__ import annotations
 import json
 import statistics
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -167,16 +167,28 @@ def first(name: str) -> tuple[Work, float]:
     return {one: partial(measure.once, call) for one, call in calls.items()}, float("nan")
 
 
-def measured(quick: bool) -> list[dict[str, Any]]:
+PARTS = {"native": native, "single": single, "runs": runs, "first": first}
+
+
+def measured(quick: bool, parts: Sequence[str]) -> list[dict[str, Any]]:
     """Seconds a call of everybody on every robot."""
     found = []
     for name in ROBOTS:
-        for part in (native, single, runs, first):
-            work, apart = part(name)
+        for part in parts:
+            work, apart = PARTS[part](name)
             for one, samples in measure.rounds(work, 3 if quick else 40).items():
                 found.append({"robot": name, "call": one, "s": samples, "apart": apart})
                 print(name, one, f"{1e6 * min(samples):.4g} us", flush=True)
     return found
+
+
+def kept(path: Path, measured: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Rows of the file that were not measured anew, with when and under what load they were."""
+    record = json.loads(path.read_text())
+    taken = {key: record["machine"][key] for key in ("date", "load")}
+    known = {(r["robot"], r["call"]) for r in measured}
+    rows = [r for r in record["results"] if (r["robot"], r["call"]) not in known]
+    return [{"taken": taken} | r for r in rows]
 
 
 def table(results: list[dict[str, Any]]) -> str:
@@ -185,9 +197,9 @@ def table(results: list[dict[str, Any]]) -> str:
         "| robot | what | us | beside | us | ratio | of medians | asked | apart |",
         "|---" * 9 + "|",
     ]
-    for r in results:
-        if r["call"] not in BESIDE:
-            continue
+    asked_for = [(robot, call) for robot in ROBOTS for call in BESIDE]
+    by_both = {(r["robot"], r["call"]): r for r in results}
+    for r in (by_both[both] for both in asked_for if both in by_both):
         beside, asked = BESIDE[r["call"]]
         rows = [p for p in results if p["robot"] == r["robot"]]
         peers = [p for p in rows if p["call"].startswith(beside)]
@@ -204,13 +216,24 @@ def table(results: list[dict[str, Any]]) -> str:
 
 def main() -> None:
     """Measure, print the table."""
-    options = measure.options(str(__doc__).splitlines()[0], HERE).parse_args()
+    parser = measure.options(str(__doc__).splitlines()[0], HERE)
+    parser.add_argument(
+        "--only", nargs="+", choices=PARTS, help="the rest stays as the JSON has it"
+    )
+    options = parser.parse_args()
     if not options.plot:
-        measure.save(options.json, measured(options.quick))
+        rows = measured(options.quick, options.only or list(PARTS))
+        measure.save(options.json, rows + (kept(options.json, rows) if options.only else []))
     record = json.loads(options.json.read_text())
     text = table(record["results"])
     print(text)
-    options.json.with_suffix(".md").write_text(f"{text}\n\nLoad {record['machine']['load']:.1f}.\n")
+    load = f"Load {record['machine']['load']:.1f}."
+    older = {r["call"]: r["taken"] for r in record["results"] if "taken" in r}
+    for call in BESIDE:
+        if call in older:
+            taken = older[call]
+            load += f" {call[0].upper()}{call[1:]}: {taken['date']}, load {taken['load']:.1f}."
+    options.json.with_suffix(".md").write_text(f"{text}\n\n{load}\n")
 
 
 if __name__ == "__main__":
