@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
+from ..errors import SceneError
 from ..ir.spec import ElementSpec
 from .files.read import MAX_SIZE, read
 from .robots.files import import_robot, is_robot
@@ -21,6 +22,8 @@ def is_scene_file(name: str) -> bool:
 def load_scene(
     path: str | os.PathLike[str],
     known_types: Mapping[tuple[str, str], ElementSpec] | None = None,
+    *,
+    units: Mapping[str, str] | None = None,
 ) -> Scene:
     """Read and validate a scene file (.toml or .json), or that of a robot as `import_robot` does.
 
@@ -29,11 +32,21 @@ def load_scene(
 
     `known_types` maps (kind, name), kind one of hinge, body, force, to the definitions of users'
     types.  When it is given every type must be built in or in it; without it types that are not
-    built in are left to `Scene.check_types`.  Raises SceneError.
+    built in are left to `Scene.check_types`.
+
+    units: those of a robot's file where they are not m and kg, as {"length": "mm", "mass": "g"}; a
+    scene file is in m and kg always.
+
+    Raises SceneError, and EnvironmentFailure where MuJoCo is needed and not there.
     """
     if isinstance(path, str | os.PathLike) and is_robot(path):
-        return import_robot(path).scene
+        return import_robot(path, units=units).scene
     where, data = read(path)
+    if units is not None:
+        raise SceneError(
+            f"{where}: units: expected none, for a scene file is in m and kg; found {units!r:.60}. "
+            "Leave it out, units are those of a robot's file"
+        )
     token = FOLDER.set(str(Path(os.fsdecode(os.fspath(path))).absolute().parent))
     try:
         scene = Scene.from_data(data, where)

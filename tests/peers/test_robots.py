@@ -196,6 +196,12 @@ def test_other_units_only_scale_what_has_lengths(tmp_path: Path, rng: np.random.
     assert got[ours] == pytest.approx(wanted, rel=1e-10, abs=1e-10 * np.abs(wanted).max())
 
 
+def test_loading_takes_units_of_mjcf_too(tmp_path: Path) -> None:
+    path, units = machine(tmp_path)[0], {"length": "in", "mass": "lb"}
+    found = mstmm.load_scene(path, units=units)
+    assert found == mstmm.import_robot(path, units=units).scene != mstmm.load_scene(path)
+
+
 def test_it_runs_as_mujoco_runs_it(tmp_path: Path) -> None:
     path, one = machine(tmp_path)
     peer = mujoco.MjModel.from_xml_path(str(path))

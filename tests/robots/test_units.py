@@ -74,6 +74,20 @@ def test_units_that_are_none(tmp_path: Path) -> None:
         mstmm.import_robot(path, units={"time": "ms"})
 
 
+def test_loading_takes_units_too(tmp_path: Path) -> None:
+    path, units = written(tmp_path, IN_MM), {"length": "mm", "mass": "g"}
+    assert mstmm.load_scene(path, units=units) == mstmm.import_robot(path, units=units).scene
+    with pytest.raises(mstmm.SceneError, match="units: mass: expected one of kg, g, t, lb"):
+        mstmm.load_scene(path, units={"mass": "stone"})
+
+
+def test_scene_files_have_no_units(tmp_path: Path) -> None:
+    path = tmp_path / "arm.toml"
+    path.write_text(mstmm.import_robot(written(tmp_path, IN_M)).to_toml())
+    with pytest.raises(mstmm.SceneError, match=r"arm\.toml: units: expected none, .* m and kg"):
+        mstmm.load_scene(path, units={"length": "mm"})
+
+
 @pytest.mark.parametrize(
     ("text", "sign"),
     [
