@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mstmm.arguments import path_of
 from mstmm.errors import MstmmError, SceneError
 from mstmm.extras import missing
@@ -108,6 +110,15 @@ def _read(xarray: Any, path: Path) -> Any:
     raise SceneError(f'result file "{path}": not a NetCDF file ({reason})')
 
 
+def _completed(model: Model, run: Trajectory) -> Trajectory:
+    """The run with a column of memory that files had not until 2026-11-24: whether a step of a
+    scene with loops ended near a singular pose.  Nothing went by that when they were made."""
+    system, rows = model.packed.system, run.memory
+    if system.strained < 0 or rows.ndim != 2 or rows.shape[1] != system.n_memory - 1:
+        return run
+    return replace(run, memory=np.insert(rows, system.strained, 0.0, axis=1))
+
+
 def _fits(model: Model, run: Trajectory) -> bool:
     """The sizes of every array follow from the scene and the number of samples."""
     n, memory = len(run.t), model.packed.system.n_memory
@@ -130,7 +141,7 @@ def _rebuilt(data: Any, path: Path) -> Result:
     least_squares = data.attrs.get("sweep") == "qr"
     model = Model(scene, known=elements, least_squares=least_squares)
     model.fusion = NotFused(f"the saved run was made by the {data.attrs['engine']} one")
-    run = provenance.trajectory(data)
+    run = _completed(model, provenance.trajectory(data))
     if not _fits(model, run):
         raise SceneError(f'result file "{path}": its states do not fit its scene')
     if data.attrs["kernels_sha256"] != kernels_hash(model.known):
