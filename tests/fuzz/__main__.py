@@ -19,6 +19,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--engine", default="looped", help='"auto" also uses compiled code')
+    parser.add_argument("--of", default="", help="only mutants of scenes with this in their names")
     parser.add_argument("--keep", type=Path, default=Path("fuzz-found"), help="folder of failures")
     parser.add_argument("--cpu", type=float, default=20.0, help="processor time of a phase, s")
     parser.add_argument("--memory", type=float, default=6.0, help="GiB of a worker, 0: no limit")
@@ -37,7 +38,7 @@ def _campaign(options: argparse.Namespace) -> int:
     from .worker import Limits
 
     limits = Limits(options.cpu, memory=int(options.memory * 2**30))
-    campaign = Campaign(options.seed, limits, options.engine, options.keep)
+    campaign = Campaign(options.seed, limits, options.engine, options.keep, options.of)
     begin = last = time.monotonic()
 
     def tell(campaign: Campaign) -> None:

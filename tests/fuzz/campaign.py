@@ -25,10 +25,15 @@ EFFORT_FOR_HANGS = 8
 
 
 class Campaign:
-    """Trials of mutants of one seed; each kind of failure is kept in a folder as it is met."""
+    """Trials of mutants of one seed; each kind of failure is kept in a folder as it is met.
 
-    def __init__(self, seed: int, limits: Limits, engine: str, keep: Path | None) -> None:
-        self.seed, self.limits, self.engine, self.keep = seed, limits, engine, keep
+    `of` stands in the names of the scenes that mutants are made from.
+    """
+
+    def __init__(
+        self, seed: int, limits: Limits, engine: str, keep: Path | None, of: str = ""
+    ) -> None:
+        self.seed, self.limits, self.engine, self.keep, self.of = seed, limits, engine, keep, of
         self.outcomes: Counter[str] = Counter()
         self.failures: dict[tuple[str, str], list[int]] = {}
 
@@ -40,7 +45,7 @@ class Campaign:
 
             def strand(k: int) -> None:
                 for index in range(first + k, first + count, jobs):
-                    scene = mutant(self.seed, index)
+                    scene = mutant(self.seed, index, self.of)
                     self._note(index, scene, self._try(workers[k], scene.data, index))
                     tell(self)
 

@@ -35,10 +35,10 @@ class Mutant:
     changes: tuple[str, ...]
 
 
-def mutant(seed: int, index: int) -> Mutant:
-    """The mutant of this number: always the same."""
+def mutant(seed: int, index: int, of: str = "") -> Mutant:
+    """The mutant of this number: always the same.  `of`: of scenes with this in their names."""
     rng = random.Random(f"{seed}/{index}")
-    origin = rng.choice(sorted(seeds()))
+    origin = rng.choice([name for name in sorted(seeds()) if of in name])
     data = copy.deepcopy(seeds()[origin])
     done: list[str] = []
     for _ in range(rng.choice((1, 1, 1, 1, 2, 2, 3))):

@@ -13,7 +13,7 @@ import mstmm
 from .campaign import Campaign, smaller
 from .mutate import mutant, places
 from .seeds import Data, seeds
-from .trial import BAD, CRASH, HANG, RAN, REFUSED, TRACEBACK, Outcome
+from .trial import BAD, CRASH, HANG, RAN, REFUSED, T_END, TRACEBACK, Outcome
 from .worker import Limits, Worker
 
 FOUND = sorted((Path(__file__).parent / "found").glob("*.json"))
@@ -26,6 +26,13 @@ def test_no_mutant_does_worse_than_a_refusal_or_a_run() -> None:
     refused = campaign.outcomes[REFUSED]
     # Mutants that are all refused try no run, mutants that all run try no message.
     assert min(refused, 40 - refused) >= 5, campaign.table()
+
+
+def test_mutants_that_bounce_on_code_of_their_own() -> None:
+    campaign = Campaign(seed=2, limits=Limits(), engine="fused", keep=None, of="bouncing")
+    campaign.run(first=0, count=10, jobs=2)
+    assert not campaign.failures, campaign.table()
+    assert campaign.outcomes[REFUSED] <= 7, campaign.table()
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +54,13 @@ def test_what_once_broke(worker: Worker, path: Path) -> None:
 def test_the_scenes_of_many_tables_are_lawful(name: str) -> None:
     model = mstmm.compile(mstmm.Scene.from_data(seeds()[name], name), engine="looped")
     assert model.simulate(1e-3).success
+
+
+@pytest.mark.parametrize("name", [name for name in seeds() if "bouncing" in name])
+def test_what_bounces_does_so_within_a_trial(name: str) -> None:
+    model = mstmm.compile(mstmm.Scene.from_data(seeds()[name], name), engine="fused")
+    run = model.simulate(T_END)
+    assert run.success and (run.trajectory.event > 0).any(), run.message
 
 
 def test_a_mutant_is_always_the_same_scene() -> None:
