@@ -1,4 +1,4 @@
-"""Robots in MJCF that the package dm_control ships, against MuJoCo."""
+"""Robots in MJCF that the packages dm_control and pybullet ship, against MuJoCo."""
 
 from __future__ import annotations
 
@@ -12,30 +12,34 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.scene.robots.convert import Choices, converted
+from mstmm.scene.robots.convert import Choices, Imported, converted
 from mstmm.scene.robots.mjcf import read_mjcf
 from peers.robot_pairs import apart, of_peers
 from peers.test_robots import states
 
-#: Folders of the package with whole robots, and what is no robot by itself.
-FOLDERS = ("suite/", "locomotion/walkers/assets/", "locomotion/soccer/", "third_party/")
+#: Folders of each package with whole robots.
+FOLDERS = {
+    "dm-control": tuple(f"dm_control/{inside}" for inside in (
+        "suite/", "locomotion/walkers/assets/", "locomotion/soccer/", "third_party/")),
+    "pybullet": ("pybullet_data/mjcf/",),
+}  # fmt: skip
 #: What of MuJoCo's forces a scene has not; <flag> in a file may switch off more.
 OFF = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_ACTUATION
 
 
 def published() -> Iterator[Path]:
     """Files that MuJoCo reads by themselves and in which something moves."""
-    for one in files("dm-control") or ():
-        inside = one.as_posix().removeprefix("dm_control/")
-        if one.suffix != ".xml" or not inside.startswith(FOLDERS):
-            continue
-        path = Path(str(one.locate()))
-        try:
-            model = mujoco.MjModel.from_xml_path(str(path))
-        except ValueError:  # a part of another file
-            continue
-        if model.nv and all(model.joint(k).name for k in range(model.njnt)):
-            yield path
+    for package, folders in FOLDERS.items():
+        for one in files(package) or ():
+            if one.suffix != ".xml" or not one.as_posix().startswith(folders):
+                continue
+            path = Path(str(one.locate()))
+            try:
+                model = mujoco.MjModel.from_xml_path(str(path))
+            except ValueError:  # a part of another file, or one of an older MuJoCo
+                continue
+            if model.nv and all(model.joint(k).name for k in range(model.njnt)):
+                yield path
 
 
 def bare(path: Path) -> Any:
@@ -51,11 +55,15 @@ def bare(path: Path) -> Any:
     return model
 
 
+def of_links(path: Path) -> Imported:
+    """Our scene with the same."""
+    robot = of_peers(read_mjcf(str(path), path.name), "damping", "inertia", "stiffness", "rest")
+    return converted(robot, Choices())
+
+
 def differences(path: Path, rng: np.random.Generator) -> dict[str, float]:
     """How far ours and MuJoCo's differ, in parts of the largest number."""
-    peer = bare(path)
-    robot = of_peers(read_mjcf(str(path), path.name), "damping", "inertia", "stiffness", "rest")
-    one = converted(robot, Choices())
+    peer, one = bare(path), of_links(path)
     model = mstmm.compile(one.scene)
     q, u, data, ours, theirs = states(one, model, peer, rng)
     both, whole = np.ix_(ours, ours), np.zeros((peer.nv, peer.nv))
@@ -85,9 +93,25 @@ def test_published_robots_move_as_mujoco_has_them() -> None:
     found = {
         path.relative_to(path.parents[2]).as_posix(): differences(path, rng) for path in published()
     }
-    assert len(found) >= 25
+    assert len(found) >= 36
     far = {name: one for name, one in found.items() if not max(one.values()) < 1e-11}
     assert far == {}
+
+
+@pytest.mark.parametrize("name", ["cheetah.xml", "walker.xml", "pusher.xml"])
+def test_steps_of_rk4_are_mujocos(name: str, rng: np.random.Generator) -> None:
+    """The same method with the same steps gives the same numbers, but for rounding."""
+    path, step, steps = next(path for path in published() if path.name == name), 1e-3, 200
+    peer, one = bare(path), of_links(path)
+    peer.opt.integrator, peer.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, step
+    model = mstmm.compile(one.scene)
+    q, u, data, ours, theirs = states(one, model, peer, rng)
+    for _ in range(steps):
+        mujoco.mj_step(peer, data)
+    run = model.simulate(step * steps, "rk4", step, initial=(q, u))
+    assert run.success and model.nq == model.nu == peer.nv == len(ours)
+    for found, wanted in ((run.q, data.qpos), (run.u, data.qvel)):
+        assert apart(found[-1][ours], wanted[theirs]) < 1e-11
 
 
 FLAGS = """<mujoco><option><flag {}/></option><worldbody><body>

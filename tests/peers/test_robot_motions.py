@@ -18,6 +18,7 @@ from peers.robot_pairs import Pair, imported, published
 #: End of a robot's path, and what its root stands on.
 ROBOTS = {
     "ur5_robot.urdf": "fixed", "panda.urdf": "fixed", "kinova.urdf": "fixed", "go2.urdf": "free",
+    "model_vr_limits.urdf": "fixed", "mini_cheetah.urdf": "free",
 }  # fmt: skip
 #: N m s/rad, N s/m, at every joint.
 DAMPING, T_END = 0.3, 0.5
