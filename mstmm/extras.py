@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 import sys
+from importlib.util import find_spec
 from io import BytesIO
 from typing import Any
 
 from .errors import EnvironmentFailure
+
+#: Extra -> what is imported for it.
+PACKAGES = {
+    "io": ("xarray", "h5netcdf", "h5py"), "plot": ("matplotlib",), "view": ("viser",),
+    "fem": ("skfem", "meshio"),
+}  # fmt: skip
+
+
+def absent(extra: str) -> list[str]:
+    """Packages of an extra that are not installed; asked before anything is computed."""
+    return [name for name in PACKAGES[extra] if find_spec(name) is None]
 
 
 def missing(name: str, what: str, error: ImportError) -> EnvironmentFailure:

@@ -68,12 +68,13 @@ def stability(
     """Find where methods fail, and how far their remedies hold.
 
     Args:
-        cases: names (`mstmm stability --list`); all if not given.
+        cases: names (`mstmm stability --list`); if not given all whose packages are installed.
         points: values of the coarse grid along each parameter, 3 or more.
         tolerance: how close the two ends of a frontier are brought, as a part of the parameter.
         progress: called with a case's name, its number from 0 and how many there are.
 
-    Raises SceneError for a name that there is not and for settings that make no sense.
+    Raises SceneError for a name that there is not and for settings that make no sense,
+    EnvironmentFailure for a named case without its packages.
     """
     if isinstance(cases, str) or (cases is not None and not isinstance(cases, Iterable)):
         raise SceneError(f"cases = {short(cases)}: expected a list of names")
@@ -83,6 +84,8 @@ def stability(
         raise SceneError(f"tolerance = {tolerance!r}: expected a number between 0 and 1")
     found = []
     definitions = known.chosen(None if cases is None else list(cases))
+    if cases is None:
+        definitions = tuple(one for one in definitions if not one.lacks)
     for number, definition in enumerate(definitions):
         if progress is not None:
             progress(definition.name, number, len(definitions))

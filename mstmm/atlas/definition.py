@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from ..extras import absent
 from .scale import Scale
 
 
@@ -26,7 +27,7 @@ class Definition:
 
     `low` and `high` are the ends between which the method is tried: at one of them it must hold,
     at the other fail.  `reach` is how far the remedy is tried beyond the failing end.  It failed
-    where `measured` is above `limit`.
+    where `measured` is above `limit`.  It needs the packages of `extra`.
     """
 
     name: str
@@ -43,3 +44,9 @@ class Definition:
     remedy: Method
     reach: float
     source: str
+    extra: str = ""
+
+    @property
+    def lacks(self) -> list[str]:
+        """Packages that the case needs and that are not installed."""
+        return absent(self.extra) if self.extra else []

@@ -155,3 +155,16 @@ def held_row(masses: Sequence[float]) -> dict[str, Any]:
     })  # fmt: skip
     bodies = [rod(name, mass=mass) for name, mass in zip(names, masses, strict=True)]
     return {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges}
+
+
+def solid_bar(slenderness: float, divisions: Sequence[int], order: int, poisson: float) -> Model:
+    """A clamped bar of square section meshed with so many hexahedra along and across, of this
+    degree; its length, Young's modulus and density are 1."""
+    across = 1 / slenderness
+    bar = {
+        "name": "bar", "young": 1.0, "poisson": poisson, "density": 1.0, "order": order,
+        "box": {"size": [1.0, across, across], "divisions": divisions},
+        "modes": 1, "stiffening": False, "ends": {"root": {"plane": [1, 0, 0, 0]}},
+    }  # fmt: skip
+    wall = {"name": "wall", "type": "fixed", "inboard": "ground", "outboard": "bar.root"}
+    return model({"gravity": [0, 0, 0], "elastic": [bar], "hinge": [wall]})

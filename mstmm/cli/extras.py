@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 
+from mstmm import extras
 from mstmm.errors import EnvironmentFailure
 
-#: Extra -> what is imported for it.
-PACKAGES = {"io": ("xarray", "h5netcdf", "h5py"), "plot": ("matplotlib",), "view": ("viser",)}
 _EXTRA_OF = {
     ".nc": "io", ".png": "plot", ".svg": "plot", ".pdf": "plot", ".gif": "plot", ".mp4": "plot",
     ".html": "view",
@@ -17,7 +15,7 @@ _EXTRA_OF = {
 
 def missing(extra: str) -> list[str]:
     """Packages of an extra that are not installed."""
-    return [name for name in PACKAGES[extra] if find_spec(name) is None]
+    return extras.absent(extra)
 
 
 def install(extra: str) -> str:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import mstmm
+from mstmm.atlas import cases
 from mstmm.atlas.page import number
 from mstmm.errors import EnvironmentFailure, SceneError
 
@@ -118,3 +120,16 @@ def test_progress_is_told() -> None:
         ["product-angle"], points=3, tolerance=0.3, progress=lambda *one: seen.append(one)
     )
     assert seen == [("product-angle", 0, 1)]
+
+
+def test_cases_without_their_packages_are_left_out_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And refused, with the way to get these, where they are asked for by name."""
+    definitions = {one.name: one for one in cases.chosen(["product-angle", "linear-elements"])}
+    monkeypatch.setattr(cases, "chosen", lambda wanted: tuple(definitions.values()))
+    monkeypatch.setattr("mstmm.atlas.definition.absent", lambda extra: ["skfem"])
+    found = mstmm.stability(points=3, tolerance=0.3).cases
+    assert [case.name for case in found] == ["product-angle"]
+    del definitions["product-angle"]
+    monkeypatch.setitem(sys.modules, "skfem", None)
+    with pytest.raises(EnvironmentFailure, match=r"pip install 'mstmm\[fem\]'"):
+        mstmm.stability(["linear-elements"])

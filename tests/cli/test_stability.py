@@ -5,7 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from cli.commands import Command
+from mstmm.atlas import cases
 
 
 def test_a_case_is_measured_told_and_drawn(mstmm: Command, folder: Path) -> None:
@@ -49,3 +52,17 @@ def test_bad_input_is_told_in_a_line(mstmm: Command, folder: Path) -> None:
         assert (done.code, says in done.err) == (2, True), done.err
         assert "Traceback" not in done.err
     assert not (folder / "x").exists()
+
+
+def test_what_packages_are_missing_for_is_named(
+    mstmm: Command, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    definitions = cases.chosen(["product-angle", "no-compression"])
+    monkeypatch.setattr(cases, "chosen", lambda wanted: definitions)
+    monkeypatch.setattr("mstmm.atlas.definition.absent", lambda extra: ["skfem"])
+    done = mstmm("stability", "--out", "found")
+    assert done.code == 0, done.err
+    assert "no-compression needs skfem: pip install 'mstmm[fem]'" in done.out + done.err
+    data = json.loads(mstmm("stability", "--out", "found", "--json").out)
+    assert data["left_out"] == ["no-compression"]
+    assert [case["name"] for case in data["cases"]] == ["product-angle"]

@@ -37,15 +37,18 @@ def stability(
     from .. import output
     from ..extras import install, missing
 
-    cases.chosen(case)  # before a folder is made
+    left_out = [one for one in cases.chosen(case) if one.lacks and not case]
     folder, lacking = output_folder(out, "atlas.json"), missing("plot")
     atlas = _found(case)
     files = atlas.save(folder, pictures=not lacking)
     if json:
-        output.emit_json({**atlas.to_dict(), "files": [str(file) for file in files]})
+        paths, names = [str(file) for file in files], [one.name for one in left_out]
+        output.emit_json({**atlas.to_dict(), "left_out": names, "files": paths})
         return
     _tell(atlas)
     output.say(f"{folder}: {', '.join(file.name for file in files)}")
+    for one in left_out:
+        output.say(f"left out: {one.name} needs {', '.join(one.lacks)}: {install(one.extra)}")
     if lacking:
         output.say(f"no pictures: they need {', '.join(lacking)}: {install('plot')}")
 

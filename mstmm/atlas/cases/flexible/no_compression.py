@@ -1,0 +1,34 @@
+"""Solid elements of degree 1 in material that keeps its volume."""
+
+from __future__ import annotations
+
+from ...definition import Definition, Method
+from ...measures import bending_error
+from ...scale import LOG
+
+SLENDERNESS = 10.0
+#: Hexahedra along the bar and across it; the finer mesh is the one that locks.
+LINEAR, QUADRATIC = (30, 3, 3), (20, 1, 1)
+
+
+CASE = Definition(
+    name="no-compression",
+    title="Solid elements of degree 1: material that keeps its volume",
+    why="Near a Poisson's ratio of 1/2 every point of integration asks that the volume around it "
+    "stay what it is, and a mesh of degree 1 has fewer displacements than points that ask: rubber "
+    "locks in every direction, whatever the shape of its elements. Of degree 2 a mesh has enough "
+    "of them to bend: the 3 % that stay at the incompressible end halve with its elements.",
+    parameter="distance of Poisson's ratio from 1/2", unit="", low=1e-8, high=0.4, scale=LOG,
+    measured="error of the first frequency, relative", limit=0.1,
+    method=Method(
+        "degree 1, 30 x 3 x 3 hexahedra",
+        lambda d: bending_error(SLENDERNESS, LINEAR, 1, 0.5 - d),
+    ),
+    remedy=Method(
+        "degree 2, 20 x 1 x 1 hexahedra",
+        lambda d: bending_error(SLENDERNESS, QUADRATIC, 2, 0.5 - d),
+    ),
+    reach=1e-10,
+    source="Hughes, The Finite Element Method, 1987, ch. 4 (volumetric locking, counts of "
+    "constraints)", extra="fem",
+)  # fmt: skip
