@@ -53,11 +53,12 @@ def names(risks: Iterable[Risk]) -> tuple[str, ...]:
 
 
 def tried(one: mstmm.Model, t_end: float, **settings: Any) -> tuple[Result, tuple[str, ...]]:
-    """A run, and the names of what was told before it."""
+    """A run, and the names of what was told before it; of its fixed step the run itself tells."""
     q, u = settings.get("initial") or one.initial_state()
     known = {key: value for key, value in settings.items() if key in ("method", "step")}
     seen = look(one, Settings(t_end, **known), np.asarray(q, float), np.asarray(u, float)).risks
-    return one.simulate(t_end, **settings), names(seen)
+    run = one.simulate(t_end, **settings)
+    return run, names((*seen, *(risk for risk in run.risks if risk.before)))
 
 
 def judged(drawn: float, run: Result, before: tuple[str, ...], error: float) -> Trial:
