@@ -106,17 +106,19 @@ def spinning_top(kind: str, spin: Sequence[float] = (0.0, 0.0, 0.0)) -> Model:
     return model({"gravity": [0, 0, 0], "body": [top], "hinge": [foot | initial]})
 
 
-def four_bar(speed: float = 0.0, askew: float = 0.0, closed: bool = True) -> dict[str, Any]:
+def four_bar(
+    speed: float = 0.0, askew: float = 0.0, closed: bool = True, ratio: float = 1.0
+) -> dict[str, Any]:
     """A crank of 0.5 m that turns at a speed (rad/s), a coupler of 1.1 m, a rocker of 0.8 m, feet
-    1.2 m apart, or these rods without the pin that closes the loop; the frames of their tips stand
-    `askew`, rad."""
+    1.2 m apart, of 1 kg/m, the coupler of `ratio` times that; or these rods without the pin that
+    closes the loop.  The frames of their tips stand `askew`, rad."""
 
-    def link(name: str, length: float) -> dict[str, Any]:
-        across = length**3 / 12
+    def link(name: str, length: float, density: float = 1.0) -> dict[str, Any]:
+        mass, across = density * length, density * length**3 / 12
         tip = {"position": [length, 0, 0], "orientation": [0.7 * askew, askew, 0]}
         return {
-            "name": name, "mass": length, "center_of_mass": [length / 2, 0, 0],
-            "inertia": [1e-3 * length, across, across], "ends": {"tip": tip},
+            "name": name, "mass": mass, "center_of_mass": [length / 2, 0, 0],
+            "inertia": [1e-3 * mass, across, across], "ends": {"tip": tip},
         }  # fmt: skip
 
     def pin(name: str, inboard: str, outboard: str, angle: float) -> dict[str, Any]:
@@ -132,9 +134,28 @@ def four_bar(speed: float = 0.0, askew: float = 0.0, closed: bool = True) -> dic
     ]  # fmt: skip
     return {
         "gravity": [0, -9.81, 0],
-        "body": [link("crank", 0.5), link("coupler", 1.1), link("rocker", 0.8)],
+        "body": [link("crank", 0.5), link("coupler", 1.1, ratio), link("rocker", 0.8)],
         "hinge": hinges + [pin("top", "coupler.tip", "rocker.tip", 0.0)] * closed,
     }  # fmt: skip
+
+
+def parallelogram(angle: float, closed: bool = True) -> dict[str, Any]:
+    """Two cranks and a coupler of 1 m on feet 1 m apart, `angle` rad from where all lie in one line
+    and a spring drives the first crank on; or these rods without the pin that closes the loop."""
+    spring = {"stiffness": 10.0, "rest": -1.0}
+    pins: tuple[tuple[str, str, str, float, dict[str, Any]], ...] = (
+        ("foot", "ground", "crank", angle, {"hold": closed, "law": spring}),
+        ("knee", "crank.tip", "coupler", -angle, {}),
+        ("heel", "ground", "rocker", angle, {"position": [1, 0, 0]}),
+        ("top", "coupler.tip", "rocker.tip", 0.0, {"cut": True}),
+    )
+    hinges = [
+        {"name": name, "type": "pin", "inboard": inboard, "outboard": outboard,
+         "initial": {"q": [q]}} | more
+        for name, inboard, outboard, q, more in pins[: 4 if closed else 3]
+    ]  # fmt: skip
+    bodies = [rod(name) for name in ("crank", "coupler", "rocker")]
+    return {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges}
 
 
 def held_row(masses: Sequence[float]) -> dict[str, Any]:

@@ -86,6 +86,10 @@ EXPECTED = {
     "repeated-rows": ((1e-8, 2e-7), 5e-4),
     # errors of (0.3 to 1) 1e-16 times the ratio; refined, of its square times (0.3 to 1) 1e-32
     "heavy-link": ((1e6, 1e9), 1e11),
+    # what yields by 1e-8 beside what answers by the square of the angle: 1e-6 near 0.1
+    "regularised-rows": ((0.03, 0.15), 1e-4),
+    # the row that the coupler answers falls below 1e-6 of the other at that ratio of masses
+    "dropped-rows": ((1e5, 1e7), 1e11),
     "friction-steps": ((1e-5, 3e-4), 5e-6),
     "gimbal-passage": ((1e-3, 3e-2), 1e-8),
     "narrow-pulse": ((3e-3, 0.3), 1e-8),
@@ -154,6 +158,7 @@ POWERS = {
     "numerical-damping": (3.0, 0.03, 0.4),
     "predictor-order": (2.0, 25.0, 1024.0),
     "laws-order": (1.0, 3e-4, 0.04),
+    "regularised-rows": (-2.0, 3e-3, 0.2),
 }
 
 
@@ -161,7 +166,8 @@ POWERS = {
 def test_failures_grow_by_the_power_that_is_known(name: str) -> None:
     """Overshoot of displacements by the square of step times frequency, of speeds by the first
     power; the loss of a second-order method by the third; what stalls, beside second order, by the
-    square of the steps; the error of a table that is left with first order, by the step."""
+    square of the steps; the error of a table that is left with first order, by the step; of rows
+    that yield by the square of what they answer by."""
     power, low, high = POWERS[name]
     inside = [(at, m) for at, m in measured(name).points if low <= at <= high]
     (first, least), (last, most) = inside[0], inside[-1]
