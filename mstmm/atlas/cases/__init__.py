@@ -11,7 +11,7 @@ from ...scene.rules.messages import near
 from ..definition import Definition
 
 #: The folders, in the order of the page.
-GROUPS = ("products", "sweeps", "steps", "rotations", "loops", "flexible")
+GROUPS = ("products", "sweeps", "steps", "classical", "rotations", "loops", "flexible")
 
 
 def _files() -> dict[str, str]:

@@ -1,0 +1,1 @@
+"""Steps in absolute coordinates, by the classical matrices."""
