@@ -39,6 +39,8 @@ EXPECTED = {
     "numerical-damping": ((0.5, 1.0), 1.0),
     # docs/theory/classical-steps.md: lost at 6.0 s
     "newmark-constraints": ((4.0, 6.1), 60.0),
+    # of fourth order: 6.2e-7 m at 10 ms
+    "wilson-gaps": ((1e-2, 1.3e-2), 0.1),
     "one-iteration": ((2e4, 1e6), 1e6),
     "classical-iteration": ((1e4, 1e6), 1e6),
     "iterated-steps": ((2e6, 1e8), 1e10),
@@ -158,6 +160,7 @@ POWERS = {
     "numerical-damping": (3.0, 0.03, 0.4),
     "predictor-order": (2.0, 25.0, 1024.0),
     "laws-order": (1.0, 3e-4, 0.04),
+    "wilson-gaps": (4.0, 1.9e-3, 0.013),
     "regularised-rows": (-2.0, 3e-3, 0.2),
 }
 

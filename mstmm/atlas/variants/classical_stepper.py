@@ -1,4 +1,5 @@
-"""Steps of the classical method in the hands of a variant, which changes them as they go."""
+"""Steps of the classical method in the hands of a variant, which changes them as they go, or looks
+at what a run does not tell."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import NumericalFailure
-from ...runtime.classical.forms import form_of
+from ...runtime.classical.forms import Moving, form_of
 from ...runtime.classical.motions import States, start_of
 from ...runtime.classical.parts import parts_of
 from ...runtime.classical.records import Stepper, size_of
@@ -35,3 +36,8 @@ class ClassicalSteps:
             raise NumericalFailure(f"a step fails by code {self.stepper.run.failure}")
         self.q = self._states.of(made)[0][-1]
         return self.q
+
+    def moving(self) -> list[Moving]:
+        """What the parts do now, in absolute coordinates, each as one of n = 1 times."""
+        states, motions = self._states, self.stepper.motions
+        return [states.form.moving(p, k, motions[k][None]) for k, p in enumerate(states.parts)]

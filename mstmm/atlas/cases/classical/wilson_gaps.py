@@ -1,0 +1,43 @@
+"""Hinges between absolute coordinates under Wilson's method."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....runtime.classical.schemes import scheme_of
+from ...definition import Definition, Method
+from ...scale import LOG
+from ...scenes import double_pendulum
+from ...variants.classical_stepper import ClassicalSteps
+
+T_END, ITERATIONS = 1.0, 20
+
+
+def _gap(step: float, scheme: str) -> float:
+    """Largest distance, m, of what the pins of two falling rods of 1 m hold together."""
+    run, largest = ClassicalSteps(double_pendulum(), scheme_of(scheme), ITERATIONS), 0.0
+    for _ in range(round(T_END / step)):
+        run.advance(step)
+        upper, lower = run.moving()
+        elbow = upper.position + upper.axes[:, :, 0]
+        largest = max(largest, *np.abs([upper.position, lower.position - elbow]).max(axis=(1, 2)))
+    return largest
+
+
+CASE = Definition(
+    name="wilson-gaps",
+    title="Wilson's method in absolute coordinates: hinges that open",
+    why="Wilson's collocation meets equations behind the end of the step, and constraints with "
+    "them: there hinges are closed, and the step goes back to where nobody asked whether they are. "
+    "However far a step is iterated, they stand open by its fourth power. Schemes that ask at the "
+    "end of the step close them to rounding.",
+    parameter="length of a step", unit="s", low=2e-3, high=0.1, scale=LOG,
+    measured="largest gap in 1 s, m", limit=1e-6,
+    method=Method("wilson, iterated", lambda step: _gap(step, "wilson")),
+    remedy=Method(
+        "generalised-alpha:0.8, iterated", lambda step: _gap(step, "generalised-alpha:0.8")
+    ),
+    reach=0.1,
+    source="Wilson, Farhoomand, Bathe, Earthquake Engineering and Structural Dynamics 1, 1973; "
+    "method: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, 2019, ch. 7",
+)  # fmt: skip
