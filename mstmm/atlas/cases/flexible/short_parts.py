@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from ....runtime.flexible.beam.harmonic import Direction
 from ...definition import Definition, Method
+from ...measures import root_inertia
 from ...scale import LOG
 from ...variants import stiffness_quotient
-
-
-def _by_series(z: float) -> float:
-    """Inertia that the root of a beam of length and stiffness 1 shows, as runs have it."""
-    beam = Direction(True, 1.0, 0.0, 1.0, np.eye(4))
-    s, softened = np.array([1j * z**2]), np.ones(1, dtype=np.complex128)
-    return float(-beam.stiffness_at(s, softened)[0, 0, 0].real / z**4)
 
 
 def _error(z: float, inertia: float) -> float:
@@ -33,7 +24,7 @@ CASE = Definition(
     method=Method(
         "quotients of sines", lambda z: _error(z, stiffness_quotient.inertia(z))
     ),
-    remedy=Method("power series beyond the static part", lambda z: _error(z, _by_series(z))),
+    remedy=Method("power series beyond the static part", lambda z: _error(z, root_inertia(z))),
     reach=1e-6,
     source="Wittrick and Williams, Q. J. Mech. Appl. Math. 24, 1971 (dynamic stiffness); "
     "Przemieniecki, Theory of Matrix Structural Analysis, 1968, ch. 12 (its power series)",
