@@ -90,6 +90,8 @@ EXPECTED = {
     "repeated-rows": ((1e-8, 2e-7), 5e-4),
     # errors of (0.3 to 1) 1e-16 times the ratio; refined, of its square times (0.3 to 1) 1e-32
     "heavy-link": ((1e6, 1e9), 1e11),
+    # 2 rows of each of n pairs wait at the lowest bars, of one less at the next: 4 n^2 / 3 + 3 n
+    "grown-tree": ((7, 9), 1000),
     # what yields by 1e-8 beside what answers by the square of the angle: 1e-6 near 0.1
     "regularised-rows": ((0.03, 0.15), 1e-4),
     # the row that the coupler answers falls below 1e-6 of the other at that ratio of masses
@@ -163,6 +165,7 @@ POWERS = {
     "predictor-order": (2.0, 25.0, 1024.0),
     "laws-order": (1.0, 3e-4, 0.04),
     "wilson-gaps": (4.0, 1.9e-3, 0.013),
+    "grown-tree": (2.0, 30.0, 300.0),
     "regularised-rows": (-2.0, 3e-3, 0.2),
 }
 
