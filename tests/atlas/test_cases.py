@@ -86,6 +86,8 @@ EXPECTED = {
     "plain-turns": ((8e-3, 3e-2), 0.1),
     # -alpha twice is an eigenvalue: nothing of rk4 holds from h alpha = 2.785 on
     "baumgarte": ((1.0, 2.8), 10.0),
+    # of fourth order: 1.1e-5 at 5 ms
+    "projected-places": ((3e-3, 7e-3), 0.02),
     # G M^-1 G' of rows that repeat others is some d^2: rounding up to d = 1e-8, and times 5 rows
     "repeated-rows": ((1e-8, 2e-7), 5e-4),
     # errors of (0.3 to 1) 1e-16 times the ratio; refined, of its square times (0.3 to 1) 1e-32
@@ -165,6 +167,7 @@ POWERS = {
     "predictor-order": (2.0, 25.0, 1024.0),
     "laws-order": (1.0, 3e-4, 0.04),
     "wilson-gaps": (4.0, 1.9e-3, 0.013),
+    "projected-places": (4.0, 9e-4, 6e-3),
     "grown-tree": (2.0, 30.0, 300.0),
     "regularised-rows": (-2.0, 3e-3, 0.2),
 }

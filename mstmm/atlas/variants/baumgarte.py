@@ -12,6 +12,7 @@ import numpy as np
 from ...arrays import Array
 from ...runtime.engine.loops.calls import LoopCalls
 from ...runtime.model.model import Model
+from .runge_kutta import rk4_step
 
 
 def gap_of(model: Model, step: float, steps: int, rate: float) -> float:
@@ -31,10 +32,7 @@ def gap_of(model: Model, step: float, steps: int, rate: float) -> float:
 
     y, largest = np.append(q, u), 0.0
     for _ in range(steps):
-        first = slope(y)
-        second = slope(y + step / 2 * first)
-        third = slope(y + step / 2 * second)
-        y = y + step / 6 * (first + 2 * second + 2 * third + slope(y + step * third))
+        y = rk4_step(slope, y, step)
         if not np.isfinite(y).all() or np.abs(y).max() > 1e6:
             return float("nan")
         gap = calls.correction(calls.gap, np.ascontiguousarray(y[:split]), u)[1]
