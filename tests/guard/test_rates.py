@@ -46,3 +46,10 @@ def test_both_sides_are_drawn_and_draw_the_same_again(family: object) -> None:
     trials = [family(np.random.default_rng([1, i])) for i in range(12)]
     assert {trial.wrong for trial in trials} == {True, False}
     assert trials[0] == family(np.random.default_rng([1, 0]))
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_what_is_seen_of_a_fixed_step_counts_as_seen_before() -> None:
+    """Nothing looks at it before the run unless it is asked to refuse."""
+    trials = [motions.explicit_step(np.random.default_rng([1, i])) for i in range(12)]
+    assert any("step-stability" in trial.before for trial in trials if trial.wrong)
