@@ -146,12 +146,12 @@ def boom(torque: float, modes: int = 3) -> mstmm.Model:
 
 @pytest.mark.parametrize("asked", [1e-3, 1e-5])
 def test_a_beam_that_begins_to_vibrate_is_tried_by_the_exponential_method(asked: float) -> None:
-    model = boom(1.0)
-    run = model.simulate(1.0, error=asked, error_of="boom.tip.position")
+    model, t_end = boom(1.0), 2.0
+    run = model.simulate(t_end, error=asked, error_of="boom.tip.position")
     known = run.error_estimate
     assert known is not None and known.met and known.estimate is not None
     assert known.runs[0].method == "exprb32" and not known.runs[0].failure
-    best = model.simulate(1.0, "dop853", rtol=1e-11, atol=1e-13, output_times=run.t)
+    best = model.simulate(t_end, "dop853", rtol=1e-11, atol=1e-13, output_times=run.t)
     way = run.position("boom.tip") - best.position("boom.tip")
     assert np.linalg.norm(way, axis=1).max() <= 10 * known.estimate <= 10 * asked
 
@@ -163,7 +163,7 @@ def test_a_beam_that_nothing_shakes_is_followed_by_others() -> None:
     assert shaken(boom(0.0), 0.0, q, np.array([0.0, 0.0, 0.0, 0.1]))
     many = boom(5.0, modes=6)
     assert not shaken(many, 0.0, *many.initial_state())
-    known = boom(0.0).simulate(1.0, error=1e-3).error_estimate
+    known = boom(0.0).simulate(2.0, error=1e-3).error_estimate
     assert known is not None and "exprb32" not in {one.method for one in known.runs}
 
 
@@ -172,10 +172,16 @@ def test_an_exponential_run_that_takes_too_many_steps_is_given_up(
 ) -> None:
     monkeypatch.setattr(family, "_SHORT", 2)
     monkeypatch.setattr(family, "_LONG", 0.0)
-    known = boom(5.0).simulate(1.0, error=1e-3).error_estimate
+    known = boom(5.0).simulate(2.0, error=1e-3).error_estimate
     assert known is not None and known.met
     assert [one.method for one in known.runs if one.failure] == ["exprb32"]
     assert "exprb32" not in {one.method for one in known.runs if not one.failure}
+
+
+def test_a_short_one_is_followed_by_explicit_steps() -> None:
+    known = boom(5.0).simulate(1.0, error=1e-3).error_estimate
+    assert known is not None and known.met
+    assert {one.method for one in known.runs} <= {"dopri5", "dop853"}
 
 
 def test_beyond_the_horizon_it_says_that_nothing_is_known() -> None:

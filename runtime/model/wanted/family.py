@@ -1,8 +1,9 @@
 """By which kind of method a wanted error is reached, and by which one.
 
-The explicit one follows the fastest vibration of the scene whatever the tolerance; steps of the
-implicit one grow shorter with the tolerance.  Which costs less shows in a first run and in the
-fastest motion: no run is made to compare the two.  The exponential one follows vibration exactly as
+The explicit one follows the fastest motion of the scene whatever the tolerance, and vibration that
+is excited ever more closely; the implicit one follows what of it counts for what is asked.  Which
+costs less shows in the motions at the start and in a first run: no run is made to compare the
+two.  The exponential one follows vibration exactly as
 long as nothing else changes much: a beam on one hinge that something shakes from the start is tried
 by it first, for a few steps.
 """
@@ -22,26 +23,34 @@ from ...integrate.loop import Status
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO, AUTO_EXPLICIT, get
 from ...run import second_opinion
-from ...run.fastest import fastest_at_start, fastest_possible
+from ...run.fastest import fastest_possible
 from ...run.method_choice import implicit_method
 from .looks import Kind
 from .shaken import shaken
+from .vibration import Vibration, vibration
 
 if TYPE_CHECKING:
     from ...engine.compiled import Compiled
     from ...run.trajectory import Trajectory
 
-#: |lambda| T from which the first run is an implicit one, for an error of _LOOSE; and the power by
-#: which it rises for smaller ones.
-_VIBRATING, _LOOSE, _RISES = 700.0, 1e-3, 0.25
+#: |lambda| T from which the first run is an implicit one, for an error of _LOOSE, and the power by
+#: which it rises for smaller ones: where the motions at the start are not known; and where they
+#: are, beside so many times the radians of vibration that counts.
+_LOOSE, _VIBRATING, _RISES = 1e-3, 700.0, 0.25
+_SMOOTH, _RISES_SMOOTH, _COUNTS = 500.0, 0.2, 6.0
+
+#: Vibration is well above what is asked that is so many times that.
+_WELL = 3.0
 
 #: The explicit method for loose tolerances, and the tolerance down to which it costs less than that
 #: of higher order.
 _LOOSE_EXPLICIT, _LOW_ORDER = "dopri5", 1e-4
 
-#: The exponential method; for errors from this one on, and from this |lambda| T on; steps after
-#: which its first run is given up, and that number in |lambda| T.
-_EXPONENTIAL, _PAYS, _SWINGING, _SHORT, _LONG = "exprb32", 1e-6, 100.0, 15, 1 / 20
+#: The exponential method; for errors from this one on, and from this |lambda| T on, for an error of
+#: _LOOSE and a speed, with the power by which it rises; steps after which its first run is given
+#: up, and that number in |lambda| T.
+_EXPONENTIAL, _PAYS, _SHORT, _LONG = "exprb32", 1e-6, 15, 1 / 20
+_SWINGING, _RISES_SWINGING = 350.0, 0.1
 
 #: The part of a run's steps that counts when stability has set them.
 _PART = 0.1
@@ -53,12 +62,15 @@ _STIFF_STEPS = 500
 #: changes it where a scene is stiff, then does it.
 _PILOT = 3000
 
-#: h |lambda| of explicit steps that follow a vibration at a tolerance, and the order at which it
-#: falls.
-_FOLLOWED, _AT, _SLOWLY = 4.0, 1e-3, 16.0
+#: h |lambda| of explicit steps that stability sets, and of those that follow a vibration at a
+#: tolerance, with the order at which it falls.
+_STABLE, _FOLLOWED, _AT, _SLOWLY = 4.0, 0.8, 1e-7, 9.0
+
+#: Explicit runs behind others, which tell little of them, are as many.
+_ANEW = 2.0
 
 #: A step in explicit ones; the order at which the number of exponential ones grows.
-_STEP, _ORDER = {Kind.IMPLICIT: 4.0, Kind.EXPONENTIAL: 2.0}, 3.0
+_STEP, _ORDER = {Kind.IMPLICIT: 2.0, Kind.EXPONENTIAL: 3.0}, 3.0
 
 #: Explicit ones among the methods of SciPy and SUNDIALS.
 _EXPLICIT_OF_OTHERS = ("scipy-DOP853", "scipy-RK45")
@@ -127,16 +139,16 @@ class Family:
     def __init__(
         self, model: Compiled, settings: Settings, error: float, q: Array, u: Array
     ) -> None:
-        self._settings, span = settings, settings.t_end - settings.t_start
+        self._settings, self._error = settings, error
         self._free, self._rescued = settings.method == AUTO, False
-        self._span, self._rate, self._tried = span, 0.0, False
-        self._many = _VIBRATING * (_LOOSE / error) ** _RISES
-        few = _SWINGING if model.flexible else self._many
-        if not self._free or _fastest_possible(model) * span <= few:
+        self._span, self._tried = settings.t_end - settings.t_start, False
+        self._fast: Vibration | None = None
+        if not self._free or _fastest_possible(model) * self._span <= _SMOOTH:
             return
         try:
-            self._rate = fastest_at_start(model.looped, settings.t_start, q, u)
-            if self._rate * span > _SWINGING and error >= _PAYS:
+            self._fast = vibration(model, settings.t_start, q, u, self._span, _SMOOTH)
+            swinging = self._rising(_SWINGING, _RISES_SWINGING) * model.nu
+            if self._lasts > swinging and error >= _PAYS:
                 self._tried = shaken(model, settings.t_start, q, u)
         except MstmmError:  # a scene without tangent, or a start that the run itself will blame
             pass
@@ -148,7 +160,36 @@ class Family:
             return kind_of(self._settings.method)
         if self._tried:
             return Kind.EXPONENTIAL
-        return Kind.IMPLICIT if self._rate * self._span > self._many else Kind.EXPLICIT
+        return Kind.IMPLICIT if self._lasts > self._many else Kind.EXPLICIT
+
+    @property
+    def radians(self) -> float:
+        """Those of vibration that is well above what is asked, where the motions at the start are
+        known; else 0."""
+        fast = self._fast
+        return fast.radians(_WELL * self._error) if fast is not None and fast.known else 0.0
+
+    def calm(self, run: Trajectory) -> bool:
+        """Whether the motions that steps of a run have left behind are below what is asked."""
+        fast, counted = self._fast, run.statistics
+        if fast is None or not fast.known or counted is None:
+            return False
+        return 0.0 < fast.left_behind(counted.steps) < self._error
+
+    @property
+    def _lasts(self) -> float:
+        """|lambda| T of the fastest motion; 0 where it is known to be slow."""
+        return 0.0 if self._fast is None else self._fast.rate * self._span
+
+    @property
+    def _many(self) -> float:
+        """|lambda| T from which implicit steps cost less."""
+        if self._fast is None or not self._fast.known:
+            return self._rising(_VIBRATING, _RISES)
+        return self._rising(_SMOOTH, _RISES_SMOOTH) + _COUNTS * self._fast.radians(self._error)
+
+    def _rising(self, at_loose: float, power: float) -> float:
+        return at_loose * (_LOOSE / self._error) ** power
 
     def next(self, rtol: float, asked: float, made: Sequence[Trajectory]) -> Kind:
         """The kind of the next run after these ones: `rtol` is its tolerance if it is of the same
@@ -156,13 +197,18 @@ class Family:
         last, kind = made[-1], kind_of_run(made[-1])
         if kind is Kind.EXPLICIT or self._settled_on(made):
             return kind
-        expected = _EXPECTED * asked
-        rate = max([self._rate, *(one.rate or 0.0 for run in made for one in run.methods)])
         order = get(implicit_method(rtol)).order if kind is Kind.IMPLICIT else _ORDER
         growth = (last.settings.rtol / rtol) ** (1 / order)
-        followed = rate * self._span / _FOLLOWED * (_AT / expected) ** (1 / _SLOWLY)
         steps = _STEP[kind] * last.statistics.steps * growth
-        return Kind.EXPLICIT if steps >= followed else kind
+        others = _ANEW * self._explicit_steps(_EXPECTED * asked, made)
+        return Kind.EXPLICIT if steps >= others else kind
+
+    def _explicit_steps(self, rtol: float, made: Sequence[Trajectory]) -> float:
+        """How many explicit steps a run would take, about."""
+        rate = max([0.0, *(one.rate or 0.0 for run in made for one in run.methods)])
+        lasts = max(self._lasts, rate * self._span)
+        followed = lasts if self._fast is None else self._fast.speeding(rtol)
+        return max(lasts / _STABLE, followed / _FOLLOWED * (_AT / rtol) ** (1 / _SLOWLY))
 
     def method(self, kind: Kind, rtol: float, made: Sequence[Trajectory]) -> str:
         """The method of the next run after these ones, of a kind, at a tolerance."""
@@ -171,8 +217,8 @@ class Family:
         if kind is Kind.EXPONENTIAL:
             return _EXPONENTIAL
         if kind is Kind.IMPLICIT:
-            return implicit_method(rtol if made else 1.0)
-        if made and not self._rate and _may_be_stiff(made[-1]):
+            return implicit_method(rtol)
+        if made and self._fast is None and _may_be_stiff(made[-1]):
             return AUTO
         return _LOOSE_EXPLICIT if made and rtol > _LOW_ORDER else AUTO_EXPLICIT
 
@@ -185,7 +231,12 @@ class Family:
         most, kind = self._settings.max_steps, kind_of(method)
         if not self._free or method == AUTO or kind is Kind.IMPLICIT:
             return most
-        few = _PILOT if kind is Kind.EXPLICIT else int(_SHORT + _LONG * self._rate * self._span)
+        few = int(_SHORT + _LONG * self._lasts)
+        if kind is Kind.EXPLICIT:
+            known = self._fast is not None and self._fast.known
+            few = (
+                max(_PILOT, int(_ANEW * self._explicit_steps(self._error, ()))) if known else _PILOT
+            )
         return min(most or few, few)
 
     def rescues(self, lost: Trajectory) -> bool:

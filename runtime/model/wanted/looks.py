@@ -12,8 +12,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
+
+import numpy as np
+
+from mstmm.arrays import Array
 
 #: The tightest tolerance that has a meaning.
 TIGHTEST = 1e-13
@@ -40,6 +44,8 @@ class _Usual:
         growth, held: the error in what local errors sum up to; and where stability sets the steps,
             for then local errors are those of fast motion, which hardly add up.
         power: of the tolerance by which errors fall.
+        summed: the same of what local errors sum up to.
+        aim: what a next tolerance aims at by local errors, in what is wanted.
         safety: the error in what the power makes of the distance.
         parted: runs that differ by more (in the size of the motion) tell nothing of the power.
         least: of a next tolerance in the one before.
@@ -50,19 +56,18 @@ class _Usual:
     growth: float
     held: float
     power: float
+    summed: float
+    aim: float
     safety: float
     parted: float
     least: float
 
 
 _USUAL = {
-    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 2.5e3, 3.0, 0.3, 0.9, 1.5, 0.5, 1e-7),
-    Kind.IMPLICIT: _Usual((100.0, 1e-4, 3e-2), 1e6, 1.0, 1.0, 0.8, 1.0, 0.1, 1e-6),
-    Kind.EXPONENTIAL: _Usual((30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.6, 1.0, 0.1, 1e-4),
+    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 2.5e3, 3.0, 0.3, 0.9, 0.9, 0.25, 1.7, 0.5, 1e-7),
+    Kind.IMPLICIT: _Usual((30.0, 1e-4, 3e-2), 1e6, 1.0, 1.0, 0.8, 0.9, 0.6, 1.0, 0.1, 1e-6),
+    Kind.EXPONENTIAL: _Usual((30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.6, 0.6, 0.4, 1.0, 0.1, 1e-4),
 }
-
-#: The power of the tolerance by which the sum of local errors falls.
-_SUMMED = 0.9
 
 #: Where local errors are not known, their sum is taken for so many times the tolerance.
 _UNKNOWN = 15.0
@@ -75,19 +80,35 @@ _TRUSTED, _NOISE, _SURE = 0.9, 0.5, 0.75
 #: exponential method tell nothing of others.
 _CHANGED, _ROUGH, _HARDLY = 0.8, 0.8, 0.25
 
-#: A next tolerance aims at this part of what is wanted: by local errors of explicit steps, by those
-#: of others, and once runs have been compared.  A run more costs more than tighter steps of high
-#: order.
-_FORETOLD, _OTHERS, _AIM = 0.4, 1.0, 0.3
+#: A next tolerance aims at this part of what is wanted once runs have been compared, by explicit
+#: steps, and by others.  A run more costs more than tighter steps of high order.
+_AIM, _AIM_OF_OTHERS = 0.3, 0.6
 
 #: A next tolerance is at most this part of the one before: of the first one, and of later ones.
 _MOST, _LATER = 0.3, 0.1
 
-#: The first explicit tolerance behind an implicit run is at least this part of the usual first one.
+#: The first explicit tolerance behind runs of other kinds is at least this part of the usual first
+#: one.
 _FOLLOWING = 1e-3
 
-#: The next tolerance in the one before, where runs have parted.
+#: The next tolerance in the one before, at most, where runs have parted.
 _LEAP = 1e-2
+
+#: The second tolerance in the first one, at most, by radians of vibration that is followed
+#: implicitly: its phase errs by far more than local errors sum up to.
+_WAVING = 5.0
+
+#: Of runs that part behind this part of the time the growth of errors is known; the estimate in
+#: what it makes of the tolerance.
+_LATE, _DOUBT = 0.8, 10.0
+
+#: What is asked in the first implicit tolerance, by radians of vibration that it has to follow, to
+#: a power.
+_A_RADIAN, _RADIANS = 40.0, 1.5
+
+#: The next tolerance in the one before, at least, of calm runs: where that is at most so many times
+#: what is asked, and errors are not taken to fall; and beyond.
+_CALM, _NEAR, _CALM_BEYOND = 0.1, 100.0, 3e-3
 
 #: Errors of implicit methods may stay for a while above this tolerance, as long as vibrations are
 #: not resolved.
@@ -108,6 +129,9 @@ class Look:
         summed: its local errors added up; None where the method keeps none.
         held: stability, not accuracy, set many of its steps.
         rough: its scene has stops, at which local errors are those of no smooth motion.
+        radians: of vibration above what is asked that implicit steps have to follow.
+        calm: explicit steps left vibration behind that is below it.
+        parted: the part of the run after which it had left the tightest one; 1 if it never has.
     """
 
     rtol: float
@@ -116,12 +140,27 @@ class Look:
     summed: float | None
     held: bool = False
     rough: bool = False
+    radians: float = 0.0
+    calm: bool = False
+    parted: float = 1.0
+
+    def seen(self, way: Array) -> Look:
+        """With how far it is from the tightest one at each sample, (n,); empty: they end
+        elsewhere."""
+        if not len(way):
+            return replace(self, apart=math.inf)
+        gone = np.flatnonzero(~(way < _USUAL[self.kind].parted))
+        parted = float(gone[0]) / max(len(way) - 1, 1) if len(gone) else 1.0
+        return replace(self, apart=float(way.max()), parted=parted)
 
 
-def first_rtol(asked: float, kind: Kind) -> float:
-    """The first tolerance: loose, for it is there to look."""
+def first_rtol(asked: float, kind: Kind, radians: float = 0.0) -> float:
+    """The first tolerance: loose, for it is there to look.  Implicit runs that have to follow so
+    many radians of vibration tell nothing before they do."""
     times, tightest, loosest = _USUAL[kind].first
     wanted = min(max(times * asked, tightest), loosest)
+    if kind is Kind.IMPLICIT and radians > 1.0:
+        wanted = min(wanted, _A_RADIAN * asked / radians**_RADIANS)
     return max(min(wanted, _USUAL[kind].reach * asked), TIGHTEST)
 
 
@@ -133,7 +172,13 @@ def estimate(looks: Sequence[Look]) -> float | None:
     before, last = looks[-2:]
     fallen = (last.rtol / before.rtol) ** _power(looks) if last.rtol < before.rtol else 1.0
     usual = _USUAL[last.kind]
-    return usual.safety * before.apart * (1.0 if before.apart >= usual.parted else fallen)
+    known = usual.safety * before.apart
+    if before.apart < usual.parted:
+        stays = last.calm and before.calm and last.rtol >= 0.99 * _CALM * before.rtol
+        return known * (1.0 if stays else fallen)
+    if before.kind is last.kind is Kind.EXPLICIT and _LATE <= before.parted < 1.0:
+        return min(known, _DOUBT * last.rtol * _growth(before))
+    return known
 
 
 def next_rtol(looks: Sequence[Look], asked: float, kind: Kind) -> float:
@@ -144,25 +189,45 @@ def next_rtol(looks: Sequence[Look], asked: float, kind: Kind) -> float:
         return _changed(last, known, asked, kind)
     if known is None or looks[-2].kind is not kind:
         factor, tightest = _foretold(last, asked), min(_ROUNDING, last.rtol / 2)
-        most = _MOST
+        most = min(_MOST, _WAVING / max(last.radians, 1.0))
     elif not looks[-2].apart < _USUAL[kind].parted:
-        factor = _LEAP
+        known_when = looks[-2].parted < 1.0
+        factor = min(_beyond(looks[-2], asked) / last.rtol, _LEAP) if known_when else _LEAP
     else:
-        factor = (_AIM * asked / known) ** (1 / _usual(last))
+        aim = _AIM if kind is Kind.EXPLICIT else _AIM_OF_OTHERS
+        factor, most = (aim * asked / known) ** (1 / _usual(last)), _MOST
     return max(last.rtol * min(max(factor, _USUAL[kind].least), most), tightest)
 
 
 def _foretold(last: Look, asked: float) -> float:
     """The next tolerance in the last one by what its local errors sum up to."""
-    aim = _FORETOLD if last.kind is Kind.EXPLICIT else _OTHERS
-    return float((aim * asked / _summed(last)) ** (1 / _SUMMED))
+    usual = _USUAL[last.kind]
+    factor = float((usual.aim * asked / _summed(last)) ** (1 / usual.summed))
+    if not last.calm:
+        return factor
+    return max(factor, _CALM if last.rtol <= _NEAR * asked else _CALM_BEYOND)
+
+
+def _beyond(before: Look, asked: float) -> float:
+    """The tolerance at which a run is to stay near, if errors grow on as they have until an earlier
+    one had left."""
+    usual = _USUAL[before.kind]
+    aim = _AIM * asked / (before.rtol * _growth(before))
+    return before.rtol * min(aim, 1.0) ** (1 / usual.power)
+
+
+def _growth(look: Look) -> float:
+    """How far errors grow to the end, at the pace from the tolerance of a run to where it is said
+    to have left."""
+    left = max(_USUAL[look.kind].parted / look.rtol, 1.0)
+    return float(left ** (1.0 / max(look.parted, 0.1)))
 
 
 def _changed(last: Look, known: float | None, asked: float, kind: Kind) -> float:
-    """The first tolerance of another kind: of an explicit one behind implicit runs one with which
-    it is known by them, for stability sets its steps in any case."""
+    """The first tolerance of another kind: of an explicit one behind others one with which it is
+    known by them, for stability sets its steps in any case."""
     first = first_rtol(asked, kind)
-    if known is None or not (last.kind is Kind.IMPLICIT and kind is Kind.EXPLICIT):
+    if known is None or kind is not Kind.EXPLICIT:
         return first
     enough = last.rtol * (_AIM * asked / (_USUAL[kind].safety * known)) ** (1 / _CHANGED)
     return min(first, max(enough, _FOLLOWING * first, TIGHTEST))
@@ -171,7 +236,7 @@ def _changed(last: Look, known: float | None, asked: float, kind: Kind) -> float
 def hopeless(looks: Sequence[Look]) -> str:
     """Why a further run would lead nowhere; "" if it may."""
     stays = len(looks) > 3 and not _falls(looks) and not _falls(looks[:-1])
-    stays = stays and looks[-2].apart < _USUAL[Kind.EXPLICIT].parted
+    stays = stays and looks[-2].apart < _USUAL[looks[-1].kind].parted
     if stays and (looks[-1].kind is Kind.EXPLICIT or looks[-1].rtol < _SLOW):
         return (
             "the error falls no more with the tolerance (rounding, or jumps of forces at which no "

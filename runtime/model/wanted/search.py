@@ -138,21 +138,24 @@ class Search:
         that much are earlier ones, too."""
         last = self._made[-1]
         if self._looks:
-            self._looks[-1] = replace(self._looks[-1], apart=self._apart(self._made[-2], last))
+            way = self._apart(self._made[-2], last)
+            self._looks[-1] = self._looks[-1].seen(way)
         counted = last.run.statistics
         summed = None if counted is None else counted.sum_local_error
         rtol, held = last.run.settings.rtol, held_back(last.run)
-        self._looks.append(Look(rtol, last.kind, 0.0, summed, held, self._rough))
+        radians = self._family.radians if last.kind is Kind.IMPLICIT else 0.0
+        calm = last.kind is Kind.EXPLICIT and self._family.calm(last.run)
+        self._looks.append(Look(rtol, last.kind, 0.0, summed, held, self._rough, radians, calm))
 
-    def _apart(self, one: _Made, tightest: _Made) -> float:
-        """How far a run is from the tightest one, in the size of the motion."""
+    def _apart(self, one: _Made, tightest: _Made) -> Array:
+        """(n,) how far a run is from the tightest one at each sample, in the size of the motion;
+        empty where they end elsewhere."""
         assert self._measure is not None
         n = min(len(one.numbers), len(tightest.numbers))
         if not n or abs(len(one.numbers) - len(tightest.numbers)) > 1:
-            return math.inf
+            return np.zeros(0)
         self._measure.scale_by(tightest.numbers)
-        way = self._measure.apart(one.numbers[:n], tightest.numbers[:n]).max()
-        return float(way) / self._size
+        return self._measure.apart(one.numbers[:n], tightest.numbers[:n]) / self._size
 
     def _told(self) -> Progress | None:
         """Progress of the next run: each takes half of what is left."""
@@ -191,7 +194,7 @@ class Search:
     def _first(self) -> tuple[str, float]:
         """Method and tolerance of the first run."""
         kind = self._family.begins
-        rtol = first_rtol(self._wanted.error, kind)
+        rtol = first_rtol(self._wanted.error, kind, self._family.radians)
         return self._family.method(kind, rtol, ()), rtol
 
     def _next(self) -> tuple[str, float]:

@@ -1,0 +1,71 @@
+"""How far fast motions are excited at the start: masses on springs, by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import mstmm
+from mstmm.runtime.model.wanted.vibration import Vibration, vibration
+
+_ASKED = 1e-6
+
+
+def weight(k: float, zeta: float, mass: float = 2.0) -> mstmm.Model:
+    """A mass let go on a slack spring of k N/m, in gravity."""
+    law = {"stiffness": k, "damping": 2 * zeta * math.sqrt(k * mass)}
+    body = {"name": "mass", "mass": mass, "inertia": [1.0, 1.0, 1.0]}
+    slide = {
+        "name": "slide", "type": "prismatic", "axis": [0.0, 1.0, 0.0], "inboard": "ground",
+        "outboard": "mass", "law": law,
+    }  # fmt: skip
+    scene = mstmm.Scene(schema_version=1, gravity=[0.0, -9.81, 0.0], body=[body], hinge=[slide])
+    return mstmm.compile(scene, engine="looped")
+
+
+def seen(model: mstmm.Model, span: float, few: float = 0.0) -> Vibration:
+    return vibration(model, 0.0, *model.initial_state(), span, few)
+
+
+def test_an_undamped_one_lasts_to_the_end() -> None:
+    found = seen(weight(5e3, 0.0), 10.0)
+    assert found.rate == pytest.approx(50.0, rel=1e-6)
+    assert found.radians(_ASKED) == pytest.approx(500.0, rel=1e-6)
+    assert found.speeding(_ASKED) == pytest.approx(500.0, rel=1e-6)
+
+
+def test_a_damped_one_lasts_until_it_has_fallen_to_what_is_asked() -> None:
+    """The two motions s = -zeta w +- i w (1 - zeta^2)^(1/2) share an amplitude: that of a start at
+    rest, x0 = m g / k, is x0 / (2 (1 - zeta^2)^(1/2)) for each.  Of the only length of a scene its
+    largest part counts, so that what is asked is asked of it."""
+    zeta = 0.05
+    found = seen(weight(5e3, zeta), 100.0)
+    assert found.radians(_ASKED) == pytest.approx(math.log(1 / _ASKED) / zeta, rel=1e-6)
+    assert found.radians(2.0) == 0.0
+
+
+def test_an_angle_is_measured_in_rad() -> None:
+    rod = {
+        "name": "rod", "mass": 1.0, "center_of_mass": [0.5, 0.0, 0.0], "inertia": [0.01, 0.1, 0.1],
+    }  # fmt: skip
+    pin = {
+        "name": "pin", "type": "pin", "axis": [0.0, 0.0, 1.0], "inboard": "ground",
+        "outboard": "rod", "law": {"stiffness": 1e5},
+    }  # fmt: skip
+    scene = mstmm.Scene(schema_version=1, gravity=[0.0, -9.81, 0.0], body=[rod], hinge=[pin])
+    found = seen(mstmm.compile(scene, engine="looped"), 1.0)
+    static = 9.81 * 0.5 / 1e5
+    assert found.parts.max() == pytest.approx(static / 2, rel=1e-3)
+    assert found.radians(static) == 0.0
+    assert found.radians(static / 3) == pytest.approx(found.rate, rel=1e-6)
+    assert found.left_behind(10) == found.parts.max()
+    assert found.left_behind(1000) == 0.0
+
+
+def test_of_slow_motion_the_rate_alone_is_looked_up() -> None:
+    found = seen(weight(5e3, 0.0), 10.0, few=501.0)
+    assert not found.known and found.rate == pytest.approx(50.0, rel=1e-6)
+    assert found.radians(_ASKED) == found.rate * found.span
+    assert not len(found.rates) and not np.any(found.parts)
