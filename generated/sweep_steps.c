@@ -671,13 +671,44 @@ static int mstmm_at_restated(mstmm_state *state, int index)
         (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] = 0;
         (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] -= lack[0];
     }
+    if (mstmm_imposed(body, state->memory)) {
+        for (int k = 0; k < body->nu; k++) {
+            if (!body->imposed_mask[k]) continue;
+            mstmm_frames_driven_effort(
+                .felt = mstmm_zeros, .J = body->rotor + k,
+                .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + k, .tau = mstmm_zeros,
+                .tau_d = rotor);
+            (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] += rotor[0];
+        }
+    }
+    return 0;
+}
+
+/* Efforts without what rotors take of the accelerations in the answer. */
+static int mstmm_at_restated_of_tree(mstmm_state *state, int index)
+{
+    real lack[1];
+    real rotor[1];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
     for (int k = 0; k < body->nu; k++) {
-        if (!body->imposed_mask[k]) continue;
         mstmm_frames_driven_effort(
             .felt = mstmm_zeros, .J = body->rotor + k,
-            .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + k, .tau = mstmm_zeros,
-            .tau_d = rotor);
-        (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] += rotor[0];
+            .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + k,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .tau_d = lack);
+        (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] = 0;
+        (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] -= lack[0];
+    }
+    if (mstmm_imposed(body, state->memory)) {
+        for (int k = 0; k < body->nu; k++) {
+            if (!body->imposed_mask[k]) continue;
+            mstmm_frames_driven_effort(
+                .felt = mstmm_zeros, .J = body->rotor + k,
+                .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + k, .tau = mstmm_zeros,
+                .tau_d = rotor);
+            (mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k)[0] += rotor[0];
+        }
     }
     return 0;
 }
@@ -1081,9 +1112,30 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
             .g = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .delta_I = parent_delta,
             .udot = mstmm_of_speeds(block, nu, MSTMM_SPEED_RATES),
             .delta = block + MSTMM_BLOCK_DELTA);
+    }
+    if ((body->generic || state->required) && !state->refined) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        int columns[6];
+        const int speeds = mstmm_free_speeds(state->memory, body, columns);
         for (int j = 0, k = 0; j < nu; j++)
             (state->udot + body->u)[j] = k < speeds && columns[k] == j ? (mstmm_of_speeds(block, nu, MSTMM_SPEED_RATES))[k++]
                          : (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j];
+    }
+    if ((body->generic || state->required) && state->refined) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        int columns[6];
+        const int speeds = mstmm_free_speeds(state->memory, body, columns);
+        for (int j = 0, k = 0; j < nu; j++)
+            (state->udot + body->u)[j] = k < speeds && columns[k] == j ? (mstmm_of_speeds(block, nu, MSTMM_SPEED_RATES))[k++]
+                         : 0;
+    }
+    if (state->refined) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        for (int j = 0; j < nu; j++)
+            (state->udot + body->u)[j] += (mstmm_of_speeds(block, nu, MSTMM_SPEED_S))[j];
     }
     if (body->modal) {
         real *block = state->workspace + body->block;
@@ -1095,6 +1147,12 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
             .delta_I = block + MSTMM_BLOCK_DELTA, .etadd = modes + MSTMM_MODES_ETADD(n));
         for (int j = 0; j < n; j++)
             (state->udot + modal->u)[j] = (modes + MSTMM_MODES_ETADD(n))[j];
+    }
+    if (body->modal && state->refined) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        for (int j = 0; j < n; j++)
+            (state->udot + modal->u)[j] += (state->given + modal->u)[j];
     }
     if (body->section) {
         real *block = state->workspace + body->block;
@@ -5561,6 +5619,25 @@ static int mstmm_pass_restated(mstmm_state *state)
     return 0;
 }
 
+MSTMM_AT_ONCE void mstmm_fetch_restated_of_tree(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
+}
+static int mstmm_pass_restated_of_tree(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_restated_of_tree(state, i, MSTMM_TILE);
+        const int code = mstmm_at_restated_of_tree(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
 static int mstmm_pass_strain(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -5704,7 +5781,7 @@ MSTMM_AT_ONCE void mstmm_fetch_recover(const mstmm_state *state, int index, int 
     const int nu = body->nu;
     mstmm_fetch(block + MSTMM_BLOCK_DELTA, block + MSTMM_BLOCK_DELTA + 6);
     mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
     mstmm_fetch(body->hinge_p, body->body_p);
 }
 static int mstmm_pass_recover(mstmm_state *state)
@@ -7196,8 +7273,12 @@ int mstmm_run_accelerations(mstmm_state *state)
     if (code) return code;
     code = mstmm_pass_laws(state);
     if (code) return code;
-    if (state->refined) {
+    if (state->refined && model->looped) {
         code = mstmm_pass_restated(state);
+        if (code) return code;
+    }
+    if (state->refined && !model->looped) {
+        code = mstmm_pass_restated_of_tree(state);
         if (code) return code;
     }
     if (state->balance && model->n_flexible) {

@@ -48,14 +48,17 @@ PIVOT_FLOOR = Fraction(1, 10**14)
 
 class Replay(RowSlots):
     """One replay of sweeps.  `staged`: transport goes stage by stage, where what is known folds;
-    `inverse`: accelerations are given; `level`: "gaping" or "slipping", what is corrected of closed
+    `inverse`: accelerations are given; `refined`: they are an answer of a tree, to which that of
+    what they leave over is added; `level`: "gaping" or "slipping", what is corrected of closed
     loops."""
 
     def __init__(
-        self, state: FusionState, staged: bool = True, inverse: bool = False, level: str = ""
-    ) -> None:
+        self, state: FusionState, staged: bool = True, inverse: bool = False, level: str = "",
+        refined: bool = False,
+    ) -> None:  # fmt: skip
         super().__init__(state)
-        self.staged, self.inverse, self.level = staged, inverse, level
+        self.staged, self.inverse, self.level = staged, inverse or refined, level
+        self.refined = refined
         #: Conditions of guards, which code without failure codes asks for as a whole.
         self.conditions: list[Node] = []
         self._values: Nodes = []
@@ -156,7 +159,8 @@ class Replay(RowSlots):
     def _scene_has(self, trait: str) -> bool:
         s = self.state.structure
         known = {
-            "linked": False, "product": False, "qr": False, "refined": False, "residual": False,
+            "linked": False, "product": False, "qr": False,
+            "refined": self.refined, "residual": self.refined,
             "couplings": bool(s.couplings), "looped": s.closes, "balance": not self.level,
             "efforts": True, "inverse": self.inverse, "weightless": False,
             "driving": not self.level,
@@ -169,7 +173,7 @@ class Replay(RowSlots):
 
     def _has(self, trait: str) -> bool:
         """Whether the subject has a trait; see `schedule.words`."""
-        if trait in ("balance", "efforts", "inverse", "weightless", "driving"):
+        if trait in ("balance", "efforts", "inverse", "weightless", "driving", "refined"):
             return self._scene_has(trait)
         if trait in ("gaping", "slipping"):
             return self.level == trait
@@ -282,6 +286,9 @@ class Replay(RowSlots):
         """Length of a slot that is filled with zeros."""
         if slot in _LOCAL_SIZES:
             return _LOCAL_SIZES[slot]
+        _, _, picked = slot.partition("[")
+        if picked:
+            return len(picked.split())
         size = SLOTS[slot].size
         if size.isdigit():
             return int(size)
@@ -429,7 +436,6 @@ _TRAITS: dict[str, Callable[[Replay, BodyStructure], bool]] = {
     "moving": lambda replay, body: body.section is None and bool(replay.free()),
     "cut": lambda replay, body: replay.closure() is not None,
     "aside": lambda replay, body: body.idle or replay.closure() is not None,
-    "refined": lambda replay, body: False,
     "coupled": lambda replay, body: replay.is_coupled(),
     "hinged": lambda replay, body: replay.closed_by("hinge"),
     "distance": lambda replay, body: replay.closed_by("distance"),

@@ -59,6 +59,10 @@ def fuse(structure: Structure, kernels: Kernels, numbers: Sequence[float] | None
     state, s = FusionState(structure, kernels, numbers), structure
     replay = Replay(state)
     replay.sweep(ACCELERATIONS)
+    for _ in range(s.refines):  # pivots are those of before: one node each
+        state.given = replay.gathered("udot")
+        replay = Replay(state, refined=True)
+        replay.sweep(ACCELERATIONS)
     outputs = [Port("qdot", (s.nq,)), Port("udot", (s.nu,))]
     sums = [Port("power", (1,)), Port("potential", (1,))]
     values: dict[str, object] = {

@@ -207,30 +207,6 @@ ROW_FOUND = Pass(
     order=TIPS_TO_ROOT,
 )  # fmt: skip
 
-RESTATED = Pass(
-    "restated", "body", "Efforts without what rotors take of the accelerations in the answer.",
-    (
-        EachSpeed(
-            steps=(
-                call("frames.driven_effort", felt="zero", J="body.rotor[k]", udot="body.s[k]",
-                     tau="body.tau[k]", tau_d="local.lack"),
-                Copy(to="body.tau[k]"),
-                Add(to="body.tau[k]", source="local.lack", times=-1),
-            ),
-        ),
-        # Nobody asks them of speeds that are imposed.
-        EachSpeed(
-            steps=(
-                call("frames.driven_effort", felt="zero", J="body.rotor[k]", udot="body.s[k]",
-                     tau="zero", tau_d="local.rotor"),
-                Add(to="body.tau[k]", source="local.rotor"),
-            ),
-            imposed=True,
-        ),
-    ),
-    skip="cut",
-)  # fmt: skip
-
 UNLOADED = Pass(
     "unloaded", "body", "No load and no effort: the rows alone are to be met.",
     (Copy(to="body.e"), Copy(to="body.tau"), *only("modal", Copy(to="modes.e_f"))),

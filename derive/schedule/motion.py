@@ -58,7 +58,9 @@ FORWARD = Pass(
              motion="connection.motion"),
         call("generic{nu}.forward", when="staged", Rt="identity", ro="zero", **HINGE, s="body.s",
              motion_I="connection.motion", motion="body.motion"),
-        ChooseBias(subspace="hinge.H", motion="body.motion", chosen="body.chosen", when="staged"),
+        # The bias motion of what is refined is that of the answer.
+        ChooseBias(subspace="hinge.H", motion="body.motion", chosen="body.chosen",
+                   when="staged !refined"),
         Do(whole=MODAL_OWN, when="modal"),
         call("body.inertia", when="!modal !weightless", p="body.p", S="body.S"),
         call("body.bias_load", when="!modal", p="body.p", motion="body.motion", e="body.e"),

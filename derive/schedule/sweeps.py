@@ -16,7 +16,6 @@ from .loops import (
     CLOSURES,
     CLOSURES_ANSWERED,
     CLOSURES_LOADED,
-    RESTATED,
     ROW_CLOSED,
     ROW_FOUND,
     UNLOADED,
@@ -25,6 +24,7 @@ from .mass import COMPOSITION, EXERTED, FELT_BY
 from .motion import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
 from .planar import in_plane
 from .qr import QR_CONDENSE, QR_OWN
+from .refine import RESTATED, RESTATED_OF_TREE
 from .riccati import CONDENSE, RECOVER
 from .solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
 from .steps import Pass, Run, Sweep
@@ -82,7 +82,8 @@ ACCELERATIONS = Sweep(
         Run(whole=EFFORTS_POWER, when="balance efforts"),
         Run(whole=EFFORTS),
         Run(whole=LAWS),
-        Run(whole=RESTATED, when="refined"),
+        Run(whole=RESTATED, when="refined looped"),
+        Run(whole=RESTATED_OF_TREE, when="refined !looped"),
         Run(whole=STRAIN, when="balance flexible"),
         *_either(Run(whole=POSES), "posed"),
         Run(hook="product_before_loads", when="product"),

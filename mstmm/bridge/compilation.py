@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..runtime.model.model import Model
 
 ENGINES = ("auto", "fused", "looped")
-SWEEPS = ("riccati", "qr", "product")
+SWEEPS = ("riccati", "refined", "qr", "product")
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,11 @@ def compile_scene(
             of this scene alone, compiled now or found in the cache; a C compiler is needed, pays
             up to about 60 bodies, possible up to 400), or "auto": fused code that is in the cache
             is used, and a run or batch long enough to repay the compiler has it built.
-        sweep: "riccati" (any tree), "qr" (the same as least squares: slower, but it keeps its
-            digits where heavy bodies hang behind light ones; rigid bodies, looped engine, and
-            explicit methods; the equilibrium and derivatives stay with the Riccati sweep), or
+        sweep: "riccati" (any tree), "refined" (what its answer leaves over is answered again, as
+            often as the start needs: digits stay where heavy bodies hang behind light ones; closed
+            loops do so by themselves), "qr" (the same as least squares: slower, for any ratio of
+            masses; rigid bodies, looped engine, and explicit methods), which both leave the
+            equilibrium and derivatives to the Riccati sweep, or
             "product" (the plain product of classical transfer matrices along a chain and
             loops closed on it, guarded).
         accuracy: with "product", the largest deviation from the Riccati sweep, relative to the
@@ -107,7 +109,7 @@ def compile_level(
     elements, definitions = store.known(store.needed(scene))
     scene.check_types(definitions)
     product = accuracy if sweep == "product" else None
-    if engine == "fused" and sweep != "riccati":
+    if engine == "fused" and sweep in ("qr", "product"):
         raise SceneError(f'sweep = "{sweep}" has no fused code; use engine = "auto" or "looped"')
     if bake and engine != "fused":
         raise SceneError(
@@ -118,7 +120,7 @@ def compile_level(
     most = MOST_ASKED if engine == "fused" else MOST_BODIES
 
     fuser = Fuser(definitions, refused, bake, most)
-    model = Model(scene, elements, fuser, product, sweep == "qr", words)
+    model = Model(scene, elements, fuser, product, sweep if product is None else "riccati", words)
     model.refuse_undetermined_start()
     if engine == "fused":
         model.fusion.build()

@@ -11,7 +11,7 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
@@ -93,6 +93,7 @@ class Fusion:
         self.inputs: Places = ()
         if not self.obstacle:
             self.structure, self.numbers = structure_of(packed.system, known, bake, packed.floors)
+            self.structure = replace(self.structure, refines=int(packed.model.refines))
             self.inputs = self.structure.inputs
             self.obstacle = _too_wide(self.structure, most)
         self._looped_by_nature = bool(self.obstacle)
@@ -274,7 +275,7 @@ class Fusion:
     def solution(self, build: bool) -> ColumnsLibrary | None:
         """The library that solves with the scene's mass matrix, which is that of a tree; errors as
         for `columns`."""
-        if self.obstacle or self.structure.closes:
+        if self.obstacle or self.structure.closes or self.structure.refines:
             return None
 
         def kernels() -> Sequence[KernelIR]:
@@ -369,7 +370,7 @@ def _obstacle(packed: Packed, most: int) -> str:
         return "the product of classical matrices is looped"
     if packed.qr:
         return "the sweep as least squares is looped"
-    if packed.model.refines:
+    if packed.model.refines and packed.system.closes:
         return "heavy bodies behind light ones cost digits, which refinement mends: it is looped"
     hinges = (packed.elements[body.hinge] for body in packed.system.distinct)
     if any(hinge.tape is not None and hinge.spec is None for hinge in hinges):

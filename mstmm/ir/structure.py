@@ -206,6 +206,7 @@ class Structure:
     elements: Mapping[Key, str] = field(default_factory=dict)  #: hashes of users' elements
     #: (place among the numbers of inputs, place in p) of those that are read: they change with time
     inputs: tuple[tuple[int, int], ...] = field(default=(), repr=False, compare=False)
+    refines: int = 0  #: how often accelerations of a tree are refined
 
     @property
     def closes(self) -> bool:

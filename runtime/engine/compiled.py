@@ -23,13 +23,14 @@ from .engine import Engine
 from .given import GivenInput, at_once, with_inputs
 from .loops.closed import Closed
 from .loops.freedom import Freedom
+from .loops.refinement import of_tree
 from .renewed import with_values
 from .sizes import speed_sizes
 from .slopes import Slopes
 
-#: What a scene is compiled with: fused code, accuracy of the plain product, whether the sweep is
-#: that of least squares, and what may be simplified.
-Asked = tuple[Callable[[Packed, Known], Fusing] | None, float | None, bool, Words]
+#: What a scene is compiled with: fused code, accuracy of the plain product, the sweep, and what may
+#: be simplified.
+Asked = tuple[Callable[[Packed, Known], Fusing] | None, float | None, str, Words]
 
 
 class Compiled:
@@ -41,6 +42,7 @@ class Compiled:
         looped: the looped engine on the packed scene.
         fusion: what is known of the fused code of the scene.
         closed: its closed loops, assembled; None for a tree.
+        sweep: "riccati", "refined" or "qr".
     """
 
     def __init__(
@@ -49,16 +51,15 @@ class Compiled:
         known: Known | None = None,
         fusing: Callable[[Packed, Known], Fusing] | None = None,
         product_accuracy: float | None = None,
-        least_squares: bool = False,
+        sweep: str = "riccati",
         simplify: Words = NOTHING,
     ) -> None:
         self.scene = scene
-        self._fusing, self._product_accuracy = fusing, product_accuracy
+        self._fusing, self._product_accuracy, self.sweep = fusing, product_accuracy, sweep
         self._simplify = simplify if product_accuracy is None else NOTHING
         self.looped = Engine(
-            pack(scene, known, product_accuracy, least_squares=least_squares,
-                 simplify=self._simplify)
-        )  # fmt: skip
+            pack(scene, known, product_accuracy, sweep=sweep, simplify=self._simplify)
+        )
         self.known = self.packed.elements.known
         self.closed: Closed | None = None
         if self.packed.system.closes:
@@ -70,6 +71,8 @@ class Compiled:
             if product_accuracy is not None:
                 product.attach(self.packed, product_accuracy)
                 resize(self.packed, self.packed.written.slots)
+        elif self.packed.refined:
+            self.packed.model.refines = of_tree(self.looped)
         self.fusion: Fusing = fusing(self.packed, self.known) if fusing else NotFused()
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -78,7 +81,7 @@ class Compiled:
 
     @property
     def _asked(self) -> Asked:
-        return self._fusing, self._product_accuracy, self.packed.qr, self._simplify
+        return self._fusing, self._product_accuracy, self.sweep, self._simplify
 
     @cached_property
     def apart(self) -> Engine:

@@ -118,12 +118,12 @@ class Engine(Calls):
     def solve(self, q: Array, columns: Array, memory: Array | None = None) -> Array:
         """M(q)^-1 times n columns of efforts (n, nu), on the speeds that nobody imposes; zero on
         the others.  q (nq,) of one state; S is factored once, each column is O(bodies); of least
-        squares and with closed loops there is no factor to keep, and each column is a sweep at rest
+        squares, refined and with closed loops no factor is kept, and each column is a sweep at rest
         with its efforts.
         Without `memory` nothing is released."""
         engine = self.inertia_alone
         memory = engine.start_memory() if memory is None else memory
-        if self.packed.qr or self.packed.system.closes:
+        if self.packed.qr or self.packed.refined or self.packed.system.closes:
             # Couplings whose values go by time move without efforts, which the last column has not.
             columns = np.vstack([columns, np.zeros(self.nu)])
             n, still = len(columns), np.zeros(columns.shape)

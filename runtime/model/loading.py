@@ -138,8 +138,7 @@ def _rebuilt(data: Any, path: Path) -> Result:
     scene = Scene.from_data(tomllib.loads(str(data["scene"].item())), f"{path}: scene")
     elements, definitions = store.known(store.needed(scene))
     scene.check_types(definitions)
-    least_squares = data.attrs.get("sweep") == "qr"
-    model = Model(scene, known=elements, least_squares=least_squares)
+    model = Model(scene, known=elements, sweep=data.attrs.get("sweep", "riccati"))
     model.fusion = NotFused(f"the saved run was made by the {data.attrs['engine']} one")
     run = _completed(model, provenance.trajectory(data))
     if not _fits(model, run):

@@ -14,7 +14,7 @@ from .elements import Known
 from .frames import Frames
 from .internal import system_of
 from .merge.simplification import NOTHING, WELDS, Words
-from .packed import Packed, resize
+from .packed import Packed, refine, resize
 from .records.model import write
 from .system import System
 
@@ -24,7 +24,7 @@ def pack(
     known: Known | None = None,
     product_accuracy: float | None = None,
     *,
-    least_squares: bool = False,
+    sweep: str = "riccati",
     align: bool = True,
     flexible: Mapping[str, ModalBody] | None = None,
     simplify: Words = NOTHING,
@@ -32,14 +32,17 @@ def pack(
     """Engine arrays of a scene; as `system_of`.
 
     With `product_accuracy` accelerations come from the plain product of classical matrices, which
-    may deviate from the Riccati sweep by that much; with `least_squares` from the QR sweep.
+    may deviate from the Riccati sweep by that much; where `sweep` is "qr" they come from the QR
+    sweep, and where it is "refined" from the Riccati sweep, refined once.
     """
     system, frames = system_of(scene, known, align=align, flexible=flexible, simplify=simplify)
     packed = packed_system(system, frames)
     if product_accuracy is not None and not system.closes:  # closed loops go first
         product.attach(packed, product_accuracy)
-    if least_squares:
+    if sweep == "qr":
         qr.attach(packed)
+    if sweep == "refined":
+        refine(packed, 1)
     resize(packed, packed.written.slots)
     return packed
 
@@ -62,7 +65,9 @@ def unmerged(packed: Packed) -> Packed:
     found.held = packed.held
     if packed.qr:
         qr.attach(found)
-        resize(found, found.written.slots)
+    if packed.refined:
+        refine(found, int(packed.model.refines))
+    resize(found, found.written.slots)
     return found
 
 

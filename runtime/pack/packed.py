@@ -26,7 +26,8 @@ class Packed(Frames):
 
     `scratch` is the first number of the workspace behind what the bodies need, `tape_slots` the
     largest workspace of a tape, `workspace` the whole length; `qr` is whether the sweep is that of
-    least squares.  `held` are the inputs that are set during a run, by name.
+    least squares, `refined` whether accelerations of a tree are refined.
+    `held` are the inputs that are set during a run, by name.
     """
 
     system: System
@@ -39,6 +40,7 @@ class Packed(Frames):
     workspace: int = 0
     product: Any = None
     qr: bool = False
+    refined: bool = False
     held: frozenset[str] = frozenset()
     _time_maps: dict[tuple[float, float], TimeMap] = field(default_factory=dict)
     _slopes: Slopes | None = None
@@ -94,3 +96,14 @@ def resize(packed: Packed, slots: int) -> None:
     packed.workspace = packed.scratch + state + packed.tape_slots
     model.scratch, model.tape_slots = packed.scratch, packed.tape_slots
     model.workspace = packed.workspace
+
+
+def refine(packed: Packed, times: int) -> None:
+    """Let the packed tree refine its accelerations so often, by an answer behind the blocks, before
+    it is resized; closed loops have room for theirs, and say themselves how often."""
+    if packed.system.closes:
+        return
+    if not packed.refined:
+        packed.model.answer = packed.scratch
+        packed.scratch += packed.system.nu
+    packed.refined, packed.model.refines = True, times

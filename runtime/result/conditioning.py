@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 #: Pivot loss and singular measure from which on they are risks.
 LOSS, SINGULAR = 1e8, 1e-4
+#: Pivot loss up to which refined accelerations keep their digits.
+REFINED = 1e13
 
 #: Change of angles within a fixed step (rad) that is one where the measure is below the first.
 NEAR, TURNED = 0.1, 0.3
@@ -46,23 +48,33 @@ _UPPER = np.triu_indices(6)
 
 @dataclass(frozen=True)
 class PivotLoss:
-    """The worst ratio of rounding (in units of 1e-16) to pivot in a run: which hinge, when (s)."""
+    """The worst ratio of rounding (in units of 1e-16) to pivot in a run: which hinge, when (s), and
+    how often accelerations are refined."""
 
     ratio: float
     hinge: str
     time: float
+    refines: int = 0
+
+    @property
+    def error(self) -> float:
+        """Of the accelerations, in parts of their size: each refinement leaves of what is wrong the
+        part that was wrong of them."""
+        return min(1e-16 * self.ratio, 1.0) ** (1 + self.refines)
 
     @property
     def risk(self) -> Risk | None:
         """That digits are lost; None up to LOSS."""
-        if not self.ratio > LOSS:
+        if not self.error > 1e-16 * LOSS:
             return None
+        refined = f", refined {self.refines} times" if self.refines else ""
+        keeps = 'sweep = "qr"' if self.refines or self.ratio > REFINED else 'sweep = "refined"'
         return Risk(
             "pivot-loss", f'hinge "{self.hinge}"',
             f'hinge "{self.hinge}" carries {self.ratio:.0e} times what its motion feels (a heavy '
-            f"body behind light ones): accelerations may err by {1e-16 * self.ratio:.0e} of their "
-            "size", 'sweep = "qr" keeps them (explicit methods); or, where the root is free, make '
-            "the heavy body the first one", self.ratio, LOSS,
+            f"body behind light ones): accelerations may err by {self.error:.0e} of their "
+            f"size{refined}", f"{keeps} keeps them (explicit methods); or, where the root is free, "
+            "make the heavy body the first one", self.ratio, LOSS,
         )  # fmt: skip
 
 
@@ -105,7 +117,8 @@ def pivot_loss(model: Compiled, run: Trajectory) -> PivotLoss | None:
         return None
     if model.packed.system.closes:
         return None
-    worst, pivots = PivotLoss(0.0, "", 0.0), _Pivots(model)
+    refines = int(model.packed.model.refines)
+    worst, pivots = PivotLoss(0.0, "", 0.0, refines), _Pivots(model)
     count = int(np.clip(_WORK // len(pivots.parents), 1, SAMPLES))
     for k in np.unique(np.linspace(0, len(run.t) - 1, count).astype(int)):
         one = slice(k, k + 1)
@@ -121,7 +134,7 @@ def pivot_loss(model: Compiled, run: Trajectory) -> PivotLoss | None:
         place = int(ratios.argmax())
         if ratios[place] > worst.ratio:
             hinge = model.looped.hinge_name(place)
-            worst = PivotLoss(float(ratios[place]), hinge, float(run.t[k]))
+            worst = PivotLoss(float(ratios[place]), hinge, float(run.t[k]), refines)
     return worst if worst.hinge else None
 
 

@@ -22,6 +22,8 @@ EXPECTED = {
     "product-masses": ((0.02, 0.2), 1e-6),
     # errors of (0.4 to 4) 1e-16 times the ratio: tests/stability/test_mass_ratios.py
     "heavy-tip": ((1e6, 1e9), 1e20),
+    # refined up to four times, of the fifth power of that: as long as it leaves a digit
+    "refined-tip": ((1e13, 1e17), 1e20),
     # across its plane a chain resists with the cube of its length, and rounding of that leaks
     "inertial-axes": ((100, 2000), 1e5),
     # one spring between a light and a heavy mass: the square of what is missed is 1 + M/m

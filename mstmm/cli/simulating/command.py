@@ -120,9 +120,9 @@ def simulate(
     ] = False,
     sweep: Annotated[
         str,
-        typer.Option("--sweep", metavar="NAME", help="riccati, qr: as least squares, for heavy "
-                     "bodies behind light ones, or product: the plain product of transfer "
-                     "matrices, for chains, guarded."),
+        typer.Option("--sweep", metavar="NAME", help="riccati, refined: for heavy bodies behind "
+                     "light ones, qr: as least squares, for any ratio of masses, or product: the "
+                     "plain product of transfer matrices, for chains, guarded."),
     ] = "riccati",
     engine: Annotated[
         str,

@@ -77,6 +77,7 @@ int mstmm_refine(mstmm_state *state, const real *q, const real *u)
     state->q = q;
     state->u = u;
     state->given = answer;
+    state->linked = 0; /* links begin from no accelerations */
     state->residual = state->refined = 1;
     for (int k = 0; k < model->refines && !code; k++) {
         memcpy(answer, state->udot, (size_t)model->nu * sizeof(real));

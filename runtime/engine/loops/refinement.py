@@ -1,4 +1,4 @@
-"""How often heavy bodies behind light ones make accelerations of closed loops be refined.
+"""How often heavy bodies behind light ones make accelerations be refined.
 
 What inverse dynamics of an answer leaves over is answered too, and added: again and again, as long
 as that changes anything.  What the last time changes is what is wrong before it.
@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.errors import NumericalFailure
+from mstmm.errors import NumericalFailure, SceneError
 
+from ...pack.start import start_values
 from ..engine import Engine
 
 #: Change of the accelerations, in parts of the largest, that is rounding, and from which on
@@ -29,8 +30,8 @@ def refinements(engine: Engine, q: Array, u: Array, mobility: int) -> int:
     Raises NumericalFailure where they do not.
     """
     model = engine.packed.model
-    if engine.packed.flexible:
-        return 0  # what modes leave over is not answered
+    if engine.packed.flexible and engine.packed.system.closes:
+        return 0  # what modes leave over there is not answered
     efforts = np.random.default_rng(0).uniform(-1.0, 1.0, (2, engine.nu))
     efforts[0] = 0.0
     memory = engine.start_memory()
@@ -60,10 +61,23 @@ def refinements(engine: Engine, q: Array, u: Array, mobility: int) -> int:
     wrong = float(changed.max())
     if wrong > _WRONG:
         raise NumericalFailure(
-            f"accelerations of the closed loops are wrong by {wrong:.1g} of their size, and "
-            f"refining them does not help: {unlike_masses(engine)}"
+            f"accelerations{' of the closed loops' * engine.packed.system.closes} are wrong by "
+            f"{wrong:.1g} of their size, and refining them does not help: {unlike_masses(engine)}"
         )
     return _MOST
+
+
+def of_tree(engine: Engine) -> int:
+    """The same of a tree at its start, where they are asked for: once at least.
+
+    Raises SceneError where they do not stay as they are.
+    """
+    packed = engine.packed
+    q, u = start_values(packed.scene, packed.layout, packed.flexible)
+    try:
+        return max(1, refinements(engine, q, u, 1))
+    except NumericalFailure as failure:
+        raise SceneError(f'scene: {failure}; or use sweep = "qr"') from None
 
 
 def unlike_masses(engine: Engine) -> str:

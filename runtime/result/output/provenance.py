@@ -61,7 +61,7 @@ def attributes(result: Record) -> dict[str, Any]:
         "scene_sha256": scene_hash(result),
         "kernels_sha256": kernels_hash(result.model.known),
         "engine": result.model.engine,
-        "sweep": "qr" if result.model.packed.qr else "riccati",
+        "sweep": result.model.sweep,
         "versions": json.dumps(versions()),
         "settings": json.dumps(settings),
         "status": "INTERRUPTED" if run.status is None else run.status.name,

@@ -10,7 +10,8 @@ from ...scenes import drawn_pins, model, rod
 RODS = 8
 
 
-def _error(ratio: float, sweep: str) -> float:
+def error(ratio: float, sweep: str) -> float:
+    """Of the accelerations of some drawn states."""
     masses = [1.0] * (RODS - 1) + [ratio]
     bodies = [rod(f"rod{i}", mass=mass) for i, mass in enumerate(masses)]
     hinges = [
@@ -32,8 +33,8 @@ CASE = Definition(
     parameter="mass of the last rod over that of the others", unit="", low=1.0, high=1e12,
     scale=LOG,
     measured="error of the accelerations, relative", limit=1e-8,
-    method=Method(f"Riccati sweep, {RODS} rods", lambda ratio: _error(ratio, "riccati")),
-    remedy=Method('least squares (sweep="qr")', lambda ratio: _error(ratio, "qr")), reach=1e20,
+    method=Method(f"Riccati sweep, {RODS} rods", lambda ratio: error(ratio, "riccati")),
+    remedy=Method('least squares (sweep="qr")', lambda ratio: error(ratio, "qr")), reach=1e20,
     source="Bjoerck, Numerical Methods for Least Squares Problems, SIAM 1996, ch. 2 and 4 (normal "
     "equations, weighted rows); sweep: Rui et al., Multibody System Dynamics 49, 2020",
 )  # fmt: skip
