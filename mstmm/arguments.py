@@ -34,6 +34,13 @@ def text_of(what: str, value: Any) -> str | None:
     raise SceneError(f"{what} = {short(value)}: expected a text")
 
 
+def word_of(what: str, value: Any, such_as: str) -> str:
+    """One word, whichever; SceneError for what is no text, saying what is expected."""
+    if isinstance(value, str):
+        return value
+    raise SceneError(f"{what} = {short(value)}: expected {such_as}")
+
+
 def yes_or_no(what: str, value: Any) -> bool:
     """True or False, and nothing that Python takes for one of them."""
     if isinstance(value, bool):

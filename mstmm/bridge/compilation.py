@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..arguments import short, word_of, yes_or_no
 from ..errors import ElementError, SceneError
 from ..ir.facts import builtin_hinges
 from ..ir.spec import ElementSpec
@@ -91,12 +93,12 @@ def compile_level(
 ) -> Model:
     """The same of a scene at a lower level of model, which may lack what an output is of: its
     results do not have that output."""
-    if engine not in ENGINES:
+    if word_of("engine", engine, f"one of {', '.join(ENGINES)}") not in ENGINES:
         raise SceneError(f'engine "{engine}" is not known; there are: {", ".join(ENGINES)}')
-    if sweep not in SWEEPS:
+    if word_of("sweep", sweep, f"one of {', '.join(SWEEPS)}") not in SWEEPS:
         raise SceneError(f'sweep "{sweep}" is not known; there are: {", ".join(SWEEPS)}')
-    if not accuracy > 0:
-        raise SceneError(f"accuracy = {accuracy!r}: expected a positive number")
+    if not (isinstance(accuracy, Real) and accuracy > 0) or isinstance(accuracy, bool):
+        raise SceneError(f"accuracy = {short(accuracy)}: expected a positive number")
     from ..runtime.kernels import store
     from ..runtime.model.model import Model
     from ..runtime.pack.flexible.rigidified import with_level
@@ -111,7 +113,7 @@ def compile_level(
     product = accuracy if sweep == "product" else None
     if engine == "fused" and sweep in ("qr", "product"):
         raise SceneError(f'sweep = "{sweep}" has no fused code; use engine = "auto" or "looped"')
-    if bake and engine != "fused":
+    if yes_or_no("bake", bake) and engine != "fused":
         raise SceneError(
             "bake = True writes the numbers of the scene into its code; "
             'it goes with engine = "fused"'

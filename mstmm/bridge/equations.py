@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import sympy as sp
 
-from ..arguments import short
+from ..arguments import short, texts_of
 from ..derive.catalogue.registry import BASES, Element, instance
 from ..derive.show.document import (
     Code,
@@ -98,6 +98,7 @@ def equations(
     Raises ElementError for a name that is none, SceneError for what is wrong with a scene, and for
     names in `keep` that it does not have.
     """
+    keep = texts_of("keep", keep, "rod1.mass")
     if isinstance(of, str) and not is_scene_file(of):
         return _of_element(of, keep)
     if isinstance(of, str | os.PathLike | Scene):

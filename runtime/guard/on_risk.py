@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from mstmm.arguments import word_of
 from mstmm.arrays import Array
 from mstmm.errors import RiskRefused, SceneError
 from mstmm.risk import ON_RISK, Risk
@@ -25,8 +26,9 @@ def started(model: Compiled, settings: Settings, q: Array, u: Array, on_risk: st
     Raises SceneError for a word that `on_risk` does not know, RiskRefused where that is "refuse"
     and something speaks against the run.
     """
-    if on_risk not in ON_RISK:
-        raise SceneError(f"on_risk = {on_risk!r}: expected one of {', '.join(ON_RISK)}")
+    known = f"one of {', '.join(ON_RISK)}"
+    if word_of("on_risk", on_risk, known) not in ON_RISK:
+        raise SceneError(f"on_risk = {on_risk!r}: expected {known}")
     seen = look(model, settings, q, u)
     if on_risk == "refuse":
         step = check_step(model.looped, settings, q, u)

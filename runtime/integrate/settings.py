@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mstmm.arguments import word_of
 from mstmm.arrays import numbers, real, whole
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import SceneError
@@ -77,10 +79,8 @@ def checked(settings: Settings) -> Settings:
     t_end = real("t_end", settings.t_end, "a time in s, not before t_start")
     if t_end < t_start:
         raise SceneError(f"t_end = {t_end:g}: expected a time in s, not before t_start")
-    if not isinstance(settings.method, str):
-        raise SceneError(f"method = {settings.method!r}: expected a name such as dop853")
-    if not isinstance(settings.scheme, str):
-        raise SceneError(f"scheme = {settings.scheme!r}: expected a name such as hht:0.3")
+    word_of("method", settings.method, "a name such as dop853")
+    word_of("scheme", settings.scheme, "a name such as hht:0.3")
     if settings.method == AUTO and settings.step is not None:
         raise SceneError(
             f'step = {settings.step!r}: method "{AUTO}" chooses its steps; leave step out, or name '
@@ -88,7 +88,7 @@ def checked(settings: Settings) -> Settings:
         )
     _times_within(settings.output_times, t_start, t_end)
     longest = settings.max_step
-    if settings.step is not None and longest and longest != np.inf:
+    if settings.step is not None and _longest(longest):
         raise SceneError(
             f"max_step = {longest!r}: bounds steps that the method chooses, but step = "
             f"{settings.step!r} fixes them all; leave one of the two out"
@@ -100,8 +100,7 @@ def checked(settings: Settings) -> Settings:
         atol=max(_LEAST, _above_zero("atol", settings.atol, "an absolute tolerance above zero")),
         step=None if settings.step is None
         else _above_zero("step", settings.step, "a time above zero, in s"),
-        max_step=0.0 if longest == np.inf or longest == 0
-        else _above_zero("max_step", longest, "a time above zero in s, or 0 for no limit"),
+        max_step=_longest(longest),
         max_steps=whole(
             "max_steps", settings.max_steps, 0, "a whole number of steps, or 0 for no limit"
         ),
@@ -113,7 +112,15 @@ def checked(settings: Settings) -> Settings:
     )  # fmt: skip
 
 
+def _longest(value: float) -> float:
+    """The longest step, 0 for no limit."""
+    if isinstance(value, Real) and value in (0, np.inf):
+        return 0.0
+    return _above_zero("max_step", value, "a time above zero in s, or 0 for no limit")
+
+
 def _tangent(settings: Settings) -> str:
+    word_of("tangent", settings.tangent, f"one of {', '.join(TANGENTS)}")
     check_tangent(settings.method, settings.tangent)
     return settings.tangent
 

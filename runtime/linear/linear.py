@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mstmm.arguments import short
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
@@ -40,8 +41,8 @@ class Linear(StateSpace):
         """
         if count is not None and not isinstance(count, (int, np.integer)):
             raise SceneError(f"count = {count!r}: expected a whole number of motions")
-        if damped not in (None, True, False):
-            raise SceneError(f"damped = {damped!r}: expected True, False or None")
+        if damped is not None and not isinstance(damped, bool | np.bool_):
+            raise SceneError(f"damped = {short(damped)}: expected True, False or None")
         if count is not None and not len(self):
             raise SceneError(f"count = {count!r}: nothing moves in this scene")
         if count is not None and (isinstance(count, bool) or not 0 < count <= len(self)):

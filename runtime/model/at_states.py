@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mstmm.arguments import texts_of
 from mstmm.arrays import Array, batch, into
 from mstmm.arrays import columns as columns_of
 from mstmm.errors import SceneError
@@ -225,6 +226,6 @@ class AtStates(Moving):
         Raises SceneError for a name that the scene does not have and for scenes with releases,
         NumericalFailure where `accelerations` does and where a derivative does not exist.
         """
-        names = tuple(parameters)
+        names = texts_of("parameters", parameters, "rod1.mass")
         by = self._differentiations.get(names) or self._differentiated_by(names)
         return by(q, u, t, efforts, lambda: self.accelerations(q, u, t, efforts))

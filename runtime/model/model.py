@@ -210,7 +210,7 @@ class Model(Linearised, Displayed):
         from .wanted.asked import Control, asked
 
         model = self if inputs is None else self.with_inputs(inputs)
-        certify = yes_or_no("certify", certify)
+        certify, resume = yes_or_no("certify", certify), yes_or_no("resume", resume)
         given = Control(method, step, rtol, atol)
         wanted = asked(error, error_of, given, checkpoint is not None or resume)
         method, rtol, atol = given.filled(wanted)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from mstmm.arguments import path_of
 from mstmm.arrays import Array
 
 from ..engine.compiled import Compiled
@@ -45,7 +46,7 @@ def simulate(
     a look at it has found."""
     watch = Watch(progress, settings, runs=2 if certify else 1)
     if checkpoint is not None:
-        watch.checkpoint = Checkpoint(Path(checkpoint), model, settings, q, u)
+        watch.checkpoint = Checkpoint(path_of("checkpoint", checkpoint), model, settings, q, u)
     run = first_run(model, settings, q, u, watch, resume)
     run = seen.given(run, q, u)
     error = second_run(model, run, q, u, watch) if certify and run.success else None

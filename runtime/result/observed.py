@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mstmm.arguments import word_of
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene import split
@@ -47,6 +48,7 @@ class Observed:
 
     def points(self, reference: str) -> Array:
         """(n, 24): motion of "body" or "body.end", see `Observation`."""
+        word_of("body", reference, "the name of a body or an end, such as 'rod1.tip'")
         if reference not in self._points:
             known = self.references.canonical(reference)
             if known is None and split(reference)[0] != "ground":

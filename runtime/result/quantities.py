@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mstmm.arguments import word_of
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene import Output
@@ -90,6 +91,7 @@ class Quantities:
 
     def slots(self, hinge: str) -> HingeSlots:
         """Place of a hinge in q and u; SceneError with the nearest name if there is none."""
+        word_of("hinge", hinge, "the name of a hinge")
         found = self.layout.hinges.get(hinge)
         if found is None:
             hinges = self.observed.references.scene.hinges
@@ -101,7 +103,7 @@ class Quantities:
 
     def of_hinge(self, hinge: str, kind: str) -> Array:
         """force or moment (n, 3)."""
-        if hinge in self.layout.modal:
+        if word_of("hinge", hinge, "the name of a hinge") in self.layout.modal:
             raise SceneError(
                 f'"{hinge}": {kind} is known of hinges; this is a flexible body: ask for the hinge '
                 "that holds it"

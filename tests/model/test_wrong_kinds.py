@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
 import mstmm
@@ -41,12 +42,56 @@ OF_RESULTS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "certify": (lambda r: r.model.simulate(0.1, certify="yes"), "expected True or False"),
 }
 
+#: Where a word is expected, and what of it is said of anything else.
+WORDS: dict[str, tuple[Callable[[Any, Any], Any], str]] = {
+    "engine": (lambda r, x: mstmm.compile(r.model.scene, engine=x), "expected one of auto, fused"),
+    "sweep": (lambda r, x: mstmm.compile(r.model.scene, sweep=x), "expected one of riccati"),
+    "accuracy": (lambda r, x: mstmm.compile(r.model.scene, accuracy=x), "a positive number"),
+    "bake": (lambda r, x: mstmm.compile(r.model.scene, bake=x), "expected True or False"),
+    "flexibility": (
+        lambda r, x: mstmm.compile(r.model.scene, flexibility=x), "one of coupled, one-way, rigid",
+    ),
+    "method": (lambda r, x: r.model.simulate(0.1, x), "expected a name such as dop853"),
+    "scheme": (lambda r, x: r.model.simulate(0.1, scheme=x), "expected a name such as hht"),
+    "tangent": (lambda r, x: r.model.simulate(0.1, tangent=x), "expected one of auto, exact, laws"),
+    "max_step": (lambda r, x: r.model.simulate(0.1, max_step=x), "expected a time above zero"),
+    "on_risk": (lambda r, x: r.model.simulate(0.1, on_risk=x), "expected one of warn, refuse"),
+    "error_of": (lambda r, x: r.model.simulate(0.1, error_of=x), "expected a list of names"),
+    "resume": (lambda r, x: r.model.simulate(0.1, resume=x), "expected True or False"),
+    "checkpoint": (
+        lambda r, x: r.model.simulate(0.1, checkpoint=x), "expected the name of a file"
+    ),
+    "method of a session": (lambda r, x: r.model.session(method=x), "expected a name such as"),
+    "tangent of a session": (lambda r, x: r.model.session(tangent=x), "expected one of auto"),
+    "damped": (lambda r, x: r.model.modes(damped=x), "expected True, False or None"),
+    "parameters": (
+        lambda r, x: r.model.derivatives([0.1], [0.0], parameters=x), "expected a list of names"
+    ),
+    "of": (lambda r, x: r.model.positions([0.1], x), "of = .*: expected a list of names"),
+    "body": (lambda r, x: r.position(x), "expected the name of a body or an end"),
+    "hinge": (lambda r, x: r.force(x), "expected the name of a hinge"),
+    "hinge of efforts": (lambda r, x: r.effort(x), "expected the name of a hinge"),
+    "kind": (lambda r, x: r.plot("rod.x", kind=x), "kind = .*: expected one of time"),
+    "label": (lambda r, x: r.plot("rod.x", label=x), "label = .*: expected a text"),
+    "keep": (lambda r, x: mstmm.equations(r.model.scene, keep=x), "keep = .*: expected a list"),
+    "base": (lambda r, x: mstmm.import_robot("a.urdf", base=x), 'expected "fixed" or "free"'),
+    "mimics": (lambda r, x: mstmm.import_robot("a.urdf", mimics=x), 'expected "coupled" or "held"'),
+}  # fmt: skip
+
 
 @pytest.mark.parametrize("name", OF_RESULTS)
 def test_of_results_and_models(result: Any, name: str) -> None:
     call, message = OF_RESULTS[name]
     with pytest.raises(SceneError, match=message):
         call(result)
+
+
+@pytest.mark.parametrize("given", [np.array([1.0, 2.0]), {"a": 1}, [3], object], ids=repr)
+@pytest.mark.parametrize("name", WORDS)
+def test_of_words(result: Any, name: str, given: Any) -> None:
+    call, message = WORDS[name]
+    with pytest.raises(SceneError, match=message):
+        call(result, given)
 
 
 def test_of_the_public_functions() -> None:

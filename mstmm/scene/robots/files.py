@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ...arguments import short
 from ...errors import SceneError
 from ..files.read import content_of
 from .convert import BASES, COUPLED, MIMICS, Choices, Imported, converted
@@ -39,10 +40,10 @@ def import_robot(
     the file where they are not m and kg, as {"length": "mm", "mass": "g"}; times are in s.  Raises
     SceneError, and EnvironmentFailure where MuJoCo is needed and not there.
     """
-    if base not in BASES:
-        raise SceneError(f'base: expected "fixed" or "free", found {base!r:.40}')
-    if mimics not in MIMICS:
-        raise SceneError(f'mimics: expected "coupled" or "held", found {mimics!r:.40}')
+    if not (isinstance(base, str) and base in BASES):
+        raise SceneError(f'base: expected "fixed" or "free", found {short(base)}')
+    if not (isinstance(mimics, str) and mimics in MIMICS):
+        raise SceneError(f'mimics: expected "coupled" or "held", found {short(mimics)}')
     if stops is not None and not _is_stiffness(stops):
         raise SceneError(f"stops: expected a stiffness above 0 in N m/rad or N/m, found {stops!r}")
     factors = Units.named(units)

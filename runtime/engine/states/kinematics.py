@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from mstmm.arguments import texts_of
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.scene import split
@@ -143,13 +144,11 @@ class Kinematics:
 
     def _probes(self, of: Names) -> tuple[Any, int]:
         """Records of bodies and ends for C, kept; SceneError for one that there is not."""
-        key = of if isinstance(of, str) else tuple(of)
+        key = of if isinstance(of, str) else texts_of("of", of, "rod1.tip")
         known = self._known.get(key)
         if known is None:
             names = [key] if isinstance(key, str) else key
             for name in names:
-                if not isinstance(name, str):
-                    raise SceneError(f"{name!r}: expected the name of a body or an end")
                 if split(name)[0] != "ground" and name not in self._references:
                     raise SceneError(self._references.unknown(name))
             places = [Probe(*self._engine.packed.end(name)) for name in names]

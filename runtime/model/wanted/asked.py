@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from mstmm.arguments import texts_of
 from mstmm.arrays import real
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import SceneError
@@ -48,7 +49,7 @@ def asked(error: float | None, of: str | Sequence[str], given: Control, kept: bo
 
     Raises SceneError for an error that nobody can reach, and beside what would fix the steps.
     """
-    names = (of,) if isinstance(of, str) else tuple(of)
+    names = texts_of("error_of", of, "rod1.angle")
     if error is None:
         if names:
             raise SceneError(f"error_of = {names[0]!r} says what an error is of; give error too")

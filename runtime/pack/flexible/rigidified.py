@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
+from mstmm.arguments import word_of
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.expression.expression import Expression, parse
@@ -59,8 +60,8 @@ def with_level(scene: Scene, flexibility: str | None) -> Scene:
     """
     if flexibility is None:
         return scene
-    if flexibility not in LEVELS:
-        known = ", ".join(LEVELS)
+    known = ", ".join(LEVELS)
+    if word_of("flexibility", flexibility, f"one of {known}, or None") not in LEVELS:
         raise SceneError(f'flexibility "{flexibility}" is not known; there are: {known}')
     level = {"model": LEVELS[flexibility]}
     fields = {key: getattr(scene, key) for key in type(scene).model_fields}

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mstmm.arguments import path_of, short, text_of
+from mstmm.arguments import path_of, short, text_of, word_of
 from mstmm.arrays import by_name
 from mstmm.errors import SceneError
 from mstmm.extras import figures
@@ -130,7 +130,7 @@ def plot_of(
 ) -> Any:  # fmt: skip
     """One run, and others beside it; see `Result.plot`."""
     where = None if path is None else path_of("picture", path)
-    runs: dict[str, Shown] = {label: run}
+    runs: dict[str, Shown] = {word_of("label", label, "a text"): run}
     for other, one in ({} if beside is None else by_name("beside", beside, "runs")).items():
         if other in runs:
             raise SceneError(f'beside: "{other}" is the label of another run; give each its own')

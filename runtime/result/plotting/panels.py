@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mstmm.arguments import word_of
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
@@ -77,8 +78,9 @@ class Wanted:
                     f'plot: expected the name of a quantity, such as "energy", found {name!r:.60}; '
                     "of several names each is an argument of its own"
                 )
-        if self.kind not in KINDS:
-            raise SceneError(f"kind = {self.kind!r}: expected one of {', '.join(KINDS)}")
+        known = f"one of {', '.join(KINDS)}"
+        if word_of("kind", self.kind, known) not in KINDS:
+            raise SceneError(f"kind = {self.kind!r}: expected {known}")
         if self.against is not None and self.kind != "time":
             raise SceneError(
                 f'against = "{self.against}" beside kind = "{self.kind}": take one of them'

@@ -112,7 +112,8 @@ def simulate_batch(
 ) -> BatchResult:
     """See `Model.simulate_batch`; settings hold the output times."""
     if len(q) == 1:  # one start serves as many as there are numbers
-        given = by_name("parameters", parameters) | by_name("inputs", inputs or {})
+        given = {} if inputs is None else by_name("inputs", inputs)
+        given |= by_name("parameters", parameters)
         many = max([1, *(rows_of(name, value) for name, value in given.items())])
         q, u = np.repeat(q, many, axis=0), np.repeat(u, many, axis=0)
     n, times = len(q), np.asarray(settings.output_times)
