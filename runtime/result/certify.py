@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..integrate.loop import Statistics
 from ..run.error_estimate import ErrorEstimate
 from ..run.stability import check_later
 from . import gives
@@ -32,7 +33,7 @@ def certificate(result: Record, error: ErrorEstimate | None) -> Certificate:
         stability_limited=(
             statistics is not None and statistics.stability_limited and not run.methods
         ),
-        sum_of_local_errors=None if statistics is None else statistics.sum_local_error,
+        sum_of_local_errors=_local_errors(statistics),
         error=error,
         finite=bool(np.isfinite(run.q).all() and np.isfinite(run.u).all()),
         end=result.message,
@@ -47,3 +48,9 @@ def certificate(result: Record, error: ErrorEstimate | None) -> Certificate:
         reached=run.reached,
         closure=closure(result.model, run),
     )
+
+
+def _local_errors(statistics: Statistics | None) -> float | None:
+    """Their sum; None where there is none, as of a run whose last step has no finite error."""
+    total = None if statistics is None else statistics.sum_local_error
+    return total if total is not None and np.isfinite(total) else None

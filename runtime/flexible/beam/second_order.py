@@ -67,8 +67,9 @@ class SecondOrder:
         """(t, m, 6) numbers a^T g b at sections x (m,) for modal coordinates a and b (t, n)."""
         rows = len(self._rates.points) * 32
         found = np.empty((len(a), len(x), 6))
-        for some in slices(len(a), max(rows, 6 * len(x), self.shapes.n**2)):
-            found[some] = self._of(x, a[some], b[some], carried)
+        with np.errstate(over="ignore", invalid="ignore"):  # a run that failed may have run away
+            for some in slices(len(a), max(rows, 6 * len(x), self.shapes.n**2)):
+                found[some] = self._of(x, a[some], b[some], carried)
         return found
 
     def _of(self, x: Array, a: Array, b: Array, carried: bool) -> Array:

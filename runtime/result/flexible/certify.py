@@ -31,6 +31,9 @@ SAMPLES, LARGEST = 160, 400
 #: Slopes below this are rounding: what bends so little is not judged by its shapes.
 _STRAIGHT = 1e-9
 
+#: Coordinates, rates and accelerations that are judged are below this.
+_MOST = 1e50
+
 
 @dataclass(frozen=True)
 class Flexibility:
@@ -112,9 +115,9 @@ def _one(
     flexible: FlexibleBodies, name: str, coupling: Array | None, line: float | None
 ) -> Flexibility:
     whole = flexible.motion(name)
-    body, finite = whole.body, np.isfinite(whole.eta).all(axis=1)
+    body, finite = whole.body, _squared(whole.eta)
     bent_all = whole.some(finite)  # also where the rest of the motion cannot be evaluated
-    finite &= np.isfinite(whole.etadd).all(axis=1) & np.isfinite(whole.acceleration).all(axis=1)
+    finite &= _squared(whole.etad) & _squared(whole.etadd) & _squared(whole.acceleration)
     good = np.flatnonzero(finite)
     bent = strain_energy(whole.some(good))
     picked = np.unique(np.linspace(0, len(good) - 1, min(SAMPLES, len(good))).astype(int))
@@ -132,6 +135,12 @@ def _one(
         e.shear_error(motion, line), e.largest_strain(bent_all), aside, body.warnings,
         name in flexible.one_way,
     )  # fmt: skip
+
+
+def _squared(numbers: Array) -> NDArray[np.bool_]:
+    """(n,) where squares of squares of numbers (n, k) are numbers: what runs away grows beyond that
+    and has long said so."""
+    return np.asarray((np.abs(numbers) < _MOST).all(axis=1))
 
 
 def _leading(motion: Motion, coupling: Array | None) -> tuple[float, str] | None:
