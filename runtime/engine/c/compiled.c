@@ -230,15 +230,46 @@ static void renew_lanes(const mstmm_scene_lanes *lanes, const double *t)
         }
 }
 
+/* mstmm_stage_speeds of one lane, in place among those of all.  Where there are none they stay: what is
+ * evaluated with them says why. */
+static void stage_speeds_of(const mstmm_scene_lanes *lanes, int lane, real t, const real *y, real *speeds,
+                            real *one)
+{
+    mstmm_scene_run *run = lanes->settle;
+    const int64_t width = lanes->fused->lanes, nq = lanes->fused->nq, nu = lanes->fused->nu;
+    for (int64_t i = 0; i < nq + nu; i++) one[i] = y[i * width + lane];
+    const real *u = one + nq;
+    mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
+    run->memory[run->model->strained] = 1;
+    if (mstmm_stage_speeds(run, t, one, &u)) return;
+    for (int64_t i = 0; i < nu; i++) speeds[i * width + lane] = u[i];
+}
+
+/* Speeds of states inside steps. */
+static const real *lanes_speeds(const mstmm_scene_lanes *lanes, const double *t, const double *y)
+{
+    const mstmm_fused *fused = lanes->fused;
+    const int64_t width = fused->lanes, nu = fused->nu;
+    const real *u = y + fused->nq * width;
+    real *speeds = lanes->numbers + width * (fused->np + nu);
+    int any = 0;
+    for (int lane = 0; lane < width; lane++) any |= lanes->near[lane];
+    if (!any) return u;
+    memcpy(speeds, u, (size_t)(width * nu) * sizeof(real));
+    for (int lane = 0; lane < width; lane++)
+        if (lanes->near[lane]) stage_speeds_of(lanes, lane, t[lane], y, speeds, speeds + width * nu);
+    return speeds;
+}
+
 static int lanes_rhs(void *context, const double *t, const double *y, double *dy, int *codes)
 {
     const mstmm_scene_lanes *lanes = context;
     const mstmm_fused *fused = lanes->fused;
     const int64_t width = fused->lanes, start = fused->nq * width;
     if (lanes->live.n) renew_lanes(lanes, t);
-    const real *efforts = lanes->numbers + width * fused->np;
-    return fused->accelerations_lanes(lanes->numbers, t, y, y + start, efforts, efforts, dy,
-                                      dy + start, codes);
+    const real *efforts = lanes->numbers + width * fused->np, *u = lanes_speeds(lanes, t, y);
+    return fused->accelerations_lanes(lanes->numbers, t, y, u, efforts, efforts, dy, dy + start,
+                                      codes);
 }
 
 static void lanes_enter(void *context, int lane, int64_t trajectory)
@@ -246,13 +277,21 @@ static void lanes_enter(void *context, int lane, int64_t trajectory)
     mstmm_scene_lanes *lanes = context;
     const real *p = lanes->p + trajectory * lanes->p_stride;
     lanes->trajectory[lane] = trajectory;
+    lanes->near[lane] = 0;
     for (int64_t i = 0; i < lanes->fused->np; i++)
         lanes->numbers[i * lanes->fused->lanes + lane] = p[i];
 }
 
+static void lanes_accepted(void *context, int lane)
+{
+    mstmm_scene_lanes *lanes = context;
+    const mstmm_scene_run *run = lanes->settle;
+    lanes->near[lane] = run->speeds && run->strain > run->model->loops_strain;
+}
+
 int64_t mstmm_lanes_numbers(const mstmm_fused *fused)
 {
-    return (int64_t)fused->lanes * (fused->np + fused->nu);
+    return (int64_t)fused->lanes * (fused->np + 2 * fused->nu) + fused->nq + fused->nu;
 }
 
 void mstmm_scene_lanes_system(mstmm_scene_lanes *lanes, mstmm_system *system, mstmm_group *group)
@@ -265,4 +304,5 @@ void mstmm_scene_lanes_system(mstmm_scene_lanes *lanes, mstmm_system *system, ms
     system->rhs_lanes = lanes_rhs;
     group->system = system;
     group->enter = lanes_enter;
+    group->accepted = lanes_accepted;
 }

@@ -32,10 +32,11 @@ typedef struct {
     mstmm_scene_run *settle; /* of this thread: what it settles after every step */
     mstmm_live_inputs live;  /* of each trajectory so many inputs change with time, in a row */
     int64_t trajectory[8];   /* in each lane */
+    int near[8];             /* the last step of each ended near a singular pose */
 } mstmm_scene_lanes;
 
 int64_t mstmm_lanes_numbers(const mstmm_fused *fused);
-/* Fills the integrator's view, whose failure codes are the guards' own, and the group's `enter`. */
+/* Fills the integrator's view, whose failure codes are the guards' own, and what the group calls. */
 void mstmm_scene_lanes_system(mstmm_scene_lanes *lanes, mstmm_system *system,
                               mstmm_group *group);
 /* cdef end */

@@ -245,6 +245,7 @@ static int settle(const mstmm_cut_group *c, int lane) {
   const int code = c->system->accept(c->system->context, run->real.t_new, c->one);
   if (code > 0) return mstmm_note(run, MSTMM_ACCEPT_FAILED, code, -1, run->real.t_new);
   scatter(c, c->one, lane, c->y_new);
+  if (c->group->accepted) c->group->accepted(c->system->context, lane);
   return code ? 1 : 0;
 }
 

@@ -35,6 +35,8 @@ typedef struct mstmm_group {
   const mstmm_system *system; /* of this thread: rhs_lanes, accept, context */
   /* NULL, or called with the system's context when a lane takes up a trajectory */
   void (*enter)(void *context, int lane, int64_t trajectory);
+  /* NULL, or called with the same when the system has accepted a step of a lane */
+  void (*accepted)(void *context, int lane);
   double *workspace; /* mstmm_group_size doubles */
   /* the state: read freely, write never */
   mstmm_run runs[8];
