@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Comparisons with Pinocchio and MuJoCo, in an environment of their own.  It shares the checkout and
+# Comparisons with Pinocchio, MuJoCo and Exudyn, in an environment of their own.  It shares the checkout and
 # its compiled extension, which is one binary for both.
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
