@@ -23,8 +23,6 @@ from ..engine.jacobian import Jacobian
 from ..host.interruptible import interruptible
 from ..integrate.loop import Failure, Samples, Statistics, Status, failure_text
 from ..integrate.settings import Settings
-from ..integrate.steppers import EXPLICIT_METHODS
-from ..pack.loops.refusal import refuse
 from . import sundials
 from .crossings import Crossings, Sight, dip, just_before
 from .endings import busiest, cause_of, rest_of
@@ -57,6 +55,10 @@ _ONE_LSODA = RLock()
 
 #: Two breaks so near to each other, as part of the time or the run, are one.
 _GAP = 2.0**-39
+
+#: An integrator that keeps its history to itself begins anew where its state is so many tolerances
+#: beside the closed one: its errors are as large anyway, and it begins with steps of order 1.
+_BESIDE = 100.0
 
 
 class _Ended(Exception):
@@ -119,8 +121,11 @@ class Equations:
     def remember(self, t: float, y: Array) -> Array:
         """After a step: memory of turns brought up to date; the settled state."""
         state = np.array(y)
-        if self.calls.accept != self.ffi.NULL:  # where there is something to settle
-            self.calls.accept(self.calls.context, t, self._c(state))
+        if self.calls.accept == self.ffi.NULL:
+            return state  # there is nothing to settle
+        if self.calls.accept(self.calls.context, t, self._c(state)) > 0:  # below 0: rates change
+            text = self.engine.failure_text(self.scene.run.failure, t)
+            raise _Ended(Status.ACCEPT_FAILED, text)
         return state
 
     def fire(self, event: int, t: float, y: Array) -> int:
@@ -136,7 +141,6 @@ def integrate(
     Raises SceneError for a fixed step, and by SUNDIALS for a scene without coordinates;
     EnvironmentFailure where the package is not installed.
     """
-    refuse(model.packed, f'method "{settings.method}"', f"use {EXPLICIT_METHODS}")
     if settings.step is not None:
         raise SceneError(f'method "{settings.method}" chooses its own steps: leave step out')
     if settings.method in sundials.METHODS:
@@ -169,6 +173,7 @@ class _Loop:
         self.flag = [False]
         calls = self.system.calls
         self.n_events = int(calls.n_events)
+        self.closes = self.system.engine.packed.system.closes
         self.truth = np.zeros(self.n_events, dtype=bool)
         self.crossings = Crossings(int(calls.n_switches), settings.t_end - settings.t_start)
         self.sight = Sight(settings.t_start, settings.t_end)
@@ -252,6 +257,8 @@ class _Loop:
                 return np.array(self.last)
             self.sample(end, solver.y)
             self.truth &= self.events(end, solver.y) >= 0
+            if self.closes and not _goes_on(solver, self.last, self.atol, self.settings.rtol):
+                break
         return np.array(self.last)
 
     def refuse_start(self, y: Array) -> None:
@@ -485,3 +492,20 @@ class _Loop:
             min(self.sizes, default=None), max(self.sizes, default=None),
             None, None, 0.0, 0.0, False, 0, self.crossings.count,
         )  # fmt: skip
+
+
+def _goes_on(solver: Any, closed: Array, atol: Array, rtol: float) -> bool:
+    """Whether an integrator goes on from `closed` (n,), the state of its last step with loops
+    closed; else another one is to begin there.
+
+    What is known of the rates where the step ends is kept: its error is of higher order.
+    """
+    from scipy.integrate import BDF, DOP853, RK23, RK45, Radau
+
+    if isinstance(solver, BDF):
+        solver.D[0] = closed  # differences of order 0 are the state
+    elif not isinstance(solver, DOP853 | RK23 | RK45 | Radau):
+        beside = np.abs(closed - solver.y) / (atol + rtol * np.abs(closed))
+        return float(beside.max(initial=0.0)) < _BESIDE
+    solver.y = closed.copy()
+    return True

@@ -13,7 +13,7 @@ import mstmm
 T_END, SAMPLES, AWAY = 2.0, 21, 1.0
 #: What follows loops, by speeds and by positions, and what does not.
 METHODS = ("dop853", "rk4", "rodas4p2", "genalpha-index3")
-LEFT_OUT = ("dttmm", "scipy-RK45")
+LEFT_OUT = ("dttmm", "exprb32")
 
 
 def test_errors_are_those_of_the_closed_form() -> None:
