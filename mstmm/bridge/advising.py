@@ -54,7 +54,6 @@ def advise(
     """
     from ..runtime.advice.advising import advised
     from ..runtime.advice.request import request
-    from ..runtime.pack.loops.refusal import refuse
 
     asked = request(t_end, error, of, budget, samples, rounds)
 
@@ -67,7 +66,6 @@ def advise(
         model = scene
     else:
         raise SceneError(f"scene = {scene!r:.60}: expected a Scene, or a Model of one")
-    refuse(model.packed, "advice", "a chart with models = True does")
     return advised(model, asked, compiled, progress or _quiet, state or _quiet)
 
 

@@ -24,7 +24,6 @@ def model() -> mstmm.Model:
 
 
 ASKED: dict[str, Callable[[mstmm.Model], Any]] = {
-    "advise": lambda m: mstmm.advise(m, 0.1),
     "exprb32": lambda m: m.simulate(0.1, "exprb32"),
     **{
         method: lambda m, method=method: m.simulate(0.1, method, step=1e-3)  # type: ignore[misc]

@@ -141,10 +141,28 @@ def _goes(weld: Hinge, bodies: Mapping[str, Body], scene: Scene, spoken: Spoken)
         return None
     if any({split(one.from_)[0], split(one.to)[0]} & {*pair} - {GROUND} for one in scene.bushing):
         return None  # its axes are those of its ends
+    if _closes_on(weld, scene):
+        return None
     if weld.inboard_body == GROUND:
         alone = len(scene.skeleton.bodies) == 1
         return None if alone or weld.outboard_body in spoken.places else weld.outboard_body
     return next((name for name in pair if name not in spoken.bodies), None)
+
+
+def _closes_on(weld: Hinge, scene: Scene) -> bool:
+    """Whether a loop would have both of its ends on the whole, or one on the ground that nothing
+    there can be."""
+    pair = {weld.outboard_body, weld.inboard_body}
+    closing = [one for one in scene.hinge if one.name != weld.name]
+    ends = [{one.inboard_body, one.outboard_body} for one in closing]
+    ends += [{split(one.from_)[0], split(one.to)[0]} for one in scene.constraint]
+    if any(two == pair for two in ends):
+        return True
+    part = weld.outboard_body
+    return weld.inboard_body == GROUND and (
+        any(one.outboard_body == part for one in closing)
+        or any(part in (split(one.from_)[0], split(one.to)[0]) for one in scene.constraint)
+    )
 
 
 def _rigid(body: Body | None) -> bool:

@@ -15,6 +15,7 @@ from ..renaming import renamed
 _PLACES: dict[str, tuple[str, ...]] = {
     "hinge": ("inboard", "outboard"), "chain": ("inboard",), "load": ("on", "axes"),
     "spring": ("from_", "to"), "bushing": ("from_", "to"), "event": (), "output": (),
+    "constraint": ("from_", "to"), "coupling": (),
 }  # fmt: skip
 _HINGES: dict[str, tuple[str, ...]] = {"event": ("hinge",)}
 
