@@ -58,7 +58,10 @@ def integrate(
             f'controller "{one.name}": method "{settings.method}" has no samples; take another one'
         )
     scheme_of(settings.scheme)
-    refuse(model.packed, f'method "{settings.method}"', "genalpha and rodas4p2 do")
+    refuse(
+        model.packed, f'method "{settings.method}"',
+        "its sources state it for chains and trees alone; genalpha and rodas4p2 do",
+    )  # fmt: skip
     refuse_steps(model.packed)
     return _Run(model, settings, tell).run(q, u)
 
