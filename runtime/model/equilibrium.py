@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.arrays import Array
-from mstmm.errors import NumericalFailure, SceneError
+from mstmm.errors import NumericalFailure
 
 from ..engine.loops.freedom import Freedom
 from ..engine.rest import Rest, Undetermined, Unsettled, approached, leaving
 from ..engine.rest_by_sweep import Loose, RestBySweep
 from ..engine.sizes import speed_sizes
 from ..engine.tangent import Tangent
+from ..run.at_rest.mechanism import Mechanism
 from ..run.system import SceneSystem
 from .turns import without_turns
 
@@ -27,9 +28,6 @@ _LISTED = 3
 #: More free speeds than this come to rest by the sweep; of more than the second number no stiffness
 #: matrix is made.
 _SWEPT, _DENSE = 20, 600
-#: Loops are followed in steps no longer than this, in sizes: longer ones may end where they are
-#: closed another way.
-_PART = 0.1
 #: Efforts along motions of loops that are rounding, in parts of the work of all that cancel.
 _CANCELLED = 1e-14
 
@@ -147,30 +145,20 @@ def _problem(model: Compiled, t: float, free: list[int]) -> Rest:
 def _of_mechanism(model: Compiled, freedom: Freedom, q: Array, t: float) -> Rest:
     """The way of a closed q to rest along the independent speeds there: what the tree needs along
     the motions that the loops leave, which the loads of loops do not see."""
-    engine, still, scene = model.looped, np.zeros(model.nu), SceneSystem(model.looped)
-    memory, every = engine.start_memory(), speed_sizes(model)
-
-    def closed(q: Array) -> Array:
-        try:
-            return scene.start(t, q, still)[: model.nq]
-        except SceneError as error:
-            raise NumericalFailure(str(error)) from None
+    engine, still, closed = model.looped, np.zeros(model.nu), Mechanism(model, freedom, t)
 
     def along(places: tuple[int, ...]) -> Rest:
-        sizes = every[list(places)]
+        sizes = closed.sizes[list(places)]
 
         def needed(q: Array) -> Array:
-            efforts = engine.inverse_dynamics(t, q, still, still, memory)
+            efforts = engine.inverse_dynamics(t, q, still, still, closed.memory)
             found = np.asarray(freedom.following(q, places).T @ efforts)
             # What nothing pushes must not go by rounding of what cancels.
             whole = float(np.abs(efforts) @ freedom.sizes)
             return np.where(np.abs(found) * sizes > _CANCELLED * whole, found, 0.0)
 
         def moved(q: Array, increment: Array) -> Array:
-            parts = max(1, int(np.ceil(float(np.abs(increment / sizes).max(initial=0.0)) / _PART)))
-            for _ in range(parts):
-                q = closed(freedom.moved(q, freedom.following(q, places) @ (increment / parts)))
-            return q
+            return closed.moved(q, places, increment)
 
         problem = Rest(needed, moved, sizes, places, lambda q: there(places, problem, q))
         return problem

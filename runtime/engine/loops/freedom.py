@@ -25,6 +25,8 @@ from .rank import judging
 _ROUNDING = 1e-9
 #: A speed is read off where no other tells more than this many times as much apart.
 _WELL = 4.0
+#: And a speed that is asked for where it does so at all.
+_BARELY = 1e4
 #: Gaps (m, rad) of loops that are open.
 _OPEN = 1e-6
 #: Speeds that decide others this many times their own size decide nothing any more.
@@ -55,15 +57,27 @@ class Freedom:
         Each is the first in the scene that is told apart from those before it a quarter as well as
         any other, by motions in sizes.
         """
-        left = self._motions(q)[self._free] / self.sizes[self._free, None]
-        found = list[int]()
-        for _ in range(left.shape[1]):
-            lengths = np.linalg.norm(left, axis=1)
-            place = int(np.argmax(_WELL * lengths >= lengths.max()))
-            found.append(int(self._free[place]))
-            along = left[place] / lengths[place]
-            left = left - np.outer(left @ along, along)
-        return tuple(sorted(found))
+        left = self._motions(q) / self.sizes[:, None]
+        return tuple(sorted(_read_off(left, self._free.tolist(), _WELL)[0]))
+
+    def settling(
+        self, q: Array, shapes: Sequence[int], kept: Sequence[int], wished: Sequence[int]
+    ) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Places of the speeds that hold a mechanism at q where `shapes` settle, and of those of
+        the shapes that decide all others then.
+
+        Held are `kept`, as far as they may move, and the first that tell the motions in which no
+        shape changes apart, of `wished` where these do.
+        """
+        left = self._motions(q) / self.sizes[:, None]
+        held, left = _read_off(left, kept, _BARELY)
+        _, lengths, ways = np.linalg.svd(left[list(shapes)])
+        changing = int((lengths > 1 / _BARELY).sum())
+        others = [k for k in self._free.tolist() if k not in {*shapes, *kept, *wished}]
+        more, _ = _read_off(left @ ways[changing:].T, [*wished, *others], _WELL)
+        for place in more:
+            left = _without(left, place)
+        return (*held, *more), tuple(sorted(_read_off(left, shapes, _WELL)[0]))
 
     def following(self, q: Array, places: Sequence[int]) -> Array:
         """N (nu, n): all speeds for a unit of each of some independent ones.
@@ -125,3 +139,22 @@ class Freedom:
         correction, slips = self._calls.correction(self._calls.slip, q, speeds)
         still, asked = self._calls.correction(self._calls.slip, q, np.zeros_like(speeds))
         return correction - still, slips - asked
+
+
+def _read_off(left: Array, places: Sequence[int], well: float) -> tuple[list[int], Array]:
+    """Rows of motions (nu, n), orthonormal in sizes, that tell them apart, and what of the motions
+    moves none of these; each is the first of `places` that is told apart well."""
+    own, found = list(places), list[int]()
+    for _ in range(left.shape[1]):
+        lengths = np.linalg.norm(left[own], axis=1)
+        if not lengths.max(initial=0.0) > 1 / _BARELY:
+            break
+        found.append(own[int(np.argmax(well * lengths >= lengths.max()))])
+        left = _without(left, found[-1])
+    return found, left
+
+
+def _without(left: Array, place: int) -> Array:
+    """Motions (nu, n) less what moves one speed."""
+    along = left[place] / np.linalg.norm(left[place])
+    return np.asarray(left - np.outer(left @ along, along))

@@ -24,14 +24,7 @@ def may_close(scene: Scene) -> bool:
 
 
 def refuse_beside_bending(scene: Scene, one_way: Collection[str]) -> None:
-    """SceneError for what flexible bodies cannot be in a scene with loops: bodies that bend without
-    acting back, and such as begin in static shapes."""
-    for body in (*scene.beam, *scene.elastic):
-        if body.initial.static and may_close(scene):
-            raise SceneError(
-                f'scene: "{body.name}": initial: loops are closed, among which no static shape is '
-                "looked for; begin at model.equilibrium(), or give eta"
-            )
+    """SceneError for flexible bodies in a scene with loops that bend without acting back."""
     if one_way and may_close(scene):
         raise SceneError(
             f'scene: "{next(iter(one_way))}": model: loops are closed, which bodies that respond '

@@ -267,10 +267,6 @@ def test_what_is_refused() -> None:
         model.simulate(0.1, method="genalpha-index3", step=1e-3)
     with pytest.raises(SceneError, match='hold: there is no hinge "bar"'):
         model.assemble(hold=["bar"])
-    static = slider_crank()
-    static["beam"][0]["initial"] = "static"
-    with pytest.raises(SceneError, match=r'"bar": initial: loops are closed.*equilibrium'):
-        mstmm.compile(mstmm.Scene(**static))
     scene["beam"][0]["model"] = "one-way"
     with pytest.raises(SceneError, match='"bar": model: loops are closed'):
         mstmm.compile(mstmm.Scene(**scene))

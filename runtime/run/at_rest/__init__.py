@@ -1,0 +1,1 @@
+"""Starts at rest: shapes of flexible bodies, and mechanisms on their way there."""
