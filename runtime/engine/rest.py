@@ -17,14 +17,17 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
 _LONGEST = 0.5  # step, in sizes of the coordinates
-_SOFT = 1e-8  # scaled stiffness below which a direction counts as slack
-_MAX_ITERATIONS, _ITERATIONS_OF_A_PART = 100, 20
+#: Scaled stiffness below which a direction counts as slack: that of simple differences, and that of
+#: exact ones, which are taken behind steps shorter than the third number, in sizes.
+_SOFT, _SOFTEST, _NEAR = 1e-8, 1e-10, 0.1
+_MAX_ITERATIONS, _ITERATIONS_OF_A_PART = 200, 20
 #: Forces without potential have no downhill to follow: a stiffness so far from symmetric, and the
 #: iterations that are then enough to see whether Newton's method goes there by itself.
 _SKEW, _ITERATIONS_WITHOUT_POTENTIAL = 1e-4, 20
 _HALVINGS = 40
-#: Steps of the difference quotients, in sizes: where a stiffness is no rounding both agree.
-_COARSE, _FINE = 1e-4, 1e-5
+#: Steps of the difference quotients, in sizes; of those of fourth order, which are exact to some
+#: 1e-12 where simple ones are to 1e-8: where a stiffness is no rounding it agrees with fine ones.
+_COARSE, _FINE, _WIDE = 1e-4, 1e-5, 1e-3
 #: Stiffness in parts of the largest one, all in J, that is rounding of it.
 _NOTHING = 1e-16
 #: First part of the load that is tried where the whole is too much, and the smallest.
@@ -91,6 +94,10 @@ class Rest:
         ]
         return np.array(columns).reshape(len(columns), len(columns)).T
 
+    def exact_slope(self, q: Array) -> Array:
+        """(n, n) stiffness in J, by differences of fourth order."""
+        return np.asarray((4 * self.slope(q, _WIDE) - self.slope(q, 2 * _WIDE)) / 3)
+
 
 def at_rest(problem: Rest, q: Array, tolerance: float) -> Array:
     """`approached`, and refused where nothing pushes a motion back: Undetermined."""
@@ -138,27 +145,28 @@ def _less(needed: Callable[[Array], Array], given: Array) -> Callable[[Array], A
 # --- Newton's method ------------------------------------------------------------------------------
 
 
-#: (slope, residual, scale) -> step; all (n,) in sizes, or (n, n).
-Stepping = Callable[[Array, Array, Array], Array]
+#: (slope, residual, scale, stiffness that is slack) -> step; all (n,) in sizes, or (n, n).
+Stepping = Callable[[Array, Array, Array, float], Array]
 
 
 def _newton(
     problem: Rest, q: Array, tolerance: float, iterations: int, stepping: Stepping
 ) -> Array:
-    residual = problem.efforts(q)
+    residual, length = problem.efforts(q), np.inf
     for k in range(iterations):
         nearby = problem.at(q)
         if nearby is not problem:
             problem, residual = nearby, nearby.efforts(q)
+        near = length < _NEAR
         try:
-            slope = problem.slope(q)
+            slope = problem.exact_slope(q) if near else problem.slope(q)
         except NumericalFailure as failure:
             raise Unsettled(str(failure), residual / problem.sizes, problem) from None
         scale = _scale(slope, residual)
         if k >= _ITERATIONS_WITHOUT_POTENTIAL and _is_skew(slope, scale):
             iterations = k
             break
-        step = stepping(slope, residual, scale)
+        step = stepping(slope, residual, scale, _SOFTEST if near else _SOFT)
         length = float(np.abs(step).max(initial=0.0))
         if length <= tolerance:
             return problem.after(q, step)
@@ -182,7 +190,7 @@ def _scale(slope: Array, residual: Array, noise: Array | float = 0.0) -> Array:
     return np.maximum.reduce([own, coupled, np.abs(residual)])
 
 
-def _downhill(slope: Array, residual: Array, scale: Array) -> Array:
+def _downhill(slope: Array, residual: Array, scale: Array, soft: float) -> Array:
     """Newton's step where the stiffness is positive definite; else one that runs downhill too.
 
     Along directions in which the stiffness is negative or vanishes, Newton would run uphill or far
@@ -192,13 +200,13 @@ def _downhill(slope: Array, residual: Array, scale: Array) -> Array:
     root = np.sqrt(scale)
     scaled, force = slope / np.outer(root, root), residual / root
     values, directions = np.linalg.eigh((scaled + scaled.T) / 2)
-    if values.min(initial=np.inf) > _SOFT:
+    if values.min(initial=np.inf) > soft:
         return np.asarray(np.linalg.solve(scaled, -force) / root)
-    softened = np.maximum(np.abs(values), _SOFT)
+    softened = np.maximum(np.abs(values), soft)
     return np.asarray(-directions @ ((directions.T @ force) / softened) / root)
 
 
-def _along_the_path(slope: Array, residual: Array, scale: Array) -> Array:
+def _along_the_path(slope: Array, residual: Array, scale: Array, _: float) -> Array:
     """Newton's step as it is: what was at rest under a little less load is close by."""
     root = np.sqrt(scale)
     try:
@@ -245,8 +253,8 @@ def _size(residual: Array, scale: Array) -> float:
 
 def _noise(problem: Rest, q: Array) -> tuple[Array, Array]:
     """The stiffness (n, n) in J, and how far two difference quotients of it lie apart."""
-    coarse, fine = problem.slope(q, _COARSE), problem.slope(q, _FINE)
-    return coarse, np.abs(coarse - fine)
+    exact, fine = problem.exact_slope(q), problem.slope(q, _FINE)
+    return exact, np.abs(exact - fine)
 
 
 def _is_rounding(problem: Rest, q: Array, residual: Array) -> bool:

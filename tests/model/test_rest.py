@@ -68,3 +68,19 @@ def test_a_stiffness_of_rounding_is_undetermined_and_a_small_one_is_not() -> Non
 def test_efforts_that_nothing_balances_are_left(value: float) -> None:
     with pytest.raises((Unsettled, NumericalFailure)):
         at_rest(Rest(lambda _: np.array([value]), moved, np.ones(1)), np.zeros(1), 1e-10)
+
+
+def test_a_slack_valley_is_followed_to_its_bottom() -> None:
+    """Stiffness of 1e-8 beside 1, which simple differences take for four times as much, or for none
+    at all."""
+    calls = []
+
+    def needed(q: Array) -> Array:
+        calls.append(q)
+        across, along = q[0] + q[1], q[0] - q[1]
+        force = 1e-8 * along + 3 * along**3
+        return np.array([across + force, across - force])
+
+    found = at_rest(Rest(needed, moved, np.ones(2)), np.array([2e-4, 1e-4]), 1e-10)
+    assert np.abs(found).max() < 1e-9
+    assert len(calls) < 150
