@@ -25,6 +25,8 @@ _MAX_ITERATIONS, _ITERATIONS_OF_A_PART = 200, 20
 #: iterations that are then enough to see whether Newton's method goes there by itself.
 _SKEW, _ITERATIONS_WITHOUT_POTENTIAL = 1e-4, 20
 _HALVINGS = 40
+#: How much efforts may climb in a step: so many times, or to those of such a motion, in sizes.
+_MORE, _ASTRAY = 10.0, 1e-3
 #: Steps of the difference quotients, in sizes; of those of fourth order, which are exact to some
 #: 1e-12 where simple ones are to 1e-8: where a stiffness is no rounding it agrees with fine ones.
 _COARSE, _FINE, _WIDE = 1e-4, 1e-5, 1e-3
@@ -222,10 +224,12 @@ def _followed(
 
     The step is halved until there is a state at its end and the efforts fall or do not climb again:
     where forces have a potential, `needed` is its gradient, and the step has not passed the bottom
-    by much as long as the gradient along it has not turned around to more than half its size.
+    by much as long as the gradient along it has not turned around to more than half its size, nor
+    others have grown out of sight of the bottom, beside a slack valley.
     """
     step = step / max(1.0, float(np.abs(step).max(initial=0.0)) / _LONGEST)
     before, along = _size(residual, scale), abs(float(residual @ step))
+    most = max(_MORE * before, _ASTRAY * float(np.sqrt(scale.max(initial=0.0))))
     reached: tuple[Array, Array] | None = None
     for _ in range(_HALVINGS):
         try:
@@ -235,9 +239,9 @@ def _followed(
             step, along = step / 2, along / 2
             continue
         reached = trial, left
-        falls = _size(left, scale) < before
-        if falls or float(left @ step) <= along / 2:
-            return trial, left, falls
+        after = _size(left, scale)
+        if after < before or (float(left @ step) <= along / 2 and after < most):
+            return trial, left, after < before
         step, along = step / 2, along / 2
     if reached is None:
         raise Unsettled("no step leads to another state", residual / problem.sizes, problem)
