@@ -1357,9 +1357,25 @@ int mstmm_sweep_laws_six_slope(const real *restrict p, const real *restrict q,
     const real *restrict twist_ref, const real *restrict d_q, const real *restrict d_u,
     const real *restrict d_effort, real *restrict d_tau);
 
+extern const mstmm_element mstmm_sweep_link_ball;
+int mstmm_sweep_link_ball_turn(const real *restrict link, const real *restrict q,
+    real *restrict turn);
+int mstmm_sweep_link_ball_forward(const real *restrict link, const real *restrict turn,
+    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
+    real *restrict qdot);
+int mstmm_sweep_link_ball_condense(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict b, const real *restrict p,
+    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
+    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
+    real *restrict e_I);
+int mstmm_sweep_link_ball_recover(const real *restrict link, const real *restrict turn,
+    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
+    const real *restrict delta_I, real *restrict udot, real *restrict delta);
+
 extern const mstmm_element mstmm_sweep_link_cylindrical;
-int mstmm_sweep_link_cylindrical_angle(const real *restrict link, const real *restrict q,
-    real *restrict theta);
+int mstmm_sweep_link_cylindrical_turn(const real *restrict link, const real *restrict q,
+    real *restrict turn);
 int mstmm_sweep_link_cylindrical_forward(const real *restrict link, const real *restrict turn,
     const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
     const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
@@ -1374,8 +1390,8 @@ int mstmm_sweep_link_cylindrical_recover(const real *restrict link, const real *
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_link_pin;
-int mstmm_sweep_link_pin_angle(const real *restrict link, const real *restrict q,
-    real *restrict theta);
+int mstmm_sweep_link_pin_turn(const real *restrict link, const real *restrict q,
+    real *restrict turn);
 int mstmm_sweep_link_pin_forward(const real *restrict link, const real *restrict turn,
     const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
     const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
@@ -1390,8 +1406,8 @@ int mstmm_sweep_link_pin_recover(const real *restrict link, const real *restrict
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_link_pin_rotor;
-int mstmm_sweep_link_pin_rotor_angle(const real *restrict link, const real *restrict q,
-    real *restrict theta);
+int mstmm_sweep_link_pin_rotor_turn(const real *restrict link, const real *restrict q,
+    real *restrict turn);
 int mstmm_sweep_link_pin_rotor_forward(const real *restrict link, const real *restrict turn,
     const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
     const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
@@ -1406,8 +1422,8 @@ int mstmm_sweep_link_pin_rotor_recover(const real *restrict link, const real *re
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_link_prismatic;
-int mstmm_sweep_link_prismatic_angle(const real *restrict link, const real *restrict q,
-    real *restrict theta);
+int mstmm_sweep_link_prismatic_turn(const real *restrict link, const real *restrict q,
+    real *restrict turn);
 int mstmm_sweep_link_prismatic_forward(const real *restrict link, const real *restrict turn,
     const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
     const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
@@ -1422,8 +1438,8 @@ int mstmm_sweep_link_prismatic_recover(const real *restrict link, const real *re
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_link_prismatic_rotor;
-int mstmm_sweep_link_prismatic_rotor_angle(const real *restrict link, const real *restrict q,
-    real *restrict theta);
+int mstmm_sweep_link_prismatic_rotor_turn(const real *restrict link, const real *restrict q,
+    real *restrict turn);
 int mstmm_sweep_link_prismatic_rotor_forward(const real *restrict link, const real *restrict turn,
     const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
     const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
@@ -1438,8 +1454,8 @@ int mstmm_sweep_link_prismatic_rotor_recover(const real *restrict link, const re
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_link_screw;
-int mstmm_sweep_link_screw_angle(const real *restrict link, const real *restrict q,
-    real *restrict theta);
+int mstmm_sweep_link_screw_turn(const real *restrict link, const real *restrict q,
+    real *restrict turn);
 int mstmm_sweep_link_screw_forward(const real *restrict link, const real *restrict turn,
     const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
     const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
@@ -1454,8 +1470,8 @@ int mstmm_sweep_link_screw_recover(const real *restrict link, const real *restri
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
 
 extern const mstmm_element mstmm_sweep_link_screw_rotor;
-int mstmm_sweep_link_screw_rotor_angle(const real *restrict link, const real *restrict q,
-    real *restrict theta);
+int mstmm_sweep_link_screw_rotor_turn(const real *restrict link, const real *restrict q,
+    real *restrict turn);
 int mstmm_sweep_link_screw_rotor_forward(const real *restrict link, const real *restrict turn,
     const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
     const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,

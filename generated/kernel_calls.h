@@ -4288,19 +4288,19 @@ static inline int mstmm_force_wrench_slope_by(void (*kernel)(void), struct mstmm
 }
 #define mstmm_force_wrench_slope(kernel, ...) mstmm_force_wrench_slope_by(kernel, (struct mstmm_force_wrench_slope){__VA_ARGS__})
 
-struct mstmm_link_angle {
+struct mstmm_link_turn {
     const real *link;
     const real *q;
-    real *theta;
+    real *turn;
 };
-typedef int mstmm_link_angle_kernel(
+typedef int mstmm_link_turn_kernel(
     const real *restrict, const real *restrict, real *restrict);
-static inline int mstmm_link_angle_by(void (*kernel)(void), struct mstmm_link_angle to)
+static inline int mstmm_link_turn_by(void (*kernel)(void), struct mstmm_link_turn to)
 {
-    return ((mstmm_link_angle_kernel *)kernel)(
-        to.link, to.q, to.theta);
+    return ((mstmm_link_turn_kernel *)kernel)(
+        to.link, to.q, to.turn);
 }
-#define mstmm_link_angle(kernel, ...) mstmm_link_angle_by(kernel, (struct mstmm_link_angle){__VA_ARGS__})
+#define mstmm_link_turn(kernel, ...) mstmm_link_turn_by(kernel, (struct mstmm_link_turn){__VA_ARGS__})
 
 struct mstmm_link_forward {
     const real *link;

@@ -5,11 +5,11 @@
 #include "kernel_calls.h"
 #include "links.h"
 
-/* Angle about z; its sine and cosine are taken for two links at a time. */
-static inline int mstmm_at_link_angle(mstmm_link_at at)
+/* Rotation across the hinge; about z its angle, whose sine and cosine are taken for two links at a time. */
+static inline int mstmm_at_link_turn(mstmm_link_at at)
 {
-    mstmm_link_angle(at.angle,
-        .link = at.numbers, .q = at.q, .theta = at.link + MSTMM_LINK_TURN);
+    mstmm_link_turn(at.turn,
+        .link = at.numbers + 12, .q = at.q, .turn = at.link + MSTMM_LINK_TURN(at.nu));
     return 0;
 }
 
@@ -18,8 +18,8 @@ static inline int mstmm_at_link_forward(mstmm_link_at at)
 {
     int code;
     code = mstmm_link_forward(at.forward,
-        .link = at.numbers, .turn = at.link + MSTMM_LINK_TURN, .b = at.numbers + 5,
-        .p = at.numbers + 16, .q = at.q, .u = at.u, .motion_I = at.outer_motion,
+        .link = at.numbers + 12, .turn = at.link + MSTMM_LINK_TURN(at.nu), .b = at.numbers,
+        .p = at.numbers + 11, .q = at.q, .u = at.u, .motion_I = at.outer_motion,
         .d = at.link + MSTMM_LINK_SHIFT, .motion = at.link + MSTMM_LINK_MOTION,
         .e_B = at.link + MSTMM_LINK_LOAD, .qdot = at.qdot);
     if (code) return mstmm_fail(at.state, MSTMM_FAILED_HINGE, at.index, code);
@@ -31,10 +31,11 @@ static inline int mstmm_at_link_condense(mstmm_link_at at)
 {
     int code;
     code = mstmm_link_condense(at.condense,
-        .link = at.numbers, .turn = at.link + MSTMM_LINK_TURN, .d = at.link + MSTMM_LINK_SHIFT,
-        .b = at.numbers + 5, .p = at.numbers + 16, .S_K = at.inner, .e_K = at.inner + 21,
-        .e_B = at.link + MSTMM_LINK_LOAD, .tau = at.tau, .G = at.link + MSTMM_LINK_FIXED + at.nu,
-        .g = at.link + MSTMM_LINK_FIXED, .S_I = at.outer, .e_I = at.outer + 21);
+        .link = at.numbers + 12, .turn = at.link + MSTMM_LINK_TURN(at.nu),
+        .d = at.link + MSTMM_LINK_SHIFT, .b = at.numbers, .p = at.numbers + 11, .S_K = at.inner,
+        .e_K = at.inner + 21, .e_B = at.link + MSTMM_LINK_LOAD, .tau = at.tau,
+        .G = at.link + MSTMM_LINK_FIXED + at.nu, .g = at.link + MSTMM_LINK_FIXED,
+        .S_I = at.outer, .e_I = at.outer + 21);
     if (code) return mstmm_fail(at.state, MSTMM_FAILED_UNDETERMINED, at.index, code);
     return 0;
 }
@@ -43,10 +44,10 @@ static inline int mstmm_at_link_condense(mstmm_link_at at)
 static inline int mstmm_at_link_recover(mstmm_link_at at)
 {
     mstmm_link_recover(at.recover,
-        .link = at.numbers, .turn = at.link + MSTMM_LINK_TURN, .d = at.link + MSTMM_LINK_SHIFT,
-        .p = at.numbers + 16, .G = at.link + MSTMM_LINK_FIXED + at.nu,
-        .g = at.link + MSTMM_LINK_FIXED, .delta_I = at.outer_delta, .udot = at.udot,
-        .delta = at.link + MSTMM_LINK_MOTION);
+        .link = at.numbers + 12, .turn = at.link + MSTMM_LINK_TURN(at.nu),
+        .d = at.link + MSTMM_LINK_SHIFT, .p = at.numbers + 11,
+        .G = at.link + MSTMM_LINK_FIXED + at.nu, .g = at.link + MSTMM_LINK_FIXED,
+        .delta_I = at.outer_delta, .udot = at.udot, .delta = at.link + MSTMM_LINK_MOTION);
     return 0;
 }
 

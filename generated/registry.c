@@ -62,6 +62,7 @@ const mstmm_element *const mstmm_elements[] = {
     &mstmm_sweep_generic5,
     &mstmm_sweep_generic6,
     &mstmm_sweep_laws,
+    &mstmm_sweep_link_ball,
     &mstmm_sweep_link_cylindrical,
     &mstmm_sweep_link_pin,
     &mstmm_sweep_link_pin_rotor,
@@ -77,4 +78,4 @@ const mstmm_element *const mstmm_elements[] = {
     NULL,
 };
 
-const int mstmm_element_count = 70;
+const int mstmm_element_count = 71;

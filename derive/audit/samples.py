@@ -110,6 +110,8 @@ class Source:
             return [numbers.uniform(0.2, 2.0) for _ in range(length)]
         if port.name in ("a", "a_n"):
             return _unit(3, numbers)
+        if port.name == "link" and length == 12:
+            return [*rotation(numbers), *_uniform(3, numbers)]
         if port.name in ("turn", "link"):
             return _cosine_and_sine(numbers.uniform(-4.0, 4.0)) + _uniform(length - 2, numbers)
         return _uniform(length, numbers)

@@ -19,7 +19,6 @@ from ..equations import (
     constraints,
     frames,
     laws,
-    link,
     loops,
     qr,
     screw,
@@ -32,6 +31,7 @@ from ..equations import tangent_placed as placed
 from ..equations.complement import complement
 from ..equations.factored import eliminate_factored, recover_factored
 from ..equations.hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
+from ..equations.links import axial, turning
 from ..flexible import beam_fields, beam_second_order, modal, modal_rows, modal_sweep, section
 from ..language.derivation import Derivation, Equation, Quantity, vector
 from ..language.element import Body, Hinge
@@ -189,14 +189,18 @@ def loop_kernels() -> tuple[Kernel, ...]:
 
 
 def links() -> dict[str, Hinge]:
-    """Built-in hinges that move about and along z alone, by name."""
+    """Built-in hinges that move about and along z alone, or turn about a point, by name."""
     hinges = [element for element in builtin_elements() if isinstance(element, Hinge)]
-    return {hinge.name: hinge for hinge in hinges if hinge.speeds is None and _axial(hinge)}
+    return {hinge.name: hinge for hinge in hinges if _axial(hinge) or _turning(hinge)}
 
 
 def _axial(hinge: Hinge) -> bool:
     motion = motion_of(hinge)
-    return motion.nu > 0 and link.along_z(motion) is not None
+    return motion.nu > 0 and hinge.speeds is None and axial.along_z(motion) is not None
+
+
+def _turning(hinge: Hinge) -> bool:
+    return turning.turns_about_a_point(motion_of(hinge))
 
 
 #: What follows the name of a hinge whose speed has a rotor, in that of its link.
@@ -213,30 +217,34 @@ def link_names() -> dict[str, str]:
 
 def link_kernels(name: str) -> tuple[Kernel, ...]:
     """A rigid body behind a hinge, pass by pass; `name` is one of `link_names`."""
-    motion, rotor = motion_of(links()[name.removesuffix(ROTOR)]), name.endswith(ROTOR)
-    subspace = motion.in_arrays(motion.subspace)
+    hinge, rotor, body = links()[name.removesuffix(ROTOR)], name.endswith(ROTOR), RigidBody()
+    motion = motion_of(hinge)
+    guards = sweep.pivot_guards(motion.nu, motion.in_arrays(motion.subspace), axial.floor(body))
+    if _turning(hinge):
+        return (
+            Kernel("turn", turning.turn(motion)),
+            Kernel("forward", turning.forward(motion, body)),
+            Kernel("condense", turning.condense(motion, body), guards),
+            Kernel("recover", turning.recover(motion)),
+        )
     return (
-        Kernel("angle", link.angle(motion)),
-        Kernel("forward", link.forward(motion, RigidBody())),
-        Kernel(
-            "condense",
-            link.condense(motion, RigidBody(), rotor),
-            sweep.pivot_guards(motion.nu, subspace, link.floor(RigidBody())),
-        ),
-        Kernel("recover", link.recover(motion, rotor)),
+        Kernel("turn", axial.turn(motion)),
+        Kernel("forward", axial.forward(motion, body)),
+        Kernel("condense", axial.condense(motion, body, rotor), guards),
+        Kernel("recover", axial.recover(motion, rotor)),
     )
 
 
 def modal_kernels() -> tuple[Kernel, ...]:
     """Flexible bodies: residual, sections, condensation; n modes, known at run time."""
-    turning = section.turn_guards()
+    turns = section.turn_guards()
     return (
         Kernel("residual", modal.residual()),
         Kernel("momentum", modal.momentum()),
         Kernel("strain_energy", modal.strain_energy()),
         Kernel("section", section.section()),
-        Kernel("outward", section.outward(), turning),
-        Kernel("inward", section.inward(), turning),
+        Kernel("outward", section.outward(), turns),
+        Kernel("inward", section.inward(), turns),
         Kernel("subspace", section.subspace()),
         Kernel("imposed", section.imposed()),
         *(Kernel(step.__name__, step()) for step in (*modal_sweep.STEPS, *modal_rows.STEPS)),

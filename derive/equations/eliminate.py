@@ -58,7 +58,13 @@ def eliminate(
             offset.symbol,
             Solve(pivot, symbol("surplus", nu), symmetric=True),
         ),
-        Equation("S_Q = S - U G", REDUCED_S.symbol, S.symbol - push * gain.symbol, zeros=zeros),
+        Equation(
+            "S_Q = S - U G",
+            REDUCED_S.symbol,
+            S.symbol - push * gain.symbol,
+            zeros=zeros,
+            symmetric=True,
+        ),
         Equation(
             "e + G^T (tau - H^T e)",
             symbol("e_full", 6),

@@ -80,7 +80,13 @@ def eliminate_factored(
         Equation("unit directions", through.symbol, _through(nu, units)),
         Equation("y = L^-1 (tau - H^T e)", surplus, Triangular(factor.symbol, right)),
         Equation("diag(d)^-1 y", offset.symbol, divided(surplus, factor.symbol)),
-        Equation("S_Q = S - Y^T Z", REDUCED_S.symbol, S.symbol - full.T * scaled, zeros=zeros),
+        Equation(
+            "S_Q = S - Y^T Z",
+            REDUCED_S.symbol,
+            S.symbol - full.T * scaled,
+            zeros=zeros,
+            symmetric=True,
+        ),
         Equation("e + Z^T y", e_full, E.symbol + scaled.T * surplus),
         Equation("e_Q", REDUCED_E.symbol, replace_rows(e_full, tau.symbol, units)),
     )

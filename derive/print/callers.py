@@ -69,7 +69,7 @@ POINTED = {
     ),
     "force": (("force", "spring"), {k: k for k in ("wrench", "wrench_slope")}),
     "link": (
-        ("sweep", "link_pin"), {k: k for k in ("angle", "forward", "condense", "recover")},
+        ("sweep", "link_pin"), {k: k for k in ("turn", "forward", "condense", "recover")},
     ),
 }  # fmt: skip
 #: Largest number of speeds of a hinge, and the kernels that there are for every number, or for

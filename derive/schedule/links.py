@@ -1,4 +1,5 @@
-"""Links: a rigid body behind a hinge that moves about and along z, one kernel a pass.
+"""Links: a rigid body behind a hinge that moves about and along z, or turns about a point, one
+kernel a pass.
 
 Bodies in a row that are links are swept without touching their blocks: between the passes there is
 no more in memory than the next pass reads, and S and e stay at hand from link to link.
@@ -11,10 +12,13 @@ from .steps import TIPS_TO_ROOT, Pass, call
 _LINK = {"link": "link.numbers", "turn": "link.turn"}
 _BODY = {"b": "link.b", "p": "link.p"}
 
-LINK_ANGLE = Pass(
-    "link_angle", "link", "Angle about z; its sine and cosine are taken for two links at a time.",
-    (call("link.angle", link="link.numbers", q="link.q", theta="link.turn"),),
-)  # fmt: skip
+LINK_TURN = Pass(
+    "link_turn",
+    "link",
+    "Rotation across the hinge; about z its angle, whose sine and cosine are"
+    " taken for two links at a time.",
+    (call("link.turn", **_LINK, q="link.q"),),
+)
 
 LINK_FORWARD = Pass(
     "link_forward", "link", "Bias motion and own load of a link.",

@@ -119,20 +119,20 @@ push | 6 n | S H of what hangs on the section
 end | 9 | axes of the end in the section
 """
 _OTHERS = """
-link.numbers | 5 | screws about x and z from link to link
 link.b | 11 | numbers of the rigid body, and the rotor inertia of its hinge
 link.p | 1 | number of the hinge
+link.numbers | 5 | screws about x and z from link to link; rotation and place (12) of a ball
 link.q | nq | coordinates; of a turned hinge with its constant angle
 link.u | nu | speeds
 link.qdot | nq | rates of the coordinates
 link.udot | nu | accelerations
 link.tau | nu | efforts
-link.turn | 2 | angle, then its cosine and sine
+link.turn | 2 | angle, then its cosine and sine; rotation (9) of a ball
 link.shift | 1 | along z
 link.lift | 3 | constant shift of the hinge's own screw
 link.motion | 9 | bias motion; after recovery the deviation
 link.load | 6 | e of the body alone
-link.G | 6 nu | udot = g - G a
+link.G | 6 nu | udot = g - G a; of a ball what is left of that to be solved
 link.g | nu | udot = g - G a
 outer.motion | 9 | bias motion of what the link hangs on
 outer.delta | 6 | deviation of what the link hangs on

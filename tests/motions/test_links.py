@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from reference import newton_euler
 from reference.compare import fresh, worst
+from reference.random_scenes import random_state
 from support.rod_scenes import chain
 
 import mstmm
@@ -16,6 +20,7 @@ from mstmm.runtime.engine.calls import Observation
 from mstmm.runtime.engine.engine import Engine
 from mstmm.runtime.pack.pack import pack
 from mstmm.runtime.pack.packed import Packed
+from mstmm.runtime.pack.records.bodies import link_of
 
 AXIAL = ("pin", "prismatic", "cylindrical", "screw")
 ACCURACY = 1e-11
@@ -57,6 +62,68 @@ def test_links_mean_what_blocks_mean(rng: np.random.Generator) -> None:
         assert worst(udot, observed(found, q, u).udot[0]) < ACCURACY
         assert worst(udot, swept(packed(scene, align=False), q, u)) < ACCURACY
     assert count > 5
+
+
+def balls(
+    kinds: Sequence[str], rng: np.random.Generator, law: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """Bodies of their own and skew in a row; the law of every ball."""
+    scene = chain(kinds, 0.7, rng.uniform(1, 2, len(kinds)).tolist(), (0.05, 0.08, 0.09))
+    for body, hinge in zip(scene["body"], scene["hinge"], strict=True):
+        body["center_of_mass"] = rng.uniform(0.1, 0.6, 3).tolist()
+        body["inertia"] += rng.uniform(-0.01, 0.01, 3).tolist()
+        body["ends"]["tip"]["orientation"] = rng.uniform(-2, 2, 3).tolist()
+        hinge |= {"axis2": [0, 1, 0]} if hinge["type"] == "universal" else {}
+        hinge |= {"law": law} if law and hinge["type"] == "ball" else {}
+    return scene
+
+
+@pytest.mark.parametrize(
+    "kinds", ["b", "bbbb", "bppp", "ppbp", "pppb", "bpbpb", "bbb" + 9 * "p", "sbub"]
+)
+@pytest.mark.parametrize("law", [{}, {"stiffness": 3.0, "damping": 0.2, "effort": "0.4"}])
+def test_balls_are_links(kinds: str, law: dict[str, Any], rng: np.random.Generator) -> None:
+    names = {"b": "ball", "p": "pin", "s": "prismatic", "u": "universal"}
+    scene = balls([names[kind] for kind in kinds], rng, law=law)
+    q, u = random_state(scene, 5)
+    found = packed(scene)
+    assert linked(found) >= kinds.count("b")
+    udot = swept(found, q, u)
+    assert worst(udot, observed(found, q, u).udot[0]) < 1e-13
+    assert worst(udot, newton_euler.solve(scene, q, u, 0.3).udot) < 1e-12
+
+
+def test_balls_on_branches_are_links(rng: np.random.Generator) -> None:
+    scene = balls(["ball", "pin", "ball", "ball", "pin", "ball"], rng)
+    for i, parent in ((2, "rod0.tip"), (3, "rod1"), (4, "rod0.tip"), (5, "ground")):
+        scene["hinge"][i]["inboard"] = parent
+    found = packed(scene)
+    assert linked(found) >= 4
+    q, u = random_state(scene, 6)
+    assert worst(swept(found, q, u), newton_euler.solve(scene, q, u, 0.3).udot) < 1e-12
+
+
+def test_balls_with_rotors_are_no_links(rng: np.random.Generator) -> None:
+    scene = balls(["ball"] * 3, rng)
+    scene["hinge"][1]["law"] = {"inertia": 0.2}
+    found = packed(scene)
+    assert linked(found) == 2
+    q, u = random_state(scene, 7)
+    assert worst(swept(found, q, u), observed(found, q, u).udot[0]) < 1e-13
+
+
+def test_balls_of_the_users_are_no_links() -> None:
+    body = packed(chain(["ball"])).system.body(0)
+    assert link_of(body) == "link_ball"
+    assert link_of(replace(body, hinge=("hinge", "socket"))) == ""
+
+
+def test_a_ball_on_a_thin_rod_is_named_where_links_sweep_it() -> None:
+    thin = packed(chain(["ball"] * 2, inertia=(0.0, 1 / 12, 1 / 12)))
+    assert linked(thin) == 2
+    q, u = np.tile([1.0, 0, 0, 0], 2), np.zeros(6)
+    with pytest.raises(mstmm.NumericalFailure, match="hinge1"):
+        swept(thin, q, u)
 
 
 def test_loads_are_at_the_hinge_wherever_the_frame_is(rng: np.random.Generator) -> None:

@@ -14,8 +14,9 @@ from mstmm.runtime.pack import system as records
 from mstmm.runtime.pack.internal import system_of
 from mstmm.runtime.pack.pack import pack
 from mstmm.runtime.pack.packed import Packed
+from mstmm.runtime.pack.records.bodies import link_of
 from mstmm.runtime.pack.structure import structure_of
-from mstmm.runtime.pack.system import System
+from mstmm.runtime.pack.system import BodyNumbers, System
 
 ROD = {"mass": 1.0, "center_of_mass": [0.5, 0.1, 0], "inertia": [0.01, 0.1, 0.1],
        "ends": {"tip": [1, 0, 0.1]}}  # fmt: skip
@@ -115,12 +116,20 @@ def test_members_of_a_chain_share_their_numbers() -> None:
     assert sum(len(run.pattern) for run in system.laws) == 2
 
 
+def link_numbers(body: BodyNumbers) -> tuple[float, ...]:
+    """Numbers of the body, of its rotor and its hinge, and of the way from its parent."""
+    if not link_of(body):
+        return ()
+    return (*body.body_p, body.rotor[0], *(body.hinge_p or (0.0,)),
+            *(body.link or body.connection))  # fmt: skip
+
+
 def read(packed: Packed, place: int) -> dict[str, Any]:
     """What C has of a body."""
     record, body = packed.model.bodies[place], packed.system.body(place)
     lengths = {
         "connection": 15, "hinge_p": len(body.hinge_p), "rotor": body.nu, "imposed_mask": body.nu,
-        "body_p": len(body.body_p) + len(body.body_frame), "link": 5 if body.link else 0,
+        "body_p": len(body.body_p) + len(body.body_frame), "link": len(link_numbers(body)),
     }  # fmt: skip
     arrays = {
         name: tuple(packed.ffi.unpack(getattr(record, name), n)) if n else ()
@@ -142,7 +151,7 @@ def test_c_has_the_numbers_of_the_system(scene: mstmm.Scene) -> None:
         assert read(packed, k) == {
             "connection": (*body.connection, 0.0, 0.0, -body.height), "hinge_p": body.hinge_p,
             "rotor": body.rotor, "imposed_mask": body.imposed,
-            "body_p": (*body.body_p, *body.body_frame), "link": body.link,
+            "body_p": (*body.body_p, *body.body_frame), "link": link_numbers(body),
             "q": places["q"][k], "u": places["u"][k],
             "parent": system.parents[k], "nu": body.nu, "release": body.release,
         }  # fmt: skip

@@ -43,15 +43,26 @@ static void begin_run(const mstmm_model *model, mstmm_branch *run, const real **
                        .nq = body->nq, .nu = body->nu, .place = -1, .parent_place = -1};
     if (!body->kernels->link_condense) return;
     run->numbers = numbers + i;
-    run->angle = body->kernels->link_angle;
+    run->angles = body->kernels->link_angles;
+    run->turn = body->kernels->link_turn;
     run->forward = body->kernels->link_forward;
     run->condense = body->kernels->link_condense;
     run->recover = body->kernels->link_recover;
 }
 
+/* A run that hangs on the one before with nothing beside it hands S and e on to it, if both are of
+ * links. */
+static void join(mstmm_branch *before, mstmm_branch *run)
+{
+    if (!before->numbers || !run->numbers) return;
+    run->joined = 1;
+    before->open = 0;
+}
+
 static int64_t link_size(const mstmm_branch *run)
 {
-    return MSTMM_LINK_FIXED + MSTMM_LINK_PER_SPEED * (int64_t)run->nu;
+    return MSTMM_LINK_TURN((int64_t)run->nu) +
+           (run->angles ? MSTMM_LINK_ANGLE : MSTMM_LINK_ROTATION);
 }
 
 /* Run that holds a body; the runs are in the order of the bodies. */
@@ -80,8 +91,10 @@ int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **n
     for (int i = 0; i < model->n_bodies; i++) {
         if (n == 0 || !continues(model, &runs[n - 1], children, i))
             begin_run(model, &runs[n++], numbers, i);
-        runs[n - 1].count++;
-        runs[n - 1].open = children[i] > 0;
+        mstmm_branch *run = &runs[n - 1];
+        if (run->count++ == 0 && n > 1 && run->parent == i - 1 && children[i - 1] == 1)
+            join(run - 1, run);
+        run->open = children[i] > 0;
     }
     for (int k = 0; k < n; k++) {
         mstmm_branch *run = &runs[k];
@@ -95,11 +108,13 @@ int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **n
             run->parent_place = outer->place + (run->parent - outer->first) * link_size(outer);
     }
     for (int i = 0; i < model->n_bodies; i++) {
+        const mstmm_kernels *kernels = model->bodies[i].kernels;
+        const int own = MSTMM_LINK_OWN + kernels->link_numbers;
         numbers[i] = model->bodies[i].link;
-        if (!gathered || !model->bodies[i].kernels->link_condense) continue;
-        real *own = gathered + (int64_t)i * MSTMM_LINK_NUMBERS;
-        memcpy(own, numbers[i], MSTMM_LINK_NUMBERS * sizeof(real));
-        numbers[i] = own;
+        if (!gathered || !kernels->link_condense) continue;
+        memcpy(gathered, numbers[i], (size_t)own * sizeof(real));
+        numbers[i] = gathered;
+        gathered += own;
     }
     *size = place - begin;
     return n;
@@ -119,7 +134,7 @@ static const real *of_parent(const mstmm_state *state, const mstmm_branch *run, 
 MSTMM_INLINE mstmm_link_at link_at(mstmm_state *state, const mstmm_branch *run, int k)
 {
     return (mstmm_link_at){
-        .state = state, .index = run->first + k, .nu = run->nu, .angle = run->angle,
+        .state = state, .index = run->first + k, .nu = run->nu, .turn = run->turn,
         .forward = run->forward, .condense = run->condense, .recover = run->recover,
         .link = state->workspace + run->place + k * link_size(run),
         .q = state->q + run->q + (int64_t)k * run->nq,
@@ -129,24 +144,24 @@ MSTMM_INLINE mstmm_link_at link_at(mstmm_state *state, const mstmm_branch *run, 
     };
 }
 
-/* Turn of every link: all angles of a run first, so that they can share their sines. */
+/* Cosines and sines of a run: all angles first, so that they can share the work. */
 static void turn_links(mstmm_state *state, const mstmm_branch *run)
 {
     const int64_t size = link_size(run);
     mstmm_link_at at = link_at(state, run, 0);
     for (int k = 0; k < run->count; k += 2, at.link += 2 * size) {
         const int both = k + 1 < run->count;
-        real *turn = at.link + MSTMM_LINK_TURN;
+        real *turn = at.link + MSTMM_LINK_TURN(run->nu);
         two_t x = {0, 0};
         at.numbers = run->numbers[k];
-        mstmm_at_link_angle(at);
+        mstmm_at_link_turn(at);
         at.q += run->nq;
         x[0] = turn[0];
         if (both) {
             mstmm_link_at next = at;
             next.numbers = run->numbers[k + 1];
             next.link += size;
-            mstmm_at_link_angle(next);
+            mstmm_at_link_turn(next);
             at.q += run->nq;
             x[1] = turn[size];
         }
@@ -161,12 +176,13 @@ static void turn_links(mstmm_state *state, const mstmm_branch *run)
 
 static int forward_links(mstmm_state *state, const mstmm_branch *run)
 {
-    turn_links(state, run);
+    if (run->angles) turn_links(state, run);
     const int64_t size = link_size(run);
     mstmm_link_at at = link_at(state, run, 0);
     at.outer_motion = of_parent(state, run, MSTMM_BLOCK_MOTION);
     for (int k = 0; k < run->count; k++, at.index++) {
         at.numbers = run->numbers[k];
+        if (!run->angles) mstmm_at_link_turn(at);
         const int code = mstmm_at_link_forward(at);
         if (code) return code;
         at.outer_motion = at.link + MSTMM_LINK_MOTION;
@@ -212,22 +228,32 @@ static const real *efforts_of(const mstmm_state *state, const mstmm_branch *run,
     return state->efforts ? state->efforts + run->u + (int64_t)k * run->nu : mstmm_zeros;
 }
 
-static int condense_links(mstmm_state *state, const mstmm_branch *run)
+/* S and e on their way from link to link, and from run to run where these are joined. */
+typedef struct {
+    real numbers[2][CARRIED];
+    int next;           /* of the two, to be written */
+    const real *handed; /* to the next run; NULL: it is not joined with this one */
+} carried_t;
+
+static int condense_links(mstmm_state *state, const mstmm_branch *run, carried_t *carried)
 {
     const int64_t size = link_size(run);
     const int last = run->first + run->count - 1;
-    real carried[2][CARRIED];
     mstmm_link_at at = link_at(state, run, run->count - 1);
-    at.inner = run->open ? mstmm_block(state->model, state->workspace, last) + MSTMM_BLOCK_S
-                         : mstmm_zeros;
+    at.inner = carried->handed ? carried->handed
+               : run->open ? mstmm_block(state->model, state->workspace, last) + MSTMM_BLOCK_S
+                           : mstmm_zeros;
     for (int k = run->count - 1; k >= 0; k--, at.link -= size, at.index--) {
         at.numbers = run->numbers[k];
-        at.outer = carried[k & 1];
+        at.outer = carried->numbers[carried->next];
+        carried->next = !carried->next;
         at.tau = efforts_of(state, run, k);
         const int code = mstmm_at_link_condense(at);
         if (code) return code;
         at.inner = at.outer;
     }
+    carried->handed = run->joined ? at.outer : NULL;
+    if (run->joined) return 0;
     real *parent = mstmm_block(state->model, state->workspace, run->parent) + MSTMM_BLOCK_S;
     for (int j = 0; j < CARRIED; j++) parent[j] += at.outer[j];
     return 0;
@@ -236,9 +262,10 @@ static int condense_links(mstmm_state *state, const mstmm_branch *run)
 int mstmm_hook_links_condense(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
+    carried_t carried = {.next = 0, .handed = NULL};
     for (int k = model->n_runs - 1; k >= 0; k--) {
         const mstmm_branch *run = &model->runs[k];
-        int code = run->numbers ? condense_links(state, run) : 0;
+        int code = run->numbers ? condense_links(state, run, &carried) : 0;
         for (int i = run->first + run->count - 1; !code && !run->numbers && i >= run->first; i--)
             code = mstmm_at_condense(state, i);
         if (code) return code;

@@ -47,7 +47,8 @@ typedef struct {
     void (*forward_kept)(void), (*directions)(void); /* NULL: step by step */
     void (*hinge_slope)(void), (*bias_load_slope)(void), (*load_by_motion)(void);
     /* NULL: no such connection */
-    void (*link_angle)(void), (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
+    void (*link_turn)(void), (*link_forward)(void), (*link_condense)(void), (*link_recover)(void);
+    int link_numbers, link_angles; /* so many of the connection; it turns about z alone */
     const mstmm_tape *tape;       /* hinge kernel without a compiler, else NULL */
     const mstmm_tape *slope_tape; /* and its derivative */
     int rigid;                    /* the body is the built-in rigid one */
@@ -76,7 +77,7 @@ typedef struct {
     const int *imposed_mask; /* per speed: 1 where imposed */
     mstmm_modal *modal;      /* the body is the floating frame of a flexible one; else NULL */
     mstmm_section *section;  /* its connection is a section of a flexible body; else NULL */
-    /* link (5), b (11), p of the kernels sweep link_*; NULL: no such connection */
+    /* b (11), p, link of the kernels sweep link_*; NULL: no such connection */
     const real *link;
 } mstmm_body;
 
@@ -84,11 +85,13 @@ typedef struct {
  * one type of link, and but for the last each has one child, so that S and e stay at hand. */
 typedef struct {
     int first, count, parent; /* parent of the first, -1: the ground */
-    int open;                 /* other runs hang on the last */
+    int open;                 /* others hang on the last, and hand S and e on through its block */
     int q, u, nq, nu;         /* of the first; the others follow without gaps */
     int64_t place, parent_place; /* of its links in the workspace; of the parent's link, or -1 */
     const real *const *numbers; /* `link` of every body */
-    void (*angle)(void), (*forward)(void), (*condense)(void), (*recover)(void);
+    void (*turn)(void), (*forward)(void), (*condense)(void), (*recover)(void);
+    int angles; /* they turn about z */
+    int joined; /* the first is the only child of the last link of the run before */
 } mstmm_branch;
 
 /* Law on coordinates of one hinge: `evaluate` is a kernel of sweep_laws. */

@@ -9,6 +9,7 @@ import numpy as np
 from mstmm.arrays import Integers
 from mstmm.ir.structure import Key
 
+from ...kernels import prebuilt
 from ...kernels.records import Records
 from ..bodies import RIGID
 from ..elements import Elements
@@ -86,11 +87,9 @@ class BodyRecords:
     def _numbers(self, record: Any, body: BodyNumbers) -> None:
         """Arrays side by side in memory."""
         link: Numbers = ()
-        if body.link:
-            rigid = body.body_p if body.body[1] == RIGID else ()
-            rotor = body.rotor[0] if body.nu else 0.0
+        if link_of(body):
             # every link has room for a number of its hinge
-            link = (*body.link, *rigid, rotor, *(body.hinge_p or (0.0,)))
+            link = (*body.body_p, body.rotor[0], *(body.hinge_p or (0.0,)), *connection_of(body))
         own = (*body.body_p, *body.body_frame)
         start = self.memory.reals(
             (*body.connection, 0.0, 0.0, -body.height, *body.rotor, *body.hinge_p, *own, *link)
@@ -103,10 +102,12 @@ class BodyRecords:
 
     def _kernels(self, body: BodyNumbers, posed: bool) -> Any:
         """Functions of the hinge, the body and the link, shared by bodies of one kind."""
-        link = "" if posed else _link_of(body)
+        link = "" if posed else link_of(body)
         kind = (body.hinge, body.body, link)
         if kind not in self._made:
-            self._made[kind] = self._kernels_of(body.hinge, body.body, link)
+            made = self._kernels_of(body.hinge, body.body, link)
+            made.link_numbers, made.link_angles = len(connection_of(body)), int(bool(body.link))
+            self._made[kind] = made
         return self._made[kind]
 
     def _kernels_of(self, of_hinge: Key, of_body: Key, link: str) -> Any:
@@ -128,10 +129,18 @@ class BodyRecords:
         return made
 
 
-def _link_of(body: BodyNumbers) -> str:
+def connection_of(body: BodyNumbers) -> Numbers:
+    """Numbers of the way from the parent in a link: screws, or a rotation and a place."""
+    return body.link or body.connection
+
+
+def link_of(body: BodyNumbers) -> str:
     """The link that a body with its hinge is swept as; none where it is no link, where something
-    imposes the speed, and for several speeds with rotors."""
-    rotor = any(body.rotor)
-    if not body.link or body.body[1] != RIGID or any(body.imposed) or (rotor and body.nu > 1):
+    imposes the speed, for several speeds with rotors, and for hinges of the user's."""
+    rotor, about_a_point = any(body.rotor), body.turning and body.nu > 1
+    if not (body.link or about_a_point) or body.body[1] != RIGID or body.section or body.modal:
         return ""
-    return f"link_{body.hinge[1]}{'_rotor' if rotor else ''}"
+    if any(body.imposed) or (rotor and body.nu > 1):
+        return ""
+    name = f"link_{body.hinge[1]}{'_rotor' if rotor else ''}"
+    return name if ("sweep", name) in prebuilt.elements() else ""

@@ -4,7 +4,7 @@ Between the frames of such a body and of its parent lie two axial screws, both o
 the scene is packed (modified Denavit-Hartenberg parameters): a constant one about x, and the
 hinge's own about z with its constant angle and shift.  One link is
 
-    angle      angle about z, whose sine and cosine the engine takes two links at a time
+    turn       angle about z, whose sine and cosine the engine takes two links at a time
     forward    bias motion of the body and the load that it needs
     condense   own inertia and what hangs on the body; elimination; transport to the parent
     recover    accelerations
@@ -19,14 +19,14 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..language.derivation import Derivation, Equation, Quantity, tilde
-from ..language.element import Body
-from . import body as body_kernels
-from .algebra import part, stack, symbol
-from .eliminate import REDUCED_E, REDUCED_S, eliminate, with_unit_columns
-from .hinge import HingeMotion, hinge_quantities
-from .screw import OUT_E, OUT_S, Stage
-from .sweep import (
+from ...language.derivation import Derivation, Equation, Quantity, tilde
+from ...language.element import Body
+from .. import body as body_kernels
+from ..algebra import part, stack, symbol
+from ..eliminate import REDUCED_E, REDUCED_S, eliminate, with_unit_columns
+from ..hinge import HingeMotion, hinge_quantities
+from ..screw import OUT_E, OUT_S, Stage
+from ..sweep import (
     DELTA,
     MOTION,
     PARENT_DELTA,
@@ -81,9 +81,9 @@ def _place(motion: HingeMotion) -> tuple[sp.Expr, sp.Expr]:
     return angle, shift
 
 
-def angle(motion: HingeMotion) -> Derivation:
+def turn(motion: HingeMotion) -> Derivation:
     """Angle about z."""
-    theta = Quantity(symbol("theta", 1), "rad", "angle about z")
+    theta = Quantity(symbol("turn", 1), "rad", "angle about z, in place of its cosine and sine")
     value = _place(motion)[0] + LINK.symbol[3, 0]
     return Derivation(
         motion.hinge.name,
@@ -109,15 +109,15 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
             *_about_x().behind(PARENT_MOTION.symbol, between),
             Equation("shift along z", SHIFT.symbol, sp.ImmutableDenseMatrix([shift + link[4, 0]])),
             *_about_z().behind(between, rest),
-            Equation("bias motion", MOTION.symbol, _moved(motion, rest)),
-            Equation("load", OWN_LOAD.symbol, _of_body(body_kernels.bias_load(body), "e")),
+            Equation("bias motion", MOTION.symbol, moved(motion, rest)),
+            Equation("load", OWN_LOAD.symbol, of_body(body_kernels.bias_load(body), "e")),
             Equation("coordinate rates", rates, motion.in_arrays(motion.rates)),
         ),
         sources=SOURCES,
     )
 
 
-def _moved(motion: HingeMotion, rest: sp.MatrixSymbol) -> sp.BlockMatrix:
+def moved(motion: HingeMotion, rest: sp.MatrixSymbol) -> sp.BlockMatrix:
     """Motion of P from that of Q in P axes: the hinge's own velocity and acceleration added."""
     w, wd, rdd = (part(rest, n) for n in (0, 3, 6))
     v_own, w_own = motion.in_arrays(motion.velocity), motion.in_arrays(motion.spin)
@@ -126,7 +126,7 @@ def _moved(motion: HingeMotion, rest: sp.MatrixSymbol) -> sp.BlockMatrix:
     return stack(w + w_own, wd + tilde(w) * w_own + c_w, rdd + 2 * (tilde(w) * v_own) + c_v)
 
 
-def _of_body(derivation: Derivation, name: str) -> sp.Basic:
+def of_body(derivation: Derivation, name: str) -> sp.Basic:
     """A definition of the body's, its parameters under this file's name."""
     own = next(q for q in derivation.inputs if q.name == "p").symbol
     matrix = sp.ImmutableDenseMatrix(derivation.definition(name))
@@ -142,7 +142,7 @@ def condense(motion: HingeMotion, body: Body, rotor: bool = False) -> Derivation
     gain, offset = gains(nu)
     tau = next(q for q in elimination.inputs if q.name == "tau")
     middle = (symbol("S_x", 6, 6), symbol("e_x", 6))
-    mass = _of_body(body_kernels.inertia(body), "S")
+    mass = of_body(body_kernels.inertia(body), "S")
     return Derivation(
         motion.hinge.name,
         f"S and e of a rigid body carried across the {motion.hinge.title}",
@@ -163,7 +163,7 @@ def condense(motion: HingeMotion, body: Body, rotor: bool = False) -> Derivation
 
 def floor(body: Body) -> sp.ImmutableDenseMatrix:
     """What a pivot must exceed, from the body's own inertia."""
-    return floor_of(_of_body(body_kernels.inertia(body), "S"))
+    return floor_of(of_body(body_kernels.inertia(body), "S"))
 
 
 def recover(motion: HingeMotion, rotor: bool = False) -> Derivation:

@@ -1,0 +1,1 @@
+"""A rigid body behind a hinge as one element, a kernel a pass."""
