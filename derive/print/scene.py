@@ -54,7 +54,7 @@ typedef double real;
 #: Up to this many operations a kernel waits for results, and its parts are merged (`streams`).
 #: Longer ones wait for their own instructions (the cache for them holds 32 kB on most processors),
 #: lanes for the multipliers: there registers are saved (`thrift`).
-_SHORT = 4000
+_SHORT = 3000
 #: What "accelerations_power" has behind the outputs of "accelerations".
 _SUMS = ("power", "potential")
 #: Statements stand in an order of their own, which gcc's scheduler makes worse (10 % at 7 balls);
