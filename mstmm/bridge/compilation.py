@@ -63,9 +63,10 @@ def compile_scene(
         flexibility: level of model of all flexible bodies: "coupled", "one-way" (they are rigid in
             the run, then respond elastically to its motion and loads) or "rigid"; None takes each
             body's own `model`.
-        simplify: what may be packed otherwise than the scene says it: True ("welds"), False, or
-            some of "welds" (rigid bodies on fixed hinges as one) and "turns" (orientations within
-            1e-11 rad of quarter turns are these; {"turns": 1e-5} with another tolerance).
+        simplify: what may be packed otherwise than the scene says it: True, False, or a list of
+            "welds" (rigid bodies on fixed hinges as one) and "turns" (orientations within 1e-11
+            rad of quarter turns are these); a table changes one and leaves the other
+            ({"turns": 1e-5}: another tolerance, rad; {"turns": 0}: none).
             `model.simplifications` tells what was done.
 
     Raises SceneError for hinges that do not form a tree, types that nobody defines, and masses that

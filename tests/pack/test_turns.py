@@ -41,30 +41,31 @@ STATE = np.array([0.3, -1.1, 0.7]), np.array([1.0, -2.0, 0.5])
 
 
 def test_twelve_digits_are_a_quarter_turn() -> None:
-    exact = mstmm.compile(arm(math.pi / 2), engine="looped", simplify="turns")
-    found = mstmm.compile(arm(1.57079632679), engine="looped", simplify="turns")
+    exact = mstmm.compile(arm(math.pi / 2), engine="looped")
+    found = mstmm.compile(arm(1.57079632679), engine="looped")
     assert not exact.simplifications
     assert [one.elements for one in found.simplifications] == [
         ("a",), ("rod1", "tip"), ("rod2", "tip"), ("rod3", "tip"),
     ]  # fmt: skip
     assert "4.9e-12 rad off" in str(found.simplifications[0])
     first, last = (one.accelerations(*STATE) for one in (exact, found))
-    plain = mstmm.compile(arm(1.57079632679), engine="looped")
+    plain = mstmm.compile(arm(1.57079632679), engine="looped", simplify=False)
     before = plain.accelerations(*STATE)
     assert np.abs(last - first).max() < 1e-9 * np.abs(first).max()  # c keeps what it is off by
     assert 0 < np.abs(last - before).max() < 1e-10 * np.abs(first).max()
 
 
-def test_a_tolerance_has_to_be_asked_for() -> None:
+def test_a_larger_tolerance_has_to_be_asked_for() -> None:
     scene = arm(1.5708)
-    assert not mstmm.compile(scene, engine="looped", simplify=["turns"]).simplifications
+    assert not mstmm.compile(scene, engine="looped").simplifications
     rough = mstmm.compile(scene, engine="looped", simplify={"turns": 1e-5})
     assert len(rough.simplifications) == 4
     again = rough.with_parameters({"rod2.mass": 3.0})
     assert len(again.simplifications) == 4
-    nothing: list[Any] = [False, True, ["welds"], {"turns": False}]
+    nothing: list[Any] = [False, ["welds"], {"turns": False}, {"turns": 0}, {"turns": 1e-12}]
     for none in nothing:
-        assert not mstmm.compile(scene, engine="looped", simplify=none).simplifications
+        twelve = mstmm.compile(arm(1.57079632679), engine="looped", simplify=none)
+        assert not twelve.simplifications
     wrong: list[Any] = [0.1, -1.0, math.nan, "much"]
     for bad in wrong:
         with pytest.raises(mstmm.SceneError, match="simplify: turns = "):
@@ -84,12 +85,40 @@ def test_every_rotation_by_quarter_turns_is_found() -> None:
     assert quarter_turns(from_rpy([0.3, 0, 0]), 0.01) is None
 
 
-def test_the_command_line_asks_for_turns(tmp_path: Path) -> None:
+def test_a_table_leaves_what_it_does_not_name() -> None:
+    scene = arm(1.5708)
+    scene = scene.model_copy(update={"hinge": (*scene.hinge[:2], scene.hinge[2].model_copy(
+        update={"type": "fixed"})
+    )})  # fmt: skip
+    for given, kinds in (
+        ({"turns": 1e-5}, {"welds", "turns"}), ({"turns": 0}, {"welds"}), ({"welds": False}, set()),
+        ({"welds": False, "turns": 1e-5}, {"turns"}),
+    ):  # fmt: skip
+        words: Any = given
+        found = mstmm.compile(scene, engine="looped", simplify=words)
+        assert {one.kind for one in found.simplifications} == kinds
+
+
+@pytest.mark.parametrize(
+    ("half_pi", "more", "count"),
+    [
+        ("1.5708", [], 0), ("1.5708", ["--turns", "1e-5"], 4), ("1.57079632679", [], 4),
+        ("1.57079632679", ["--turns", "0"], 0), ("1.57079632679", ["--no-simplify"], 0),
+    ],
+)  # fmt: skip
+def test_turns_on_the_command_line(
+    half_pi: str, more: list[str], count: int, tmp_path: Path
+) -> None:
     file = tmp_path / "arm.toml"
-    file.write_text(arm(1.5708).to_toml())
+    file.write_text(arm(float(half_pi)).to_toml())
     asked = ["simulate", str(file), "--t-end", "0.01", "--output", str(tmp_path / "arm.csv")]
-    done = CliRunner().invoke(app, [*asked, "--turns", "1e-5", "--json"])
-    kinds = [one["kind"] for one in json.loads(done.stdout)["simplifications"]]
-    assert kinds == ["turns"] * 4
-    done = CliRunner().invoke(app, [*asked, "--turns", "1e-5"])
+    done = CliRunner().invoke(app, [*asked, *more, "--json"])
+    assert [one["kind"] for one in json.loads(done.stdout)["simplifications"]] == ["turns"] * count
+
+
+def test_the_command_line_tells_of_turns(tmp_path: Path) -> None:
+    file = tmp_path / "arm.toml"
+    file.write_text(arm(1.57079632679).to_toml())
+    asked = ["simulate", str(file), "--t-end", "0.01", "--output", str(tmp_path / "arm.csv")]
+    done = CliRunner().invoke(app, asked)
     assert "4 orientations within a tolerance of quarter turns taken as these" in done.output

@@ -56,7 +56,9 @@ class Pair:
     def __init__(self, path: Path, one: Imported, base: str, rng: np.random.Generator) -> None:
         root = (pin.JointModelFreeFlyer(),) if base == "free" else ()
         self.one, self.peer = one, pin.buildModelFromUrdf(str(path), *root)
-        self.model, self.data = mstmm.compile(one.scene), self.peer.createData()
+        # the others take orientations as files write them
+        self.model = mstmm.compile(one.scene, simplify={"turns": 0})
+        self.data = self.peer.createData()
         assert self.model.nu == self.peer.nv
         self.q, self.u, self.efforts = (
             np.zeros(n) for n in (self.model.nq, self.model.nu, self.model.nu)

@@ -163,12 +163,13 @@ def simulate(
     simplify: Annotated[
         bool,
         typer.Option("--simplify/--no-simplify", help="Pack bodies on fixed hinges as one with "
-                     "what holds them, which changes no result."),
+                     "what holds them, and take orientations written with 12 digits as the quarter "
+                     "turns that they are."),
     ] = True,
     turns: Annotated[
         float | None,
         typer.Option("--turns", metavar="X", parser=not_negative, help="Take orientations within "
-                     "so many rad of quarter turns as these."),
+                     "so many rad of quarter turns as these (1e-11 if nothing is said; 0: none)."),
     ] = None,
     json: Json = False,
 ) -> None:  # fmt: skip
@@ -179,7 +180,7 @@ def simulate(
         None if plot is None else output_file(plot, PICTURES, "--plot"),
         tuple(quantity or ()), certify, resume, sweep, engine, flexibility, accuracy,
         max_step or 0.0, radius, scheme, iterations, tangent, error, tuple(of or ()),
-        on_risk, tuple(inputs or ()), simplify, turns or 0.0,
+        on_risk, tuple(inputs or ()), simplify, turns,
     )  # fmt: skip
     refuse_endless(plan)
     refuse_beside_error(plan)
@@ -220,7 +221,8 @@ def _model(plan: Plan) -> Model:
     scene, level = mstmm.load_scene(plan.scene), plan.flexibility
     if plan.inputs:
         scene = with_inputs(scene, plan.inputs)
-    words = {"welds": plan.simplify, "turns": plan.turns}
+    turns = plan.simplify if plan.turns is None else plan.turns
+    words = {"welds": plan.simplify, "turns": turns}
     model = compiled(plan.scene, scene, plan.sweep, plan.engine, level, words)
     if plan.quantities:
         start = model.simulate(t_end=0.0, method="dop853")

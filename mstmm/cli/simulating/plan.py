@@ -48,7 +48,7 @@ class Plan:
     on_risk: str = "warn"
     inputs: tuple[str, ...] = ()
     simplify: bool = True
-    turns: float = 0.0
+    turns: float | None = None
 
     @property
     def resumable(self) -> bool:

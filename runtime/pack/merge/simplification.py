@@ -19,12 +19,11 @@ COUNTED = {
 }
 #: Word -> whether it is done, or up to which tolerance.
 Words = Mapping[str, bool | float]
-#: What a word means by itself.  Orientations may be off by so many rad: files write quarter turns
-#: as 1.57079632679, which is off by 4.9e-12.
-_ALONE: Words = {WELDS: True, TURNS: 1e-11}
-#: What is done where nothing is asked, and nothing at all.  Turns change results by as much as an
-#: orientation is off, so that they have to be asked for.
-USUAL: Words = {WELDS: True}
+#: What is done where nothing is asked, and what a word means by itself.  Orientations may be off by
+#: so many rad: files write quarter turns as 1.57079632679, which is off by 4.9e-12, and two such
+#: angles add up.  Numbers of fewer digits (1.570796327: 2e-10 off, 1.5708: 4e-6) change results by
+#: more than rounding does, so that a larger tolerance has to be asked for.
+USUAL: Words = {WELDS: True, TURNS: 1e-11}
 NOTHING: Words = {}
 #: The largest tolerance, rad.
 _MOST = 0.01
@@ -49,24 +48,26 @@ class Simplification:
 
 
 def asked_for(simplify: bool | Collection[str] | Words) -> Words:
-    """The words that an option means; SceneError for others."""
+    """The words that an option means, others as usual where it is a table; SceneError for words
+    that are not known."""
     if isinstance(simplify, bool):
         return USUAL if simplify else NOTHING
     words = texts_of("simplify", list(simplify) if isinstance(simplify, Mapping) else simplify,
                      "welds")  # fmt: skip
     for word in words:
-        if word not in _ALONE:
+        if word not in USUAL:
             raise SceneError(
                 f"simplify: {word!r:.60} is not known; expected True, False, or some of: "
-                + ", ".join(_ALONE)
+                + ", ".join(USUAL)
             )
     if not isinstance(simplify, Mapping):
-        return {word: _ALONE[word] for word in words}
-    found = {word: _ALONE[word] if given is True else given for word, given in simplify.items()}
+        return {word: USUAL[word] for word in words}
+    found = {word: USUAL[word] if given is True else given for word, given in simplify.items()}
+    found = {**USUAL, **found}
     turns = real("simplify: turns", found.get(TURNS) or 0.0)
     if not 0 <= turns <= _MOST:
         raise SceneError(
             f"simplify: turns = {turns!r}: expected an angle from 0 to {_MOST} rad, or True for "
-            f"{_ALONE[TURNS]:g}"
+            f"{USUAL[TURNS]:g}"
         )
     return {word: given for word, given in found.items() if given}
