@@ -61,6 +61,11 @@ class Coordinates(Measure):
     def read(self, result: Record) -> Array:
         return result.q
 
+    @property
+    def least(self) -> float:
+        """The smallest of the sizes of units other than angles, and of 1."""
+        return min([1.0, *self._sizes.values()])
+
     def scale_by(self, numbers: Array) -> None:
         moved = excursions(self._layout, numbers, but="rad")
         self._sizes = {unit: size or 1.0 for unit, size in moved.items()}

@@ -69,6 +69,9 @@ _STABLE, _FOLLOWED, _AT, _SLOWLY = 4.0, 0.8, 1e-7, 9.0
 #: Explicit runs behind others, which tell little of them, are as many.
 _ANEW = 2.0
 
+#: Radians that explicit steps follow a motion by.
+_RAD = 2.0
+
 #: A step in explicit ones; the order at which the number of exponential ones grows.
 _STEP, _ORDER = {Kind.IMPLICIT: 2.0, Kind.EXPONENTIAL: 3.0}, 3.0
 
@@ -161,6 +164,11 @@ class Family:
         if self._tried:
             return Kind.EXPONENTIAL
         return Kind.IMPLICIT if self._lasts > self._many else Kind.EXPLICIT
+
+    def leaves(self, run: Trajectory) -> bool:
+        """Whether explicit steps of a run do not follow the fastest motion, which is known."""
+        known = self._fast is not None and self._fast.known
+        return known and run.statistics is not None and _RAD * run.statistics.steps < self._lasts
 
     @property
     def radians(self) -> float:

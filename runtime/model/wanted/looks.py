@@ -64,7 +64,7 @@ class _Usual:
 
 
 _USUAL = {
-    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 2.5e3, 3.0, 0.3, 0.9, 0.9, 0.25, 1.7, 0.5, 1e-7),
+    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 2.5e3, 3.0, 0.3, 0.9, 0.9, 0.2, 1.7, 0.5, 1e-6),
     Kind.IMPLICIT: _Usual((30.0, 1e-4, 3e-2), 1e6, 1.0, 1.0, 0.8, 0.9, 0.6, 1.0, 0.1, 1e-6),
     Kind.EXPONENTIAL: _Usual((30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.6, 0.6, 0.4, 1.0, 0.1, 1e-4),
 }
@@ -128,6 +128,7 @@ class Look:
         apart: how far it is from the tightest run; 0 for that one, inf where they end elsewhere.
         summed: its local errors added up; None where the method keeps none.
         held: stability, not accuracy, set many of its steps.
+        growth: its error in what local errors sum up to, where more is known of it than is usual.
         rough: its scene has stops, at which local errors are those of no smooth motion.
         radians: of vibration above what is asked that implicit steps have to follow.
         calm: explicit steps left vibration behind that is below it.
@@ -142,6 +143,7 @@ class Look:
     rough: bool = False
     radians: float = 0.0
     calm: bool = False
+    growth: float | None = None
     parted: float = 1.0
 
     def seen(self, way: Array) -> Look:
@@ -251,7 +253,7 @@ def _summed(look: Look) -> float:
     """What the error of a run is by its local errors, about."""
     usual = _USUAL[look.kind]
     known = look.summed or _UNKNOWN * look.rtol
-    return known * (usual.held if look.held else usual.growth)
+    return known * (look.growth or (usual.held if look.held else usual.growth))
 
 
 def _usual(look: Look) -> float:

@@ -45,6 +45,10 @@ _ATOL = 0.01
 #: user's are enough to look at them alone.
 _SAMPLES, _LOOKS, _ENOUGH = 201, 101, 50
 
+#: The error of bodies that bend in what local errors sum up to, by the length that their shapes
+#: move by (m), and at most; and where steps do not follow the fastest motions.
+_SHAPED, _MOST_SHAPED, _OF_SPEEDS = 5e-3, 20.0, 0.02
+
 Progress = Callable[[float, float], None]
 
 
@@ -145,7 +149,22 @@ class Search:
         rtol, held = last.run.settings.rtol, held_back(last.run)
         radians = self._family.radians if last.kind is Kind.IMPLICIT else 0.0
         calm = last.kind is Kind.EXPLICIT and self._family.calm(last.run)
-        self._looks.append(Look(rtol, last.kind, 0.0, summed, held, self._rough, radians, calm))
+        growth = self._growth(last)
+        self._looks.append(
+            Look(rtol, last.kind, 0.0, summed, held, self._rough, radians, calm, growth)
+        )
+
+    def _growth(self, last: _Made) -> float | None:
+        """The error of explicit steps in what local errors sum up to, where it is known: shapes
+        move by far less than angles do, and err in parts of that; of motions that steps do not
+        follow speeds have local errors, which leave no trace."""
+        if last.kind is not Kind.EXPLICIT:
+            return None
+        if self._model.flexible and isinstance(self._measure, Coordinates):
+            self._measure.scale_by(last.numbers)
+            return min(_SHAPED / self._measure.least, _MOST_SHAPED)
+        left = self._family.leaves(last.run) and not self._model.flexible
+        return _OF_SPEEDS if left else None
 
     def _apart(self, one: _Made, tightest: _Made) -> Array:
         """(n,) how far a run is from the tightest one at each sample, in the size of the motion;
