@@ -144,7 +144,7 @@ def test_loops_and_large_scenes_say_why_there_are_no_closed_equations() -> None:
 @pytest.mark.parametrize(
     ("of", "keep", "said"),
     [("pni", [], "did you mean"), ("pin", ["rod1.mass"], "keep names numbers of a scene"),
-     (rods({}), ["rod1.mas"], "there is no such number"), (rods({}), "rod1.mass", "a list of"),
+     (rods({}), ["rod1.mas"], "there is no such number"), (rods({}), 3, "a list of names"),
      (None, [], "expected the name of an element"), (object, [], "expected the name of"),
      ("none.json", [], "there is no such file"), ("none.urdf", [], "there is no such file")],
     ids=["name", "element", "number", "text", "nothing", "class", "scene", "robot"],

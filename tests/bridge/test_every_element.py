@@ -71,7 +71,7 @@ def test_what_no_run_calls_has_no_c() -> None:
     short = {key: name for name, key in DIRECT.items()}
     by_name = {
         "hinge", "forward", "condense", "recover", "angle", "singularity", "inertia", "bias_load",
-        "energy", "wrench", "linear", "full", "rotation", "six",
+        "energy", "wrench", "linear", "full", "rotation", "six", "turn",
     }  # fmt: skip
     by_name |= {f"{name}_slope" for name in by_name} | MADE
     for (kind, name), element in prebuilt.elements().items():
