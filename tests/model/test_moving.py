@@ -221,7 +221,7 @@ def test_what_there_is_not_is_named() -> None:
     model = mstmm.compile(mstmm.Scene(gravity=[0, 0, 0], body=[ROD | {"name": "a"}], hinge=[pin]))
     with pytest.raises(SceneError, match=r'"a.tap": there is no such body or end .*a.tip'):
         model.positions([0.0], "a.tap")
-    with pytest.raises(SceneError, match=r"of = \(3,\): expected a list of names"):
+    with pytest.raises(SceneError, match=r"of = \[3\]: expected a list of names"):
         model.jacobian([0.0], [3])  # type: ignore[list-item]
     with pytest.raises(SceneError, match=r"q\[0\] = nan"):
         model.poses(np.array([np.nan]), "a")

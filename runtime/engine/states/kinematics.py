@@ -65,7 +65,7 @@ class Kinematics:
     def call(self, kind: str, of: Names) -> Call:
         """The call on one state, q (nq,) or q and u (nu,), that answers "places", "poses",
         "velocities", "jacobian" or "jacobian_rate" of bodies or ends."""
-        key = of if isinstance(of, str) else tuple(of)
+        key = of if isinstance(of, str) else texts_of("of", of, "rod1.tip")
         found = self._calls.get((kind, key))
         if found is None:
             found = self._calls[kind, key] = self._prepared(kind, key)

@@ -3,9 +3,8 @@
 The explicit one follows the fastest motion of the scene whatever the tolerance, and vibration that
 is excited ever more closely; the implicit one follows what of it counts for what is asked.  Which
 costs less shows in the motions at the start and in a first run: no run is made to compare the
-two.  The exponential one follows vibration exactly as
-long as nothing else changes much: a beam on one hinge that something shakes from the start is tried
-by it first, for a few steps.
+two.  The exponential one follows vibration exactly as long as nothing else changes much: a beam on
+one hinge that something shakes from the start is tried by it first, for a few steps.
 """
 
 from __future__ import annotations
