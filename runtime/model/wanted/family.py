@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 #: which it rises for smaller ones: where the motions at the start are not known; and where they
 #: are, beside so many times the radians of vibration that counts.
 _LOOSE, _VIBRATING, _RISES = 1e-3, 700.0, 0.25
-_SMOOTH, _RISES_SMOOTH, _COUNTS = 500.0, 0.2, 6.0
+_SMOOTH, _RISES_SMOOTH, _COUNTS = 500.0, 0.16, 6.0
 
 #: Vibration is well above what is asked that is so many times that.
 _WELL = 3.0
@@ -45,11 +45,12 @@ _WELL = 3.0
 #: of higher order.
 _LOOSE_EXPLICIT, _LOW_ORDER = "dopri5", 1e-4
 
-#: The exponential method; for errors from this one on, and from this |lambda| T on, for an error of
-#: _LOOSE and a speed, with the power by which it rises; steps after which its first run is given
-#: up, and that number in |lambda| T.
+#: The exponential method; for errors from this one on; steps after which its first run is given up,
+#: and that number in |lambda| T.  It pays from this |lambda| T on, for an error of _LOOSE and a
+#: speed, with the power by which it rises, radians that explicit steps have to follow more closely
+#: counted so many times more.
 _EXPONENTIAL, _PAYS, _SHORT, _LONG = "exprb32", 1e-6, 15, 1 / 20
-_SWINGING, _RISES_SWINGING = 350.0, 0.1
+_SWINGING, _RISES_SWINGING, _FOLLOWING = 430.0, 0.05, 2.0
 
 #: The part of a run's steps that counts when stability has set them.
 _PART = 0.1
@@ -150,7 +151,8 @@ class Family:
         try:
             self._fast = vibration(model, settings.t_start, q, u, self._span, _SMOOTH)
             swinging = self._rising(_SWINGING, _RISES_SWINGING) * model.nu
-            if self._lasts > swinging and error >= _PAYS:
+            followed = self._lasts + _FOLLOWING * self.radians
+            if followed > swinging and error >= _PAYS:
                 self._tried = shaken(model, settings.t_start, q, u)
         except MstmmError:  # a scene without tangent, or a start that the run itself will blame
             pass
