@@ -34,9 +34,10 @@ if TYPE_CHECKING:
 
 #: |lambda| T from which the first run is an implicit one, for an error of _LOOSE, and the power by
 #: which it rises for smaller ones: where the motions at the start are not known; and where they
-#: are, beside so many times the radians of vibration that counts.
+#: are, beside so many times the radians of vibration that counts, which rises with the order of
+#: implicit steps.
 _LOOSE, _VIBRATING, _RISES = 1e-3, 700.0, 0.25
-_SMOOTH, _RISES_SMOOTH, _COUNTS = 500.0, 0.16, 6.0
+_SMOOTH, _RISES_SMOOTH, _COUNTS, _RISES_COUNTED = 500.0, 0.16, 6.0, 1 / 6
 
 #: Vibration is well above what is asked that is so many times that.
 _WELL = 3.0
@@ -173,10 +174,10 @@ class Family:
 
     @property
     def radians(self) -> float:
-        """Those of vibration that is well above what is asked, where the motions at the start are
-        known; else 0."""
+        """Those of vibration that is well above what is asked, as far as that demands short steps,
+        where the motions at the start are known; else 0."""
         fast = self._fast
-        return fast.radians(_WELL * self._error) if fast is not None and fast.known else 0.0
+        return fast.demanding(_WELL * self._error) if fast is not None and fast.known else 0.0
 
     def calm(self, run: Trajectory) -> bool:
         """Whether the motions that steps of a run have left behind are below what is asked."""
@@ -195,7 +196,8 @@ class Family:
         """|lambda| T from which implicit steps cost less."""
         if self._fast is None or not self._fast.known:
             return self._rising(_VIBRATING, _RISES)
-        return self._rising(_SMOOTH, _RISES_SMOOTH) + _COUNTS * self._fast.radians(self._error)
+        counted = self._rising(_COUNTS, _RISES_COUNTED) * self._fast.radians(self._error)
+        return self._rising(_SMOOTH, _RISES_SMOOTH) + counted
 
     def _rising(self, at_loose: float, power: float) -> float:
         return at_loose * (_LOOSE / self._error) ** power

@@ -29,6 +29,8 @@ _FEW = 64
 #: Motions of fewer radians over a run are those that are wanted.
 _SLOW = 10.0
 
+#: Motions are far above what is asked by so many times it; the power at which others count less.
+_FAR, _EASES = 100.0, 0.7
 
 #: Radians a step, from which on explicit steps do not follow a motion.
 _LEFT = 2.0
@@ -62,6 +64,12 @@ class Vibration:
         """Radians of the motion that takes most of them until none is above `asked`."""
         return self._until(self.parts, asked)
 
+    def demanding(self, asked: float) -> float:
+        """The same, of motions that are not far above `asked` less: their phase may err by more."""
+        return self._until(
+            self.parts, asked, np.minimum(self.parts / (_FAR * asked), 1.0) ** _EASES
+        )
+
     def speeding(self, asked: float) -> float:
         """The same by speeds."""
         return self._until(self.speeds, asked)
@@ -71,14 +79,15 @@ class Vibration:
         none."""
         return float(self.parts[self.rates * self.span > _LEFT * steps].max(initial=0.0))
 
-    def _until(self, sizes: Array, asked: float) -> float:
+    def _until(self, sizes: Array, asked: float, weights: Array | float = 1.0) -> float:
         if not len(self.rates):
             return self.rate * self.span
         seen = sizes > asked
         whole = self.rates[seen] * self.span
         with np.errstate(divide="ignore"):
             lasting = np.log(sizes[seen] / asked) / self.dampings[seen]
-        return float(np.minimum(lasting, whole).max(initial=0.0))
+        counted = np.minimum(lasting, whole) * np.broadcast_to(weights, sizes.shape)[seen]
+        return float(counted.max(initial=0.0))
 
 
 def vibration(model: Compiled, t: float, q: Array, u: Array, span: float, few: float) -> Vibration:
