@@ -194,9 +194,8 @@ def test_scenes_without_a_matrix_are_named(change: Any, named: str) -> None:
 
 
 def test_an_unknown_sweep_is_named() -> None:
-    with pytest.raises(
-        mstmm.SceneError, match='sweep "plain" is not known; there are: riccati, refined, qr, product'
-    ):
+    there_are = 'sweep "plain" is not known; there are: riccati, refined, qr, product'
+    with pytest.raises(mstmm.SceneError, match=there_are):
         compiled(chain(["pin"]), sweep="plain")
 
 
