@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from ..runtime.pack.system import System
 
 #: More bodies (ends and sections of flexible bodies count) than this are not fused unless the user
-#: asks for it: compilers take seconds, while the advantage shrinks.
+#: asks for it: compilers take seconds (4.5 s of CPU for 50 pins, 10 for 100).
 MOST_BODIES = 64
 #: More than this are not fused at all: 400 pins take 22 s of CPU.
 MOST_ASKED = 400

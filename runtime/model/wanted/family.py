@@ -70,9 +70,6 @@ _STABLE, _FOLLOWED, _AT, _SLOWLY = 4.0, 0.8, 1e-7, 9.0
 #: Explicit runs behind others, which tell little of them, are as many.
 _ANEW = 2.0
 
-#: Radians that explicit steps follow a motion by.
-_RAD = 2.0
-
 #: A step in explicit ones; the order at which the number of exponential ones grows.
 _STEP, _ORDER = {Kind.IMPLICIT: 2.0, Kind.EXPONENTIAL: 3.0}, 3.0
 
@@ -169,22 +166,26 @@ class Family:
 
     def leaves(self, run: Trajectory) -> bool:
         """Whether explicit steps of a run do not follow the fastest motion, which is known."""
-        known = self._fast is not None and self._fast.known
-        return known and run.statistics is not None and _RAD * run.statistics.steps < self._lasts
+        known, counted = self._known, run.statistics
+        return known is not None and counted is not None and known.outruns(counted.steps)
 
     @property
     def radians(self) -> float:
         """Those of vibration that is well above what is asked, as far as that demands short steps,
         where the motions at the start are known; else 0."""
-        fast = self._fast
-        return fast.demanding(_WELL * self._error) if fast is not None and fast.known else 0.0
+        return 0.0 if self._known is None else self._known.demanding(_WELL * self._error)
 
     def calm(self, run: Trajectory) -> bool:
         """Whether the motions that steps of a run have left behind are below what is asked."""
-        fast, counted = self._fast, run.statistics
-        if fast is None or not fast.known or counted is None:
+        known, counted = self._known, run.statistics
+        if known is None or counted is None:
             return False
-        return 0.0 < fast.left_behind(counted.steps) < self._error
+        return 0.0 < known.left_behind(counted.steps) < self._error
+
+    @property
+    def _known(self) -> Vibration | None:
+        """The motions at the start, where more than their rate is known."""
+        return self._fast if self._fast is not None and self._fast.known else None
 
     @property
     def _lasts(self) -> float:
@@ -194,9 +195,9 @@ class Family:
     @property
     def _many(self) -> float:
         """|lambda| T from which implicit steps cost less."""
-        if self._fast is None or not self._fast.known:
+        if self._known is None:
             return self._rising(_VIBRATING, _RISES)
-        counted = self._rising(_COUNTS, _RISES_COUNTED) * self._fast.radians(self._error)
+        counted = self._rising(_COUNTS, _RISES_COUNTED) * self._known.radians(self._error)
         return self._rising(_SMOOTH, _RISES_SMOOTH) + counted
 
     def _rising(self, at_loose: float, power: float) -> float:
@@ -244,10 +245,8 @@ class Family:
             return most
         few = int(_SHORT + _LONG * self._lasts)
         if kind is Kind.EXPLICIT:
-            known = self._fast is not None and self._fast.known
-            few = (
-                max(_PILOT, int(_ANEW * self._explicit_steps(self._error, ()))) if known else _PILOT
-            )
+            foreseen = 0.0 if self._known is None else self._explicit_steps(self._error, ())
+            few = max(_PILOT, int(_ANEW * foreseen))
         return min(most or few, few)
 
     def rescues(self, lost: Trajectory) -> bool:

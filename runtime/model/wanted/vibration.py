@@ -74,6 +74,10 @@ class Vibration:
         """The same by speeds."""
         return self._until(self.speeds, asked)
 
+    def outruns(self, steps: int) -> bool:
+        """Whether so many steps over the run do not follow the fastest motion."""
+        return self.rate * self.span > _LEFT * steps
+
     def left_behind(self, steps: int) -> float:
         """The largest amplitude of motions that so many steps over the run do not follow; 0 for
         none."""
