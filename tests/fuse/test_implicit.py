@@ -181,7 +181,7 @@ def test_a_choice_among_methods_takes_the_code_once_it_steps_implicitly() -> Non
 def test_without_a_compiler_the_looped_engine_serves(monkeypatch: pytest.MonkeyPatch) -> None:
     model = mstmm.compile(mstmm.Scene(**arm(4)), engine="fused")
 
-    def fails(*_: object) -> None:
+    def fails(*_: object, known: object = None) -> None:
         raise EnvironmentFailure("no compiler")
 
     monkeypatch.setattr("mstmm.bridge.fusion.opened", fails)
