@@ -33,16 +33,11 @@ cd "$scratch/checkout"
 sanitized() {
     LD_PRELOAD="$(gcc -print-file-name=libasan.so) $(gcc -print-file-name=libstdc++.so.6)" "$VENV/bin/python" -m "$@"
 }
-# in two halves, side by side
-sanitized pytest -q -p no:cacheprovider tests/run tests/result tests/loops tests/flexible/test_engines.py \
+sanitized pytest -q -n logical --dist loadfile -p no:cacheprovider \
+    tests/run tests/result tests/loops tests/flexible/test_engines.py \
     tests/linear/test_response.py tests/linear/test_modes.py tests/linear/test_damping.py tests/linear/test_exact.py \
-    >"$scratch/half" 2>&1 & half=$!
-failed=0
-sanitized pytest -q -p no:cacheprovider tests/bridge/test_kernels.py tests/classical tests/integrate tests/breaks tests/model \
-    tests/engine/test_jacobian.py tests/engine/test_tangent.py tests/engine/test_culprit.py || failed=1
-wait "$half" || failed=1
-cat "$scratch/half"
-[ "$failed" -eq 0 ]
+    tests/bridge/test_kernels.py tests/classical tests/integrate tests/breaks tests/model \
+    tests/engine/test_jacobian.py tests/engine/test_tangent.py tests/engine/test_culprit.py
 
 echo "--- changed scenes, sanitized"
 sanitized tests.fuzz \
