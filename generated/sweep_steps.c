@@ -1816,6 +1816,12 @@ static int mstmm_at_answered(mstmm_state *state, int index)
         for (int j = 0; j < n; j++)
             (state->udot + modal->u)[j] = (modes + MSTMM_MODES_ETADD(n))[j];
     }
+    if (body->modal && state->refined) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        for (int j = 0; j < n; j++)
+            (state->udot + modal->u)[j] += (state->given + modal->u)[j];
+    }
     if (body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);

@@ -235,6 +235,7 @@ _MODES_ANSWERED = (
         steps=(call("modal.row_answered", Y="bent.y", x="bent.x", etadd="modes.etadd"),),
     ),
     Copy(to="modes.udot", source="modes.etadd"),
+    Add(to="modes.udot", source="modes.given", when="refined"),
 )
 
 _ACROSS = {"H": "hinge.H_free", "G": "hinge.G"}

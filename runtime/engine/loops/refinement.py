@@ -30,8 +30,6 @@ def refinements(engine: Engine, q: Array, u: Array, mobility: int) -> int:
     Raises NumericalFailure where they do not.
     """
     model = engine.packed.model
-    if engine.packed.flexible and engine.packed.system.closes:
-        return 0  # what modes leave over there is not answered
     efforts = np.random.default_rng(0).uniform(-1.0, 1.0, (2, engine.nu))
     efforts[0] = 0.0
     memory = engine.start_memory()

@@ -38,9 +38,7 @@ def refuse_bending(packed: Packed, what: str) -> None:
 
 
 def refuse_of_speeds(packed: Packed, method: str) -> None:
-    """SceneError for rows of speeds and for flexible bodies in loops, whose ends a method on
-    positions cannot close yet."""
-    refuse_bending(packed, f'method "{method}"')
+    """SceneError for rows of speeds, which a method on positions does not meet."""
     scene = packed.described
     names = [f'coupling "{one.name}"' for one in scene.coupling if one.speeds is not None]
     names += [f'constraint "{one.name}"' for one in scene.constraint if one.type == ROLLING]
