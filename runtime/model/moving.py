@@ -75,8 +75,10 @@ class Moving(Compiled):
         if alone is not None:
             return into(out, alone)
         lead, (states,) = batch(("q", q, self.nq))
-        rows = [self._kinematics.jacobian(of, state) for state in states]
-        return into(out, self._shaped(lead, of, np.array(rows)))
+        found = self._kinematics.each("jacobian", of, states)
+        if found is None:
+            found = np.array([self._kinematics.jacobian(of, state) for state in states])
+        return into(out, self._shaped(lead, of, found))
 
     def jacobian_rate(
         self, q: ArrayLike, u: ArrayLike, of: Names, *, out: Array | None = None
@@ -87,12 +89,13 @@ class Moving(Compiled):
         if alone is not None:
             return into(out, alone)
         lead, (states, speeds) = batch(("q", q, self.nq), ("u", u, self.nu))
-        turning = [self._turning(*one_state) for one_state in zip(states, speeds, strict=True)]
-        rows = [
-            self._kinematics.jacobian_rate(of, *given)
-            for given in zip(states, speeds, turning, strict=True)
-        ]
-        return into(out, self._shaped(lead, of, np.array(rows)))
+        found = self._kinematics.each("jacobian_rate", of, states, speeds)
+        if found is None:
+            found = np.array([
+                self._kinematics.jacobian_rate(of, *given, self._turning(*given))
+                for given in zip(states, speeds, strict=True)
+            ])  # fmt: skip
+        return into(out, self._shaped(lead, of, found))
 
     def energy(
         self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0, *, out: Array | None = None

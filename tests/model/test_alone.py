@@ -74,6 +74,10 @@ def test_points_and_sums_alone_are_those_among_others() -> None:
             found, many = call(*at, of), call(*(row[None] for row in at), of)[0]
             assert found.shape == many.shape
             assert np.allclose(found, many, rtol=1e-12, atol=1e-14), (call, of)
+        general = one._kinematics.jacobian(of, q)
+        rate = one._kinematics.jacobian_rate(of, q, u, one._turning(q, u))
+        for alone, found in ((one.jacobian(q, of), general), (one.jacobian_rate(q, u, of), rate)):
+            assert np.allclose(alone, found.reshape(alone.shape), rtol=1e-12, atol=1e-14), of
     for call, *at in ((one.energy, q, u, 0.7), (one.momentum, q, u, 0.7)):
         found, many = call(*at), call(q[None], u[None], 0.7)[0]
         assert found.shape == many.shape and np.array_equal(found, many), call
@@ -81,6 +85,21 @@ def test_points_and_sums_alone_are_those_among_others() -> None:
     assert np.allclose(
         one.integrate(turned, u, 0.2), one.integrate([turned], u, 0.2)[0], rtol=1e-14
     )
+
+
+def test_jacobians_of_several_states_are_those_of_each() -> None:
+    one, (q, u, *_) = model("looped"), state(7)
+    states, speeds = q * np.array([[[1.0]], [[2.0]], [[-1.0]]]), u + np.arange(2.0)[:, None]
+    for of in ("d.tip", ["d.tip", "a", "ground"]):
+        found, rates = one.jacobian(states, of), one.jacobian_rate(states, speeds, of)
+        assert rates.shape == (3, 2, *one.jacobian(q, of).shape)
+        for at in np.ndindex(3, 2):
+            assert np.array_equal(found[at[0], 0], one.jacobian(states[at[0], 0], of))
+            each = one.jacobian_rate(states[at[0], 0], speeds[at[1]], of)
+            assert np.array_equal(rates[at], each)
+        assert one.jacobian(states[:0, 0], of).shape == (0, *one.jacobian(q, of).shape)
+        nowhere = one.jacobian_rate(states[:0, 0], speeds[:1][:0], of)
+        assert nowhere.shape == (0, *one.jacobian(q, of).shape)
 
 
 def test_large_scenes_let_other_threads_run() -> None:

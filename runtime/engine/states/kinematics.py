@@ -71,6 +71,19 @@ class Kinematics:
             found = self._calls[kind, key] = self._prepared(kind, key)
         return found
 
+    def each(self, kind: str, of: Names, *states: Array) -> Array | None:
+        """(n, k, 6, nu): what `call` answers of Jacobians for rows of states, one behind the other;
+        None where it leaves one to the general way."""
+        call = self.call(kind, of)
+        answers = []
+        for given in zip(*states, strict=True):
+            answer = call(*given)
+            if answer is None:
+                return None
+            answers.append(answer)
+        shape = (self._probes(of)[1], *_SHAPES[kind][1], self._engine.nu)
+        return np.array(answers).reshape(len(states[0]), *shape)
+
     def _prepared(self, kind: str, of: Names) -> Call:
         engine, (probes, count) = self._engine, self._probes(of)
         by_speeds = kind.startswith("jacobian")
