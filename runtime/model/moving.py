@@ -75,9 +75,7 @@ class Moving(Compiled):
         if alone is not None:
             return into(out, alone)
         lead, (states,) = batch(("q", q, self.nq))
-        found = self._kinematics.each("jacobian", of, states)
-        if found is None:
-            found = np.array([self._kinematics.jacobian(of, state) for state in states])
+        found = self._kinematics.each("jacobian", of, self._kinematics.jacobian, states)
         return into(out, self._shaped(lead, of, found))
 
     def jacobian_rate(
@@ -89,13 +87,12 @@ class Moving(Compiled):
         if alone is not None:
             return into(out, alone)
         lead, (states, speeds) = batch(("q", q, self.nq), ("u", u, self.nu))
-        found = self._kinematics.each("jacobian_rate", of, states, speeds)
-        if found is None:
-            found = np.array([
-                self._kinematics.jacobian_rate(of, *given, self._turning(*given))
-                for given in zip(states, speeds, strict=True)
-            ])  # fmt: skip
+        found = self._kinematics.each("jacobian_rate", of, self._jacobian_rate, states, speeds)
         return into(out, self._shaped(lead, of, found))
+
+    def _jacobian_rate(self, of: Names, q: Array, u: Array) -> Array:
+        """The same of one state, (k, 6, nu)."""
+        return self._kinematics.jacobian_rate(of, q, u, self._turning(q, u))
 
     def energy(
         self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0, *, out: Array | None = None

@@ -74,8 +74,7 @@ def test_points_and_sums_alone_are_those_among_others() -> None:
             found, many = call(*at, of), call(*(row[None] for row in at), of)[0]
             assert found.shape == many.shape
             assert np.allclose(found, many, rtol=1e-12, atol=1e-14), (call, of)
-        general = one._kinematics.jacobian(of, q)
-        rate = one._kinematics.jacobian_rate(of, q, u, one._turning(q, u))
+        general, rate = one._kinematics.jacobian(of, q), one._jacobian_rate(of, q, u)
         for alone, found in ((one.jacobian(q, of), general), (one.jacobian_rate(q, u, of), rate)):
             assert np.allclose(alone, found.reshape(alone.shape), rtol=1e-12, atol=1e-14), of
     for call, *at in ((one.energy, q, u, 0.7), (one.momentum, q, u, 0.7)):
@@ -98,7 +97,7 @@ def test_jacobians_of_several_states_are_those_of_each() -> None:
             each = one.jacobian_rate(states[at[0], 0], speeds[at[1]], of)
             assert np.array_equal(rates[at], each)
         assert one.jacobian(states[:0, 0], of).shape == (0, *one.jacobian(q, of).shape)
-        nowhere = one.jacobian_rate(states[:0, 0], speeds[:1][:0], of)
+        nowhere = one.jacobian_rate(states[:0, 0], speeds[:0], of)
         assert nowhere.shape == (0, *one.jacobian(q, of).shape)
 
 
@@ -118,6 +117,8 @@ def test_large_scenes_let_other_threads_run() -> None:
     asked = np.ones(one.nu)
     assert np.array_equal(one.inverse_dynamics(q, u, asked), one.inverse_dynamics([q], u, asked)[0])
     assert np.array_equal(one.jacobian(q, "r9"), one.jacobian(q[None], "r9")[0])
+    for found in (one.jacobian(q[None][:0], "r9"), one.jacobian_rate(q[None][:0], u, "r9")):
+        assert found.shape == (0, 6, one.nu)
 
 
 def test_the_mass_matrix_gives_what_inverse_dynamics_asks() -> None:

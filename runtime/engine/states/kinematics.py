@@ -71,18 +71,15 @@ class Kinematics:
             found = self._calls[kind, key] = self._prepared(kind, key)
         return found
 
-    def each(self, kind: str, of: Names, *states: Array) -> Array | None:
-        """(n, k, 6, nu): what `call` answers of Jacobians for rows of states, one behind the other;
-        None where it leaves one to the general way."""
-        call = self.call(kind, of)
-        answers = []
-        for given in zip(*states, strict=True):
+    def each(self, kind: str, of: Names, general: Callable[..., Array], *states: Array) -> Array:
+        """(n, k, 6, nu): "jacobian" or "jacobian_rate" at rows of states, by `call`, and by
+        `general` (of, row, ...) where that leaves it to the general way."""
+        call, count = self.call(kind, of), self._probes(of)[1]
+        found = np.empty((len(states[0]), count, 6, self._engine.nu))
+        for place, given in zip(found, zip(*states, strict=True), strict=True):
             answer = call(*given)
-            if answer is None:
-                return None
-            answers.append(answer)
-        shape = (self._probes(of)[1], *_SHAPES[kind][1], self._engine.nu)
-        return np.array(answers).reshape(len(states[0]), *shape)
+            place[:] = general(of, *given) if answer is None else answer
+        return found
 
     def _prepared(self, kind: str, of: Names) -> Call:
         engine, (probes, count) = self._engine, self._probes(of)

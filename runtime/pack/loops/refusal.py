@@ -30,13 +30,6 @@ def refuse(packed: Packed, what: str, instead: str) -> None:
     )
 
 
-def refuse_bending(packed: Packed, what: str) -> None:
-    """SceneError where loops are closed in a scene with flexible bodies, which `what` cannot follow
-    yet."""
-    if packed.flexible:
-        refuse(packed, f"{what} with flexible bodies", INSTEAD)
-
-
 def refuse_of_speeds(packed: Packed, method: str) -> None:
     """SceneError for rows of speeds, which a method on positions does not meet."""
     scene = packed.described
@@ -52,7 +45,8 @@ def refuse_of_speeds(packed: Packed, method: str) -> None:
 def refuse_beyond_hinges(packed: Packed, what: str) -> None:
     """SceneError where more than hinges of rigid bodies closes loops, which `what` cannot follow
     yet."""
-    refuse_bending(packed, what)
+    if packed.flexible:
+        refuse(packed, f"{what} with flexible bodies", INSTEAD)
     scene = packed.described
     names = [f'coupling "{one.name}"' for one in scene.coupling]
     names += [f'constraint "{one.name}"' for one in scene.constraint]

@@ -2,38 +2,58 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import mstmm
+from mstmm.arrays import Array
 
 from .test_against_tree import SCENES
+from .test_constraints import ROWS, bladed
 
 #: Mass per length, length and bending stiffness of a beam; gravity so weak that its end stays.
 HEAVY, LENGTH, STIFF, WEIGHT = 1.5, 1.2, 40.0, 0.01
 
 
+def errors(model: mstmm.Model, method: str, end: float, steps: int) -> Array:
+    """Of q and of u, the largest at ends of steps, beside DOP853, which closes loops behind its."""
+    at: dict[str, Any] = {"rtol": 1e-11, "atol": 1e-12, "output_times": np.linspace(0.0, end, 11)}
+    exact, run = model.simulate(end, **at), model.simulate(end, method, step=end / steps, **at)
+    assert run.success, run.message
+    closure = run.certificate.closure
+    assert closure is not None and closure.gap < 1e-13
+    return np.array([np.abs(run.q - exact.q).max(), np.abs(run.u - exact.u).max()])
+
+
+@pytest.mark.parametrize("method", ["genalpha-index3", "hht-index3"])
 @pytest.mark.parametrize("name", sorted(SCENES))
-def test_order_and_no_gap(name: str) -> None:
-    """Against a run by DOP853, whose loops are closed behind its steps."""
+def test_order_and_no_gap(name: str, method: str) -> None:
     model = mstmm.compile(mstmm.Scene(**SCENES[name][0]()), engine="looped")
-    end = 0.1
-    exact = model.simulate(end, rtol=1e-11, atol=1e-12, output_times=[0.0, end])
-    errors = []
-    for steps in (1600, 3200):  # the shapes vibrate
-        run = model.simulate(
-            end, "genalpha-index3", step=end / steps, rtol=1e-11, atol=1e-12,
-            output_times=[0.0, end],
-        )  # fmt: skip
-        assert run.success, run.message
-        closure = run.certificate.closure
-        assert closure is not None and closure.gap < 1e-14
-        errors.append([
-            np.abs(run.q[-1] - exact.q[-1]).max(), np.abs(run.u[-1] - exact.u[-1]).max()
-        ])  # fmt: skip
-    orders = np.log2(np.array(errors[0]) / errors[1])
-    print(name, errors, orders)
-    assert orders.min() > 1.8 and orders[0] < 2.2
+    coarse, fine = (errors(model, method, 0.1, steps) for steps in (1600, 3200))
+    print(name, coarse, fine, np.log2(coarse / fine))
+    assert np.abs(np.log2(coarse / fine) - 2).max() < 0.1 and fine[0] < 1e-5
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_constraints_and_couplings(name: str) -> None:
+    closing, ring, _ = ROWS[name]
+    model = bladed(ring, **closing)
+    coarse, fine = (errors(model, "genalpha-index3", 0.2, steps) for steps in (400, 800))
+    print(name, coarse, fine, np.log2(coarse / fine))
+    assert np.abs(np.log2(coarse / fine) - 2).max() < 0.1 and fine[0] < 1e-4
+
+
+def test_fused_code_does_as_looped() -> None:
+    scene = mstmm.Scene(**SCENES["slider_crank"][0]())
+    runs = [
+        mstmm.compile(scene, engine=engine).simulate(0.01, "genalpha-index3", step=1e-4)
+        for engine in ("looped", "fused")
+    ]
+    assert runs[1].success, runs[1].message
+    for one, other in ((runs[0].q, runs[1].q), (runs[0].u, runs[1].u)):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-9)
 
 
 def test_a_beam_that_slides_rings_as_its_shape_alone() -> None:
