@@ -50,6 +50,17 @@ def chain(count: int, kind: str = "pin", skew: float = 0.0, **of_rods: Any) -> d
     }  # fmt: skip
 
 
+def row_of(masses: Sequence[float]) -> dict[str, Any]:
+    """Rods of 1 m of these masses on parallel pins in a row; gravity along -y."""
+    hinges = [
+        {"name": f"pin{i}", "type": "pin", "outboard": f"rod{i}",
+         "inboard": f"rod{i - 1}.tip" if i else "ground"}
+        for i in range(len(masses))
+    ]  # fmt: skip
+    bodies = [rod(f"rod{i}", mass=mass) for i, mass in enumerate(masses)]
+    return {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges}
+
+
 def drawn_pins(count: int) -> list[tuple[Array, Array]]:
     """Three states of pins, angles and rates within +-1, the same in every run."""
     rng = np.random.default_rng(1)
@@ -149,13 +160,36 @@ def parallelogram(angle: float, closed: bool = True) -> dict[str, Any]:
         ("heel", "ground", "rocker", angle, {"position": [1, 0, 0]}),
         ("top", "coupler.tip", "rocker.tip", 0.0, {"cut": True}),
     )
+    return _of_three_rods(pins[: 4 if closed else 3])
+
+
+def _of_three_rods(pins: Sequence[tuple[str, str, str, float, dict[str, Any]]]) -> dict[str, Any]:
+    """Crank, coupler and rocker on pins: name, inboard, outboard, angle and what else they have."""
     hinges = [
         {"name": name, "type": "pin", "inboard": inboard, "outboard": outboard,
          "initial": {"q": [q]}} | more
-        for name, inboard, outboard, q, more in pins[: 4 if closed else 3]
+        for name, inboard, outboard, q, more in pins
     ]  # fmt: skip
     bodies = [rod(name) for name in ("crank", "coupler", "rocker")]
     return {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges}
+
+
+#: Angle by which the cranks of a hung linkage lean outwards, rad: its feet are 2 m apart.
+LEAN = np.pi / 6
+
+
+def hung_linkage(stiffness: float) -> dict[str, Any]:
+    """A coupler that hangs level from two cranks, all of 1 m and 1 kg; the first crank is held
+    where it is by a spring (N*m/rad)."""
+    down = -np.pi / 2
+    pins: tuple[tuple[str, str, str, float, dict[str, Any]], ...] = (
+        ("foot", "ground", "crank", down + LEAN, {"law": {"stiffness": stiffness,
+                                                          "rest": down + LEAN}}),
+        ("knee", "crank.tip", "coupler", -down - LEAN, {}),
+        ("heel", "ground", "rocker", down - LEAN, {"position": [2, 0, 0]}),
+        ("top", "coupler.tip", "rocker.tip", down - LEAN, {"cut": True}),
+    )  # fmt: skip
+    return _of_three_rods(pins)
 
 
 def held_row(masses: Sequence[float]) -> dict[str, Any]:

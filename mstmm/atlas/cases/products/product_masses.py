@@ -8,20 +8,14 @@ from typing import Any
 from ...definition import Definition, Method
 from ...measures import correction
 from ...scale import LOG
-from ...scenes import drawn_pins, model, rod
+from ...scenes import drawn_pins, model, row_of
 
 RODS = 8
 
 
 def _error(ratio: float, **options: Any) -> float:
-    bodies = [rod(f"rod{i}", mass=ratio**i) for i in range(RODS)]
-    hinges = [
-        {"name": f"pin{i}", "type": "pin", "outboard": f"rod{i}",
-         "inboard": f"rod{i - 1}.tip" if i else "ground"}
-        for i in range(RODS)
-    ]  # fmt: skip
-    scene = {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges}
-    return correction(model(scene, **options), drawn_pins(RODS))
+    row = model(row_of([ratio**i for i in range(RODS)]), **options)
+    return correction(row, drawn_pins(RODS))
 
 
 CASE = Definition(
