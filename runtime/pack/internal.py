@@ -28,8 +28,8 @@ from .letting_go import releasable
 from .loops.closures import closures_of
 from .loops.couplings import couplings_of
 from .loops.curves import elements_of
+from .loops.may_close import may_close
 from .loops.opened import opened
-from .loops.unknown import may_close, refuse_beside_bending
 from .merge.carried import Carried, carried_in, contracted
 from .merge.simplification import NOTHING, TURNS, WELDS, Simplification, Words
 from .merge.turns import with_exact_turns
@@ -51,7 +51,6 @@ def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) 
 
     rigid = rigidified(scene, flexible or {})
     known = {name: body for name, body in (flexible or {}).items() if name not in rigid.one_way}
-    refuse_beside_bending(scene, rigid.one_way)
     nodes, cuts = opened(rigid.scene)
     bodies = modal_bodies(rigid.scene) if flexible is None else known
     expanded = expand(nodes, bodies, cuts)

@@ -92,7 +92,8 @@ def _made(
 ) -> ModalBody:
     chosen = choices(beam, data, held, idle)
     body = _of_choices(beam, data, held, chosen, idle)
-    definite = bool(beam.quadrature) or _stays_definite(body, held, support)
+    definite = bool(beam.quadrature) or beam.model == "one-way"  # whose inertia stays as it is
+    definite = definite or _stays_definite(body, held, support)
     if not definite and may_change_frame(beam, chosen):
         body = _of_choices(beam, data, held, in_the_mean(chosen), idle)
         definite = _stays_definite(body, held, support)

@@ -3,7 +3,8 @@ linear elastodynamics.
 
 A body whose `model` is "rigid" or "one-way" becomes a rigid body with the mass, mass centre,
 inertia and ends of the undeformed one.  Of a one-way body every end on which something acts becomes
-a massless body welded to it, "blade/tip": the load of that weld is all that acts there.
+a massless body welded to it, "blade/tip": the load of that weld is all that acts there.  Which
+hinges close loops is decided before that, for what holds a body would be a choice again.
 """
 
 from __future__ import annotations
@@ -19,11 +20,14 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.expression.expression import Expression, parse
 from mstmm.numbers.rotations import Matrix, to_quaternion
-from mstmm.scene import Body, Bushing, End, Hinge, Load, Scene, Spring, split
+from mstmm.scene import Body, Bushing, Constraint, End, Hinge, Load, Scene, Spring, split
+from mstmm.scene.checks.topology import build, holders
 from mstmm.scene.tables.rigid import rigid_beam
 
 from ...flexible.modal_body import ModalBody
 from ...flexible.modal_port import ModalPort
+from ..loops.may_close import may_close
+from .passed import in_loops, refuse_moving_ends
 
 if TYPE_CHECKING:
     from mstmm.scene.tables.beam import Beam
@@ -31,7 +35,7 @@ if TYPE_CHECKING:
 
     from ...flexible.elastic.ports import Port
 
-Force = TypeVar("Force", Spring, Bushing)
+Joining = TypeVar("Joining", Spring, Bushing, Constraint)
 
 #: What `compile(flexibility=)` takes, and the `model` it gives every flexible body.
 LEVELS = {"coupled": "flexible", "one-way": "one-way", "rigid": "rigid"}
@@ -45,12 +49,16 @@ class Rigidified:
         nodes: "blade.tip" -> the body welded there, "blade/tip".
         one_way: the modal bodies of those that respond one way.
         held: the end by which each of them is held.
+        holders: the hinge of the tree that holds each of them.
+        looped: names of the hinges around closed loops.
     """
 
     scene: Scene
     nodes: dict[str, str] = field(default_factory=dict)
     one_way: dict[str, ModalBody] = field(default_factory=dict)
     held: dict[str, str] = field(default_factory=dict)
+    holders: dict[str, Hinge] = field(default_factory=dict)
+    looped: frozenset[str] = frozenset()
 
 
 def with_level(scene: Scene, flexibility: str | None) -> Scene:
@@ -78,7 +86,8 @@ def rigidified(
 
     `known` are the modal bodies that need not be computed.
 
-    SceneError for a viscous drag, which rigid bodies do not have.
+    SceneError for a viscous drag, which rigid bodies do not have, and for shapes of a one-way body
+    that open a loop.
     """
     stiff: list[Beam | Elastic] = [b for b in scene.beam if b.model != "flexible"]
     stiff += [b for b in scene.elastic if b.model != "flexible"]
@@ -95,12 +104,19 @@ class _Rigidifying:
         self.scene, self.stiff = scene, {body.name: body for body in stiff}
         self.known = known
         self.made = Rigidified(scene)
+        responds = any(body.model == "one-way" for body in stiff)
+        self.held = holders(scene) if responds else {}
+        self.cut = None
+        if responds and may_close(scene):
+            held = {hinge.name for hinge in self.held.values()}
+            self.cut = frozenset(hinge.name for hinge in scene.hinge) - held
         self.bodies: dict[str, Body] = {}
         self.welds: list[Hinge] = []
 
     def run(self) -> Rigidified:
         for name, body in self.stiff.items():
             self._body(name, body)
+        self._closed()
         scene, names = self.scene, self.stiff
         fields = {key: getattr(scene, key) for key in type(scene).model_fields}
         fields |= {
@@ -115,6 +131,7 @@ class _Rigidifying:
             "load": tuple(map(self._load, scene.load)),
             "spring": tuple(map(self._between, scene.spring)),
             "bushing": tuple(map(self._between, scene.bushing)),
+            "constraint": tuple(map(self._between, scene.constraint)),
         }  # fmt: skip
         self.made.scene = Scene.model_construct(**fields)
         return self.made
@@ -131,9 +148,10 @@ class _Rigidifying:
         if modal is None:
             return
         self.made.one_way[name] = modal
-        self.made.held[name] = next(
-            (h.outboard_end for h in self.scene.hinge if h.outboard_body == name), next(iter(ends))
-        )
+        holder = self.held.get(name)
+        self.made.held[name] = next(iter(ends)) if holder is None else holder.outboard_end
+        if holder is not None:
+            self.made.holders[name] = holder
         used = dict.fromkeys(split(reference)[1] for reference in self._references(name))
         for end in (*used, *(load.name for load in self._spread(name))):
             self._weld(name, end)
@@ -147,6 +165,17 @@ class _Rigidifying:
         self.welds.append(weld.model_copy(update=update))
         self.made.nodes[f"{name}.{end}"] = node
 
+    def _closed(self) -> None:
+        """What loops pass, where one-way bodies are in the scene."""
+        plan = None if self.cut is None else build(self.scene.skeleton).plan
+        if plan is None:
+            return
+        elements = in_loops(self.scene, plan)
+        refuse_moving_ends(self.made.one_way, elements)
+        self.made.looped = frozenset(
+            one.name for one in elements if not isinstance(one, Constraint)
+        )
+
     # --- references -----------------------------------------------------------------------------
 
     def _references(self, name: str) -> Iterator[str]:
@@ -154,7 +183,9 @@ class _Rigidifying:
         references = [hinge.inboard for hinge in self.scene.hinge]
         references += [chain.inboard for chain in self.scene.chain]
         references += [load.on for load in self.scene.load if load.force_per_length is None]
-        references += [end for one in self.scene.forces for end in (one.from_, one.to)]
+        joined = (*self.scene.forces, *self.scene.constraint)
+        references += [end for one in joined for end in (one.from_, one.to)]
+        references += [one.outboard for one in self.scene.hinge if one.name in (self.cut or ())]
         yield from (reference for reference in references if split(reference)[0] == name)
 
     def _spread(self, name: str) -> list[Load]:
@@ -171,9 +202,14 @@ class _Rigidifying:
         return self.made.nodes.get(reference, reference)
 
     def _hinge(self, hinge: Hinge) -> Hinge:
-        return hinge.model_copy(update={"inboard": self._node(hinge.inboard)})
+        update: dict[str, object] = {"inboard": self._node(hinge.inboard)}
+        if self.cut is not None:
+            cut = hinge.name in self.cut
+            outboard = self._node(hinge.outboard) if cut else hinge.outboard
+            update |= {"cut": cut, "outboard": outboard}
+        return hinge.model_copy(update=update)
 
-    def _between(self, element: Force) -> Force:
+    def _between(self, element: Joining) -> Joining:
         ends = {"from_": self._node(element.from_), "to": self._node(element.to)}
         return element.model_copy(update=ends)
 

@@ -14,7 +14,7 @@ from mstmm.scene import Body, Constraint, End, Scene, split
 from mstmm.scene.checks.topology import build
 
 from .holding import holding
-from .unknown import may_close
+from .may_close import may_close
 
 
 @dataclass(frozen=True, slots=True)

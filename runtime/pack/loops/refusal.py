@@ -9,7 +9,7 @@ from mstmm.scene.checks.topology import build
 from mstmm.scene.tables.closures import ROLLING
 
 from ...integrate.steppers import EXPLICIT_METHODS, ON_POSITIONS
-from .unknown import named_loop
+from .may_close import named_loop
 
 if TYPE_CHECKING:
     from ..packed import Packed

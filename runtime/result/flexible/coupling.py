@@ -3,7 +3,8 @@
 With chi_i = M_ri^T D^-1 M_ri / M_ii, 0 to 1, the coupled frequency of a shape is
 omega_i / sqrt(1 - chi_i): whether the vibration's reaction on the hinge may be left out.  D is the
 inertia at the nearest hinge inboard that moves, with the hinges outboard of it free and all modes
-held; M_ii is the inertia of the shape with what it carries.
+held; M_ii is the inertia of the shape with what it carries.  Where loops close, D is the inertia of
+all independent motions of the hinges, and M that along speeds which keep the loops closed.
 """
 
 from __future__ import annotations
@@ -27,26 +28,54 @@ LARGEST = 300
 
 def couplings(flexible: FlexibleBodies) -> dict[str, Array]:
     """Body -> chi (modes,) at the start of the run; without bodies that no moving hinge carries.
-    Empty for scenes with more than LARGEST speeds, and for a start that has no inertia matrix, as
-    the run itself says."""
+    Empty for scenes with more than LARGEST speeds, loops in which shapes do not move by themselves,
+    and for a start that has no inertia matrix, as the run itself says."""
     if flexible.model.nu > LARGEST or not len(flexible.run.t):
         return {}
     model, q = flexible.coupled_start()
     try:
-        inertia = model.looped.mass_matrix(q)
+        return _in_loops(flexible, model, q) if model.freedom else _in_tree(flexible, model, q)
     except NumericalFailure:
         return {}
-    found, tree = dict[str, Array](), _Tree(model)
+
+
+def _in_tree(flexible: FlexibleBodies, model: Compiled, q: Array) -> dict[str, Array]:
+    inertia, tree, found = model.looped.mass_matrix(q), _Tree(model), dict[str, Array]()
     for name in flexible.known:
         own, others = tree.hinge_of(name)
-        if not own:
-            continue
-        modes = list(range(*_bounds(model.layout.modal[name].u_slice)))
-        try:
-            found[name] = _coupling_of(inertia, own, modes, others)
-        except np.linalg.LinAlgError:  # inertia that a hinge does not have: not known
-            continue
+        if own:
+            found |= _named(name, inertia, own, _modes(model, name), others)
     return found
+
+
+def _in_loops(flexible: FlexibleBodies, model: Compiled, q: Array) -> dict[str, Array]:
+    """By the motions that loops leave, of which every shape has to be one."""
+    assert model.freedom is not None
+    found, shapes = dict[str, Array](), {name: _modes(model, name) for name in flexible.known}
+    bent = [k for modes in shapes.values() for k in modes]
+    hinges, free = model.freedom.settling(q, bent, (), ())
+    if not hinges or {*free} != {*bent}:
+        return {}
+    places, own = (*hinges, *bent), list(range(len(hinges)))
+    ways = model.freedom.following(q, places)
+    inertia = np.asarray(model.looped.required_by_inertia(q, ways.T) @ ways)
+    for name, modes in shapes.items():
+        found |= _named(name, inertia, own, [places.index(k) for k in modes], [])
+    return found
+
+
+def _named(
+    name: str, inertia: Array, own: list[int], modes: list[int], others: list[int]
+) -> dict[str, Array]:
+    """Empty where a hinge has no inertia: not known."""
+    try:
+        return {name: _coupling_of(inertia, own, modes, others)}
+    except np.linalg.LinAlgError:
+        return {}
+
+
+def _modes(model: Compiled, name: str) -> list[int]:
+    return list(range(*_bounds(model.layout.modal[name].u_slice)))
 
 
 def _coupling_of(inertia: Array, own: list[int], modes: list[int], others: list[int]) -> Array:

@@ -3,26 +3,25 @@
 A small motion moves the point that is at r by a + psi x r (inertial axes) and turns what is there
 by psi.  Hinges pass it on as it is, for their coordinates are those of the rigid run; a flexible
 body adds that of its section on the way out, less that of the section by which it is held, as far
-as the hinge there holds it.
+as the hinge there holds it.  A hinge that is part of a closed loop passes nothing on: it turns by
+what the section turns, and the section does not move otherwise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.scene import split
-from mstmm.scene.tables.hinge_frames import start_motion
 
+from ...pack.flexible.held_turns import held_turns
 from .response import Response, rigidity, split_node
 
 if TYPE_CHECKING:
-    from mstmm.scene import Hinge
-
     from ...engine.compiled import Compiled
     from ...flexible.modal_port import ModalPort
     from ..observed import Observed
@@ -75,9 +74,9 @@ class Superposition:
         self.model, self.rigid, self.responses = model, rigid, responses
         self.known = rigidity(model)
         packed = rigid.engine.packed
-        self.parents = packed.topology.parents
-        self.names = packed.scene.bodies
-        self.order = packed.topology.order
+        self.topology, self.hinges = packed.topology, packed.scene.hinges
+        self.names, self.order = packed.scene.bodies, packed.topology.order
+        self.ends = frozenset(self.known.nodes.values())
         self._sections: dict[tuple[str, str], SmallMotion] = {}
         self._held: dict[str, SmallMotion] = {}
 
@@ -94,16 +93,18 @@ class Superposition:
         body, end = split(reference)
         found: SmallMotion | None = None
         exit_ = end if body in self.responses else ""
+        passes = True
         while place >= 0:
             name = self.names.name(self.order[place])
-            if "/" in name and split_node(name)[0] in self.responses:
+            if name in self.ends and passes:
                 exit_ = split_node(name)[1]
             if name in self.responses:
                 here = -self.held(name)
                 if exit_:
                     here = here + self.section(name, exit_)
                 found, exit_ = here if found is None else found + here, ""
-            place = self.parents[place]
+            passes = self.hinges.name(self.topology.at(place)[1]) not in self.known.looped
+            place = self.topology.parents[place]
         return found
 
     def section(self, name: str, end: str) -> SmallMotion:
@@ -129,36 +130,13 @@ class Superposition:
 
     def _constrained(self, name: str) -> SmallMotion:
         end = self.known.held[name]
-        port, hinge = self.known.one_way[name].ports[end], self._holder(name)
-        shift, turn = port.phi, port.theta
+        port, hinge = self.known.one_way[name].ports[end], self.known.holders.get(name)
+        shift = port.phi
         if hinge is None or (hinge.facts is not None and hinge.facts.free_body):
             shift = np.zeros_like(shift)
-        turn = _not_free(hinge, np.asarray(port.rotation)) @ turn
-        return self._section(name, _with(port, shift, turn))
-
-    def _holder(self, name: str) -> Hinge | None:
-        return next((h for h in self.model.scene.hinge if h.outboard_body == name), None)
-
-
-def _with(port: ModalPort, phi: Array, theta: Array) -> ModalPort:
-    from dataclasses import replace
-
-    return replace(port, phi=phi, theta=theta)
-
-
-def _not_free(hinge: Hinge | None, rotation: Array) -> Array:
-    """(3, 3) projection of rotations, body axes, on those that a hinge holds."""
-    motions = None if hinge is None else start_motion(hinge)
-    if hinge is None or hinge.facts is None or motions is None:
-        return np.zeros((3, 3))
-    facts, driven = hinge.facts, hinge.drive is not None and None not in hinge.drive
-    if driven or not facts.turns:
-        return np.eye(3)
-    if len(facts.turns) > 1 or "q" in facts.varies[facts.turns[0]][3:]:
-        return np.zeros((3, 3))
-    axis = rotation @ np.array(motions[facts.turns[0]][1])
-    axis /= np.linalg.norm(axis)
-    return np.eye(3) - np.outer(axis, axis)
+        none = np.zeros((3, 3))
+        held = none if hinge is None else held_turns(hinge, port.rotation, unknown=none)
+        return self._section(name, replace(port, phi=shift, theta=held @ port.theta))
 
 
 def _origin(points: Array) -> Jet:

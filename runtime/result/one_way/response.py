@@ -19,7 +19,6 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 from mstmm.risk import RUN, Risk
-from mstmm.scene import split
 
 from ...flexible.kernel_inputs import moments_of
 from ...flexible.modal_kernels import kernel
@@ -191,12 +190,11 @@ def modal_loads(model: Compiled, body: ModalBody, observed: Observed) -> Array:
     }  # fmt: skip
     loads = -evaluate(kernel("residual"), given, body.n)["e_f"]
     held = rigid.held[body.name]
-    acting = [(held, _held_by(model, body.name), 1.0)]
+    holder = rigid.holders.get(body.name)
+    acting = [] if holder is None else [(held, holder.name, 1.0)]
     welds = [node for node in rigid.nodes.values() if split_node(node)[0] == body.name]
     acting += [(split_node(node)[1], node, -1.0) for node in welds]
     for end, hinge, sign in acting:
-        if hinge is None:
-            continue
         load = sign * observed.columns("loads", (packed.hinge_position[hinge],))
         port = body.ports[end]
         loads = loads + inward(load[:, :3]) @ port.phi + inward(load[:, 3:]) @ port.theta
@@ -214,11 +212,6 @@ def split_node(node: str) -> tuple[str, str]:
     """("blade", "tip") of "blade/tip"."""
     body, _, end = node.partition("/")
     return body, end
-
-
-def _held_by(model: Compiled, name: str) -> str | None:
-    hinges = model.scene.hinge
-    return next((h.name for h in hinges if split(h.outboard)[0] == name), None)
 
 
 def _response(

@@ -10,7 +10,6 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.risk import Risk
-from mstmm.scene import split
 
 from ...engine.compiled import Compiled
 from ...pack.flexible.rigidified import with_level
@@ -48,15 +47,15 @@ def _too_coupled(share: tuple[str, float]) -> Risk:
 
 def _let_go(model: Compiled) -> tuple[Risk, ...]:
     """Each one-way body whose hinge releases it."""
-    letting = set(releasable(model.scene))
-    holders = {split(h.outboard)[0]: h.name for h in model.scene.hinge if h.name in letting}
+    letting, rigid = set(releasable(model.scene)), rigidity(model)
+    holders = {body: h.name for body, h in rigid.holders.items() if h.name in letting}
     return tuple(
         Risk(
             "one-way-release", f'"{name}"',
             f'hinge "{holders[name]}" lets go of "{name}", whose response stays that of a held '
             "body", 'take flexibility = "coupled"',
         )
-        for name in rigidity(model).one_way
+        for name in rigid.one_way
         if name in holders
     )  # fmt: skip
 

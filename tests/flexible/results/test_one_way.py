@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from flexible import elastic_bar as bar
+from flexible.rigid_shapes import rigid_shapes
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.flexible.modal_body import ModalBody
 from mstmm.runtime.result.observed import Observed
 from mstmm.runtime.result.one_way.oscillators import Cells, Oscillators
 from mstmm.runtime.result.one_way.response import Response, modal_loads, rigidity
@@ -214,30 +214,6 @@ def test_one_body_of_two() -> None:
     assert np.allclose(found.position("first.tip"), found.position("second.root"), atol=1e-12)
     assert np.abs(moved).max() > 1e-3
     assert np.abs(found.deflection("second", "tip")).max() > 5e-4
-
-
-def rigid_shapes(body: ModalBody) -> ModalBody:
-    """The same body with its six rigid-body motions for shapes."""
-    eps = np.zeros((3, 3, 3))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        eps[i, j, k], eps[i, k, j] = 1.0, -1.0
-    none, unit = np.zeros((6, 6)), np.eye(3)
-    moved = np.einsum("a,bk->abk", body.first, unit)
-    turned = np.einsum("bkc,ac->abk", eps, body.second)
-    return replace(
-        body, modes=tuple("123456"), K=none, D=none, G=np.zeros((3, 6, 6)),
-        C=np.hstack([body.mass * unit, np.einsum("bkc,c->bk", eps, body.first)]),
-        E=np.concatenate([moved, turned], axis=2), F=np.zeros((3, 3, 6, 6)),
-        X=np.zeros((3, 3, 6, 6)),
-        ports={
-            name: replace(
-                port,
-                phi=np.hstack([unit, np.einsum("bkc,c->bk", eps, port.position)]),
-                theta=np.hstack([np.zeros((3, 3)), unit]),
-            )
-            for name, port in body.ports.items()
-        },
-    )  # fmt: skip
 
 
 def test_loads_are_in_balance() -> None:

@@ -265,6 +265,3 @@ def test_what_is_refused() -> None:
     model = mstmm.compile(mstmm.Scene(**scene))
     with pytest.raises(SceneError, match='hold: there is no hinge "bar"'):
         model.assemble(hold=["bar"])
-    scene["beam"][0]["model"] = "one-way"
-    with pytest.raises(SceneError, match='"bar": model: loops are closed'):
-        mstmm.compile(mstmm.Scene(**scene))

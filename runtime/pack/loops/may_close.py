@@ -1,11 +1,9 @@
-"""What closes loops and is read, but not compiled yet."""
+"""Whether a scene may have closed loops, and what a message calls one."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import TYPE_CHECKING
 
-from mstmm.errors import SceneError
 from mstmm.graph.plan import Plan
 from mstmm.scene import Scene
 
@@ -21,15 +19,6 @@ def may_close(scene: Scene) -> bool:
     skeleton = scene.skeleton
     more = len(skeleton.hinge) != len(skeleton.body)
     return more or bool(scene.constraint or scene.coupling)
-
-
-def refuse_beside_bending(scene: Scene, one_way: Collection[str]) -> None:
-    """SceneError for flexible bodies in a scene with loops that bend without acting back."""
-    if one_way and may_close(scene):
-        raise SceneError(
-            f'scene: "{next(iter(one_way))}": model: loops are closed, which bodies that respond '
-            'one way cannot follow; write model = "flexible" or "rigid"'
-        )
 
 
 def named_loop(scene: SceneTables, plan: Plan) -> str:
