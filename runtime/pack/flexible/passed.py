@@ -46,7 +46,7 @@ def refuse_moving_ends(
 ) -> None:
     """SceneError for a shape of one of the bodies that moves a section which a loop passes."""
     for name, body in bodies.items():
-        for element, end, inboard in _ends_of(name, elements):
+        for element, end, inboard in ends_of(name, elements):
             port = body.ports[end]
             moving = _moved(body, port, _held(element, port, inboard)) > _ROUNDING
             if not moving.any():
@@ -61,7 +61,7 @@ def refuse_moving_ends(
             )
 
 
-def _ends_of(
+def ends_of(
     name: str, elements: tuple[Hinge | Constraint, ...]
 ) -> Iterator[tuple[Hinge | Constraint, str, bool]]:
     """(element, end of the body on it, whether it is the inboard one)."""

@@ -27,7 +27,7 @@ from mstmm.scene.tables.rigid import rigid_beam
 from ...flexible.modal_body import ModalBody
 from ...flexible.modal_port import ModalPort
 from ..loops.may_close import may_close
-from .passed import in_loops, refuse_moving_ends
+from .passed import ends_of, in_loops, refuse_moving_ends
 
 if TYPE_CHECKING:
     from mstmm.scene.tables.beam import Beam
@@ -51,6 +51,7 @@ class Rigidified:
         held: the end by which each of them is held.
         holders: the hinge of the tree that holds each of them.
         looped: names of the hinges around closed loops.
+        passed: those of them that a loop passes.
     """
 
     scene: Scene
@@ -59,6 +60,7 @@ class Rigidified:
     held: dict[str, str] = field(default_factory=dict)
     holders: dict[str, Hinge] = field(default_factory=dict)
     looped: frozenset[str] = frozenset()
+    passed: frozenset[str] = frozenset()
 
 
 def with_level(scene: Scene, flexibility: str | None) -> Scene:
@@ -170,8 +172,9 @@ class _Rigidifying:
         plan = None if self.cut is None else build(self.scene.skeleton).plan
         if plan is None:
             return
-        elements = in_loops(self.scene, plan)
-        refuse_moving_ends(self.made.one_way, elements)
+        elements, bodies = in_loops(self.scene, plan), self.made.one_way
+        refuse_moving_ends(bodies, elements)
+        self.made.passed = frozenset(name for name in bodies if any(ends_of(name, elements)))
         self.made.looped = frozenset(
             one.name for one in elements if not isinstance(one, Constraint)
         )

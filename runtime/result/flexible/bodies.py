@@ -10,14 +10,14 @@ import numpy as np
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
-from mstmm.scene import split
+from mstmm.scene.checks.topology import holders
 from mstmm.scene.rules.messages import near
 
 from .loads import LineLoad, PointLoad
 from .motion import Motion
 
 if TYPE_CHECKING:
-    from mstmm.scene import Load
+    from mstmm.scene import Hinge, Load
 
     from ...engine.compiled import Compiled
     from ...flexible.modal_body import ModalBody
@@ -31,6 +31,7 @@ class FlexibleBodies:
         self.model, self.observed, self.run = model, observed, observed.run
         self.known: Mapping[str, ModalBody] = model.flexible
         self.one_way: Collection[str] = ()  # those that respond, and are no part of the run
+        self.unbalanced: Collection[str] = ()  # loads on their ends leave their motion out
         self._motions: dict[str, Motion] = {}
 
     def body(self, name: str, what: str) -> ModalBody:
@@ -72,11 +73,14 @@ class FlexibleBodies:
 
     def held_end(self, name: str) -> str:
         """The end through which a body hangs on the tree."""
-        for hinge in self.model.scene.hinge:
-            body, end = split(hinge.outboard)
-            if body == name:
-                return end
-        raise SceneError(f'"{name}": no hinge holds this body')
+        hinge = self._holders.get(name)
+        if hinge is None:
+            raise SceneError(f'"{name}": no hinge holds this body')
+        return hinge.outboard_end
+
+    @cached_property
+    def _holders(self) -> dict[str, Hinge]:
+        return holders(self.model.scene)
 
     def held_place(self, name: str) -> float:
         """The x in m of the section through which a beam hangs on the tree."""

@@ -125,7 +125,8 @@ def _one(
     motion, some = whole.some(good), good[picked]
     slope, shapes = e.largest_slope(bent_all), body.shapes
     first = float(frequencies(body)[0])
-    tail, aside = _from_sections(flexible, name, some, line) if shapes is not None else (None, None)
+    known = shapes is not None and name not in flexible.unbalanced
+    tail, aside = _from_sections(flexible, name, some, line) if known else (None, None)
     return Flexibility(
         name, len(body.modes), body.frame,
         e.is_stiffened(body) and name not in flexible.one_way,

@@ -115,6 +115,12 @@ class FlexibleResults:
 
     def _loads(self, motion: Motion, places: Array) -> tuple[Array, Array]:
         flexible, name = self._flexible, motion.body.name
+        if name in flexible.unbalanced:
+            raise SceneError(
+                f'"{name}": loads of a loop on its ends are those of the rigid run, which do not '
+                "balance its vibration, so that no equilibrium tells loads of its sections; take "
+                'source = "shapes" of bending_moment and axial_force, or model = "flexible"'
+            )
         return section_loads(
             motion, places, flexible.gravity, flexible.held_place(name),
             flexible.point_loads(name), flexible.line_loads(name),

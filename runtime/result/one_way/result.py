@@ -140,7 +140,8 @@ class _OneWayBodies(FlexibleBodies):
     def __init__(self, result: OneWayResult) -> None:
         super().__init__(result.model, result._observed)
         self._result = result
-        self._responding = rigidity(result.model).one_way
+        rigid = rigidity(result.model)
+        self._responding, self.unbalanced = rigid.one_way, rigid.passed
         self.known = {**self.known, **self._responding}
         self.one_way = self._responding
 

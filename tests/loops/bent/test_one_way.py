@@ -174,6 +174,30 @@ def test_what_hangs_on_the_rod_beside_the_loop_moves_along(tmp_path: Path) -> No
     np.testing.assert_allclose(loaded.orientation("bob"), found.orientation("bob"), atol=1e-9)
 
 
+def test_loads_of_sections_are_told_by_the_shapes_alone() -> None:
+    """The pins' loads of the rigid run do not carry the vibration: no equilibrium is asked for."""
+    found = responding(linkage(driven=True, modes={"y": 6, "z": 0}))
+    moment = found.bending_moment("bar", ROD / 2, source="shapes")
+    coupled = mstmm.compile(mstmm.Scene(**linkage(driven=True)), "looped")
+    run = coupled.simulate(TIMES[-1], output_times=TIMES, rtol=1e-9)
+    expected = run.bending_moment("bar", ROD / 2)
+    np.testing.assert_allclose(moment, expected, atol=0.03 * np.abs(expected).max())
+    with pytest.raises(SceneError, match='"bar": loads of a loop on its ends are those of the rig'):
+        found.section_force("bar", 0.1)
+    assert "missed" not in str(found.certificate) and not found.warnings
+
+
+def test_the_end_that_holds_a_body_is_that_of_the_tree() -> None:
+    """Whatever stands first: loads of the sections of a coupled rod, its wrist written first."""
+    scene = linkage("turned", driven=True)
+    runs = []
+    for hinges in (scene["hinge"], scene["hinge"][::-1]):
+        model = mstmm.compile(mstmm.Scene(**scene | {"hinge": hinges}), "looped")
+        run = model.simulate(0.1, output_times=[0.1], rtol=1e-10, atol=1e-12)
+        runs.append(run.bending_moment("bar", ROD / 3))
+    np.testing.assert_allclose(runs[0], runs[1], rtol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("beam", "clamped", "words"),
     [
