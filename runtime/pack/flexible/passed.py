@@ -17,7 +17,7 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.graph.paths import Paths
 from mstmm.graph.plan import Plan
-from mstmm.scene import Constraint, Hinge, Scene
+from mstmm.scene import Constraint, Hinge, Scene, split
 from mstmm.scene.tables.closures import ROLLING
 
 from ...flexible.modal_body import ModalBody
@@ -71,7 +71,7 @@ def ends_of(
             else (element.inboard, element.outboard)
         )  # fmt: skip
         for inboard, reference in zip((True, False), pair, strict=True):
-            body, _, end = reference.partition(".")
+            body, end = split(reference)
             if body == name:
                 yield element, end, inboard
 

@@ -236,3 +236,26 @@ def test_a_body_beside_the_loop_may_do_as_it_likes() -> None:
              "hinge": [scene["hinge"][0], weld]}  # fmt: skip
     found, expected = (responding(one, None).position("whip.tip") for one in (scene, alone))
     np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+def test_a_coupling_of_hinges_passes_no_loads_through_the_body() -> None:
+    """A clamped whip on one of two geared hubs: as on a hub with the inertia of both."""
+    hub = {"name": "hub", "mass": 2.0, "inertia": [0.3] * 3, "ends": {"rim": [0.1, 0, 0]}}
+    whip = {"name": "whip", "length": 0.5, "mass_per_length": 0.4, "bending_stiffness": 8.0,
+            "modes": {"y": 2, "z": 0}, "model": "one-way"}  # fmt: skip
+    hinges: list[Scene] = [
+        {"name": "axle", "type": "pin", "inboard": "ground", "outboard": "hub"},
+        {"name": "weld", "type": "fixed", "inboard": "hub.rim", "outboard": "whip"},
+    ]
+    torque = {"on": "hub", "moment": [0, 0, "2*sin(9*t)"]}
+    one = {"gravity": [0, 0, 0], "body": [hub | {"inertia": [0.6] * 3}], "beam": [whip],
+           "hinge": hinges, "load": [torque]}  # fmt: skip
+    other = {"name": "shaft", "type": "pin", "inboard": "ground", "outboard": "second"}
+    geared = one | {
+        "body": [hub, hub | {"name": "second", "ends": {}}], "hinge": [*hinges, other],
+        "coupling": [{"name": "gear", "expression": "axle.q + shaft.q"}],
+    }  # fmt: skip
+    found, expected = (responding(scene, None).response("whip").eta for scene in (geared, one))
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(found, expected, atol=1e-6 * scale)
+    assert scale > 1e-4

@@ -22,7 +22,7 @@ def _error(load: float, squared: float) -> float:
     """Of omega^2, beside its closed form.
 
     With cranks of 1 m that lean by a, feet apart by 1 + 2 sin a and all masses 1, the ends of the
-    coupler stay 1 m apart to second order where the lean falls by (1/2 + sin a) tan a s^2 for
+    coupler stay 1 m apart to second order where the mean lean grows by (1/2 + sin a) tan a s^2 for
     cranks that turn by s.
     """
     sine, cosine = math.sin(LEAN), math.cos(LEAN)
