@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 #: are, beside so many times the radians of vibration that counts, which rises with the order of
 #: implicit steps.
 _LOOSE, _VIBRATING, _RISES = 1e-3, 700.0, 0.25
-_SMOOTH, _RISES_SMOOTH, _COUNTS, _RISES_COUNTED = 500.0, 0.16, 6.0, 1 / 6
+_SMOOTH, _RISES_SMOOTH, _COUNTS, _RISES_COUNTED = 450.0, 0.09, 4.5, 0.06
 
 #: Vibration is well above what is asked that is so many times that.
 _WELL = 3.0
@@ -51,7 +51,7 @@ _LOOSE_EXPLICIT, _LOW_ORDER = "dopri5", 1e-4
 #: speed, with the power by which it rises, radians that explicit steps have to follow more closely
 #: counted so many times more.
 _EXPONENTIAL, _PAYS, _SHORT, _LONG = "exprb32", 1e-6, 15, 1 / 20
-_SWINGING, _RISES_SWINGING, _FOLLOWING = 430.0, 0.05, 2.0
+_SWINGING, _RISES_SWINGING, _FOLLOWING = 250.0, 0.16, 2.0
 
 #: The part of a run's steps that counts when stability has set them.
 _PART = 0.1

@@ -94,17 +94,16 @@ _FOLLOWING = 1e-3
 #: The next tolerance in the one before, at most, where runs have parted.
 _LEAP = 1e-2
 
-#: The second tolerance in the first one, at most, by radians of vibration that is followed
-#: implicitly: its phase errs by far more than local errors sum up to.
-_WAVING = 5.0
+#: The error in what local errors sum up to, a radian of vibration that is followed implicitly: its
+#: phase goes on to err by what they change.
+_WAVING = 0.25
 
 #: Of runs that part behind this part of the time the growth of errors is known; the estimate in
 #: what it makes of the tolerance.
 _LATE, _DOUBT = 0.8, 10.0
 
-#: What is asked in the first implicit tolerance, by radians of vibration that it has to follow, to
-#: a power.
-_A_RADIAN, _RADIANS = 40.0, 1.5
+#: The first implicit tolerance in what is asked, by radians of vibration that it has to follow.
+_A_RADIAN = 20.0
 
 #: The next tolerance in the one before, at least, of calm runs: where that is at most so many times
 #: what is asked, and errors are not taken to fall; and beyond.
@@ -162,7 +161,7 @@ def first_rtol(asked: float, kind: Kind, radians: float = 0.0) -> float:
     times, tightest, loosest = _USUAL[kind].first
     wanted = min(max(times * asked, tightest), loosest)
     if kind is Kind.IMPLICIT and radians > 1.0:
-        wanted = min(wanted, _A_RADIAN * asked / radians**_RADIANS)
+        wanted = min(wanted, _A_RADIAN * asked / radians)
     return max(min(wanted, _USUAL[kind].reach * asked), TIGHTEST)
 
 
@@ -191,7 +190,7 @@ def next_rtol(looks: Sequence[Look], asked: float, kind: Kind) -> float:
         return _changed(last, known, asked, kind)
     if known is None or looks[-2].kind is not kind:
         factor, tightest = _foretold(last, asked), min(_ROUNDING, last.rtol / 2)
-        most = min(_MOST, _WAVING / max(last.radians, 1.0))
+        most = _MOST
     elif not looks[-2].apart < _USUAL[kind].parted:
         known_when = looks[-2].parted < 1.0
         factor = min(_beyond(looks[-2], asked) / last.rtol, _LEAP) if known_when else _LEAP
@@ -253,7 +252,8 @@ def _summed(look: Look) -> float:
     """What the error of a run is by its local errors, about."""
     usual = _USUAL[look.kind]
     known = look.summed or _UNKNOWN * look.rtol
-    return known * (look.growth or (usual.held if look.held else usual.growth))
+    usually = usual.held if look.held else usual.growth
+    return known * (look.growth or usually + _WAVING * look.radians)
 
 
 def _usual(look: Look) -> float:

@@ -47,7 +47,7 @@ _SAMPLES, _LOOKS, _ENOUGH = 201, 101, 50
 
 #: The error of bodies that bend in what local errors sum up to, by the length that their shapes
 #: move by (m), and at most; and where steps do not follow the fastest motions.
-_SHAPED, _MOST_SHAPED, _OF_SPEEDS = 5e-3, 20.0, 0.02
+_SHAPED, _MOST_SHAPED, _OF_SPEEDS = 5e-3, 20.0, 0.2
 
 Progress = Callable[[float, float], None]
 
