@@ -120,6 +120,21 @@ def test_local_errors_where_stability_sets_the_steps_count_for_less() -> None:
     assert free < held < 3e-3
 
 
+def test_vibration_that_is_followed_implicitly_errs_by_more_than_local_errors() -> None:
+    """Its phase goes on to err: the first tolerance is tighter for each radian of it, and the
+    second one by what they make of the same local errors."""
+    kind = Kind.IMPLICIT
+    still, waving = (first_rtol(1e-5, kind, radians) for radians in (0.0, 300.0))
+    assert waving == pytest.approx(20.0 * 1e-5 / 300.0)
+    assert waving < still
+    rtols = [
+        next_rtol([Look(1e-6, kind, 0.0, 1e-5, radians=radians)], 1e-5, kind)
+        for radians in (0.0, 40.0)
+    ]
+    assert rtols[1] == pytest.approx(1e-6 * (0.6 * 1e-5 / (11.0 * 1e-5)) ** (1 / 0.9))
+    assert rtols[1] < rtols[0]
+
+
 def test_with_stops_errors_are_trusted_to_fall_less() -> None:
     runs = (1e-3, 0.1), (1e-6, 0.0)
     smooth, rough = (

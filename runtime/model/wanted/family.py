@@ -43,8 +43,10 @@ _SMOOTH, _RISES_SMOOTH, _COUNTS, _RISES_COUNTED = 450.0, 0.09, 4.5, 0.06
 _WELL = 3.0
 
 #: The explicit method for loose tolerances, and the tolerance down to which it costs less than that
-#: of higher order.
-_LOOSE_EXPLICIT, _LOW_ORDER = "dopri5", 1e-4
+#: of higher order; and where stability sets the steps, for at its bound that one keeps errors that
+#: this one damps: of motions that are damped by more than this ratio, or are so many times what is
+#: asked.
+_LOOSE_EXPLICIT, _LOW_ORDER, _LOW_WHERE_HELD, _DAMPED, _FAR = "dopri5", 1e-4, 1e-6, 0.03, 100.0
 
 #: The exponential method; for errors from this one on; steps after which its first run is given up,
 #: and that number in |lambda| T.  It pays from this |lambda| T on, for an error of _LOOSE and a
@@ -107,6 +109,11 @@ def held_back(run: Trajectory) -> bool:
     """Whether stability set a part of the steps of a run that counts."""
     counted = run.statistics
     return counted is not None and counted.stability_limited_steps > _PART * counted.steps
+
+
+def damps(run: Trajectory) -> bool:
+    """Whether steps of a run, set by stability, damp their own errors."""
+    return run.settings.method == _LOOSE_EXPLICIT and held_back(run)
 
 
 def has_stops(model: Compiled) -> bool:
@@ -188,6 +195,15 @@ class Family:
         return self._fast if self._fast is not None and self._fast.known else None
 
     @property
+    def _damping(self) -> bool:
+        """Whether it pays that explicit steps at their bound of stability damp their errors: where
+        the fastest motions are damped as well, or far above what is asked."""
+        known = self._known
+        return known is not None and (
+            known.least_damping > _DAMPED or known.largest > _FAR * self._error
+        )
+
+    @property
     def _lasts(self) -> float:
         """|lambda| T of the fastest motion; 0 where it is known to be slow."""
         return 0.0 if self._fast is None else self._fast.rate * self._span
@@ -232,7 +248,11 @@ class Family:
             return implicit_method(rtol)
         if made and self._fast is None and _may_be_stiff(made[-1]):
             return AUTO
-        return _LOOSE_EXPLICIT if made and rtol > _LOW_ORDER else AUTO_EXPLICIT
+        damping = self._damping
+        if not made:
+            return _LOOSE_EXPLICIT if damping else AUTO_EXPLICIT
+        least = _LOW_WHERE_HELD if damping and held_back(made[-1]) else _LOW_ORDER
+        return _LOOSE_EXPLICIT if rtol > least else AUTO_EXPLICIT
 
     def _settled_on(self, made: Sequence[Trajectory]) -> bool:
         """Whether the method stays what the user named, or `auto` where that has made a run."""

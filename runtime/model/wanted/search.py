@@ -29,7 +29,7 @@ from ...run.error_estimate import compare
 from ...run.execution import Watch, first_run
 from ..results import certified, result_of
 from .asked import Asked
-from .family import Family, has_stops, held_back, kind_of_run
+from .family import Family, damps, has_stops, held_back, kind_of_run
 from .looks import Kind, Look, estimate, first_rtol, hopeless, next_rtol
 
 if TYPE_CHECKING:
@@ -46,8 +46,9 @@ _ATOL = 0.01
 _SAMPLES, _LOOKS, _ENOUGH = 201, 101, 50
 
 #: The error of bodies that bend in what local errors sum up to, by the length that their shapes
-#: move by (m), and at most; and where steps do not follow the fastest motions.
-_SHAPED, _MOST_SHAPED, _OF_SPEEDS = 5e-3, 20.0, 0.2
+#: move by (m), and at most, and the part of it where steps damp it; and where steps do not follow
+#: the fastest motions.
+_SHAPED, _MOST_SHAPED, _DAMPED, _OF_SPEEDS = 5e-3, 20.0, 0.1, 0.2
 
 Progress = Callable[[float, float], None]
 
@@ -162,7 +163,8 @@ class Search:
             return None
         if self._model.flexible and isinstance(self._measure, Coordinates):
             self._measure.scale_by(last.numbers)
-            return min(_SHAPED / self._measure.least, _MOST_SHAPED)
+            shaped = min(_SHAPED / self._measure.least, _MOST_SHAPED)
+            return shaped * (_DAMPED if damps(last.run) else 1.0)
         left = self._family.leaves(last.run) and not self._model.flexible
         return _OF_SPEEDS if left else None
 

@@ -32,6 +32,9 @@ _SLOW = 10.0
 #: Motions are far above what is asked by so many times it; the power at which others count less.
 _FAR, _EASES = 100.0, 0.7
 
+#: Motions count as the fastest from this part of its rate on.
+_AS_FAST = 0.5
+
 #: Radians a step, from which on explicit steps do not follow a motion.
 _LEFT = 2.0
 
@@ -59,6 +62,16 @@ class Vibration:
     def known(self) -> bool:
         """Whether more is known than the rate."""
         return bool(len(self.rates))
+
+    @property
+    def least_damping(self) -> float:
+        """Damping ratio of the fastest motions, the least of them."""
+        return float(self.dampings[self.rates >= _AS_FAST * self.rate].min(initial=1.0))
+
+    @property
+    def largest(self) -> float:
+        """The largest amplitude of coordinates."""
+        return float(self.parts.max(initial=0.0))
 
     def radians(self, asked: float) -> float:
         """Radians of the motion that takes most of them until none is above `asked`."""
