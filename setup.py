@@ -1,7 +1,13 @@
 """Builds the compiled kernels, one binary for every Python from 3.11; see pyproject.toml."""
 
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
 from setuptools import setup
 from setuptools.command.editable_wheel import editable_wheel
+
+#: The variable that says how many files are compiled at a time, and how many are at most without.
+JOBS, MOST = "MSTMM_BUILD_JOBS", 8
 
 
 class OneFolder(editable_wheel):
@@ -13,8 +19,19 @@ class OneFolder(editable_wheel):
         super().finalize_options()
 
 
-setup(
-    cffi_modules=["runtime/libraries/build_extension.py:ffibuilder"],
-    options={"bdist_wheel": {"py_limited_api": "cp311"}},
-    cmdclass={"editable_wheel": OneFolder},
-)
+def side_by_side() -> AbstractContextManager[Any]:
+    """Files of C are compiled on all cores; one after the other where pybind11 is missing, whose
+    helper does it."""
+    try:
+        from pybind11.setup_helpers import ParallelCompile
+    except ImportError:
+        return nullcontext()
+    return ParallelCompile(JOBS, max=MOST)
+
+
+with side_by_side():
+    setup(
+        cffi_modules=["runtime/libraries/build_extension.py:ffibuilder"],
+        options={"bdist_wheel": {"py_limited_api": "cp311"}},
+        cmdclass={"editable_wheel": OneFolder},
+    )
