@@ -118,18 +118,20 @@ def spinning_top(kind: str, spin: Sequence[float] = (0.0, 0.0, 0.0)) -> Model:
 
 
 def four_bar(
-    speed: float = 0.0, askew: float = 0.0, closed: bool = True, ratio: float = 1.0
-) -> dict[str, Any]:
+    speed: float = 0.0, askew: float = 0.0, closed: bool = True, ratio: float = 1.0,
+    spread: float = 1.0, feet: float = 1.2,
+) -> dict[str, Any]:  # fmt: skip
     """A crank of 0.5 m that turns at a speed (rad/s), a coupler of 1.1 m, a rocker of 0.8 m, feet
-    1.2 m apart, of 1 kg/m, the coupler of `ratio` times that; or these rods without the pin that
-    closes the loop.  The frames of their tips stand `askew`, rad."""
+    so far apart, of 1 kg/m, the coupler of `ratio` times that; or these rods without the pin that
+    closes the loop.  The frames of their tips stand `askew`, rad; their moments of inertia are
+    `spread` in those of uniform rods."""
 
     def link(name: str, length: float, density: float = 1.0) -> dict[str, Any]:
-        mass, across = density * length, density * length**3 / 12
+        mass, across = density * length, spread * density * length**3 / 12
         tip = {"position": [length, 0, 0], "orientation": [0.7 * askew, askew, 0]}
         return {
             "name": name, "mass": mass, "center_of_mass": [length / 2, 0, 0],
-            "inertia": [1e-3 * mass, across, across], "ends": {"tip": tip},
+            "inertia": [1e-3 * spread * mass, across, across], "ends": {"tip": tip},
         }  # fmt: skip
 
     def pin(name: str, inboard: str, outboard: str, angle: float) -> dict[str, Any]:
@@ -141,7 +143,7 @@ def four_bar(
     foot = pin("foot", "ground", "crank", 1.0) | {"initial": {"q": [1.0], "u": [speed]}}
     hinges = [
         foot | {"hold": closed}, pin("knee", "crank.tip", "coupler", -0.6),
-        pin("heel", "ground", "rocker", 1.7) | {"position": [1.2, 0, 0]},
+        pin("heel", "ground", "rocker", 1.7) | {"position": [feet, 0, 0]},
     ]  # fmt: skip
     return {
         "gravity": [0, -9.81, 0],

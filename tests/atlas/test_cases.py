@@ -100,6 +100,8 @@ EXPECTED = {
     "grown-tree": ((7, 9), 1000),
     # what is missing is load times 0.577, of 1 + 1.443 load: 0.01 at 0.0178
     "loaded-linkage": ((0.017, 0.019), 1e6),
+    # gaps across a coupler weigh 1 + 3 / spread times less than along it: 10 to 100 times
+    "least-gap": ((0.03, 0.33), 1e-7),
     # what yields by 1e-8 beside what answers by the square of the angle: 1e-6 near 0.1
     "regularised-rows": ((0.03, 0.15), 1e-4),
     # the row that the coupler answers falls below 1e-6 of the other at that ratio of masses
