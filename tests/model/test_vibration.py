@@ -44,8 +44,8 @@ def test_a_damped_one_lasts_until_it_has_fallen_to_what_is_asked() -> None:
     found = seen(weight(5e3, zeta), 100.0)
     assert found.radians(_ASKED) == pytest.approx(math.log(1 / _ASKED) / zeta, rel=1e-6)
     assert found.radians(2.0) == 0.0
-    assert found.least_damping == pytest.approx(zeta, rel=1e-6)
-    assert found.largest == pytest.approx(1.0)  # of the only length
+    assert found.fastest_damping == pytest.approx(zeta, rel=1e-6)
+    assert found.fastest_part == pytest.approx(1.0)  # of the only length
 
 
 def test_an_angle_is_measured_in_rad() -> None:
@@ -59,8 +59,8 @@ def test_an_angle_is_measured_in_rad() -> None:
     scene = mstmm.Scene(schema_version=1, gravity=[0.0, -9.81, 0.0], body=[rod], hinge=[pin])
     found = seen(mstmm.compile(scene, engine="looped"), 1.0)
     static = 9.81 * 0.5 / 1e5
-    assert found.largest == pytest.approx(static / 2, rel=1e-3)
-    assert found.least_damping == pytest.approx(0.0, abs=1e-6)
+    assert found.fastest_part == pytest.approx(static / 2, rel=1e-3)
+    assert found.fastest_damping == pytest.approx(0.0, abs=1e-6)
     assert found.radians(static) == 0.0
     assert found.radians(static / 3) == pytest.approx(found.rate, rel=1e-6)
     assert found.left_behind(10) == found.parts.max()

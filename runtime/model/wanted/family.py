@@ -51,8 +51,8 @@ _LOOSE_EXPLICIT, _LOW_ORDER, _LOW_WHERE_HELD, _DAMPED, _FAR = "dopri5", 1e-4, 1e
 #: The exponential method; for errors from this one on; steps after which its first run is given up,
 #: and that number in |lambda| T.  It pays from this |lambda| T on, for an error of _LOOSE and a
 #: speed, with the power by which it rises, radians that explicit steps have to follow more closely
-#: counted so many times more.
-_EXPONENTIAL, _PAYS, _SHORT, _LONG = "exprb32", 1e-6, 15, 1 / 20
+#: counted so many times more; up to so many times those from which implicit steps pay.
+_EXPONENTIAL, _PAYS, _SHORT, _LONG, _LASTING = "exprb32", 1e-6, 15, 1 / 20, 4.0
 _SWINGING, _RISES_SWINGING, _FOLLOWING = 250.0, 0.16, 2.0
 
 #: The part of a run's steps that counts when stability has set them.
@@ -157,7 +157,8 @@ class Family:
             self._fast = vibration(model, settings.t_start, q, u, self._span, _SMOOTH)
             swinging = self._rising(_SWINGING, _RISES_SWINGING) * model.nu
             followed = self._lasts + _FOLLOWING * self.radians
-            if followed > swinging and error >= _PAYS:
+            lasting = self._lasts < _LASTING * self._many
+            if followed > swinging and lasting and error >= _PAYS:
                 self._tried = shaken(model, settings.t_start, q, u)
         except MstmmError:  # a scene without tangent, or a start that the run itself will blame
             pass
@@ -200,7 +201,7 @@ class Family:
         the fastest motions are damped as well, or far above what is asked."""
         known = self._known
         return known is not None and (
-            known.least_damping > _DAMPED or known.largest > _FAR * self._error
+            known.fastest_damping > _DAMPED or known.fastest_part > _FAR * self._error
         )
 
     @property

@@ -91,8 +91,8 @@ _MOST, _LATER = 0.3, 0.1
 #: one.
 _FOLLOWING = 1e-3
 
-#: The next tolerance in the one before, at most, where runs have parted.
-_LEAP = 1e-2
+#: The next tolerance in the one before, where runs have parted: at most, and at least.
+_LEAP, _FAR_LEAP = 1e-2, 1e-3
 
 #: The error in what local errors sum up to, a radian of vibration that is followed implicitly: its
 #: phase goes on to err by what they change.
@@ -192,8 +192,9 @@ def next_rtol(looks: Sequence[Look], asked: float, kind: Kind) -> float:
         factor, tightest = _foretold(last, asked), min(_ROUNDING, last.rtol / 2)
         most = _MOST
     elif not looks[-2].apart < _USUAL[kind].parted:
-        known_when = looks[-2].parted < 1.0
-        factor = min(_beyond(looks[-2], asked) / last.rtol, _LEAP) if known_when else _LEAP
+        factor = _LEAP
+        if kind is Kind.EXPLICIT and looks[-2].parted < 1.0:
+            factor = min(max(_beyond(looks[-2], asked) / last.rtol, _FAR_LEAP), _LEAP)
     else:
         aim = _AIM if kind is Kind.EXPLICIT else _AIM_OF_OTHERS
         factor, most = (aim * asked / known) ** (1 / _usual(last)), _MOST

@@ -64,14 +64,18 @@ class Vibration:
         return bool(len(self.rates))
 
     @property
-    def least_damping(self) -> float:
+    def fastest_damping(self) -> float:
         """Damping ratio of the fastest motions, the least of them."""
-        return float(self.dampings[self.rates >= _AS_FAST * self.rate].min(initial=1.0))
+        return float(self.dampings[self._fastest].min(initial=1.0))
 
     @property
-    def largest(self) -> float:
-        """The largest amplitude of coordinates."""
-        return float(self.parts.max(initial=0.0))
+    def fastest_part(self) -> float:
+        """Amplitude of coordinates in the fastest motions, the largest of them."""
+        return float(self.parts[self._fastest].max(initial=0.0))
+
+    @property
+    def _fastest(self) -> Array:
+        return self.rates >= _AS_FAST * self.rate
 
     def radians(self, asked: float) -> float:
         """Radians of the motion that takes most of them until none is above `asked`."""
