@@ -8,11 +8,16 @@ trap 'rm -rf "$scratch"' EXIT
 strict=(@compile_flags.txt -Wall -Wextra -Wpedantic -Wshadow -Wstrict-prototypes -Werror)
 sanitize=(-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
 sources=(generated/*.c runtime/*/c/*.c)
+modules=(runtime/*/*/c/*.c)                  # call Python and numpy: no part of the driver
+headers=(-isystem "$("$VENV/bin/python" -c 'import sysconfig; print(sysconfig.get_paths()["include"])')"
+    -isystem "$("$VENV/bin/python" -c 'import numpy; print(numpy.get_include())')")
 
 echo "--- warnings as errors: clang"
-printf '%s\0' "${sources[@]}" | xargs -0 -n 8 -P "$(nproc)" clang "${strict[@]}" -fsyntax-only
+printf '%s\0' "${sources[@]}" "${modules[@]}" |
+    xargs -0 -n 8 -P "$(nproc)" clang "${strict[@]}" "${headers[@]}" -fsyntax-only
 
 echo "--- warnings as errors: gcc; every kernel, sanitized"
+gcc "${strict[@]}" "${headers[@]}" -fsyntax-only "${modules[@]}"
 mkdir "$scratch/objects"
 # the largest functions are beyond what gcc tracks the variables of, and compiled twice where it tries
 printf '#!/bin/sh\nexec gcc %s -c "$1" -o "%s/$(echo "$1" | tr /. __).o"\n' \

@@ -151,6 +151,7 @@ static PyMethodDef called_as = {
 
 static PyObject *prepare(PyObject *module, PyObject *given)
 {
+    (void)module;
     Py_ssize_t function, record;
     PyObject *widths, *shapes, *kept;
     int numbered, optional, released;
