@@ -48,13 +48,15 @@ def refuse_moving_ends(
     for name, body in bodies.items():
         for element, end, inboard in ends_of(name, elements):
             port = body.ports[end]
-            moving = _moved(body, port, _held(element, port, inboard)) > _ROUNDING
+            shift, turn = _moved(body, port, _held(element, port, inboard))
+            moving = shift + turn > _ROUNDING
             if not moving.any():
                 continue
             table = "constraint" if isinstance(element, Constraint) else "hinge"
-            shape = body.modes[int(moving.argmax())]
+            first = int(moving.argmax())
+            does = "moves" if shift[first] > _ROUNDING else "turns"
             raise SceneError(
-                f'"{name}": model: shape {shape} moves the end "{end}", where {table} '
+                f'"{name}": model: shape {body.modes[first]} {does} the end "{end}", where {table} '
                 f'"{element.name}" closes a loop, and a body that responds one way does not close '
                 'it again; on a beam between pins take basis = "simply-supported" and frame = '
                 '"chord", or else model = "flexible"'
@@ -84,10 +86,11 @@ def _held(element: Hinge | Constraint, port: ModalPort, inboard: bool) -> Array:
     return held_turns(element, axes, unknown=np.eye(3))
 
 
-def _moved(body: ModalBody, port: ModalPort, held: Array) -> Array:
-    """(modes,) how far each shape moves a section, in parts of its own size."""
+def _moved(body: ModalBody, port: ModalPort, held: Array) -> tuple[Array, Array]:
+    """(modes,) twice: how far each shape shifts a section, and turns it by what is held, in parts
+    of its own size."""
     size = np.sqrt(np.diag(body.Mff) / body.mass)
     places = np.array([one.position for one in body.ports.values()])
     length = float(np.linalg.norm(np.ptp(places, axis=0))) or 1.0
     shift, turn = np.abs(port.phi).max(axis=0), np.abs(held @ port.theta).max(axis=0)
-    return np.asarray((shift + length * turn) / size)
+    return shift / size, length * turn / size
