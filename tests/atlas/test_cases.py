@@ -86,6 +86,10 @@ EXPECTED = {
     "undamped-stop": ((0.2, 1.0), 1e3),
     # of second order: 2e-7 at 2 ms
     "plain-charts": ((0.03, 0.06), 0.1),
+    # of third order: 1.4e-6 at 50 ms
+    "single-product": ((0.04, 0.05), 0.2),
+    # of second order: 4.3e-6 at 50 ms, 1.1e-6 at 25 ms
+    "turn-slope": ((0.022, 0.026), 0.1),
     # lost within the second between steps of 2 and 4 ms, at 6 rad/s
     "plain-turns": ((8e-3, 3e-2), 0.1),
     # -alpha twice is an eigenvalue: nothing of rk4 holds from h alpha = 2.785 on
@@ -175,6 +179,8 @@ POWERS = {
     "predictor-order": (2.0, 25.0, 1024.0),
     "laws-order": (1.0, 3e-4, 0.04),
     "wilson-gaps": (4.0, 1.9e-3, 0.013),
+    "single-product": (3.0, 0.01, 0.11),
+    "turn-slope": (2.0, 0.01, 0.11),
     "projected-places": (4.0, 9e-4, 6e-3),
     "grown-tree": (2.0, 30.0, 300.0),
     "regularised-rows": (-2.0, 3e-3, 0.2),
@@ -188,7 +194,8 @@ def test_failures_grow_by_the_power_that_is_known(name: str) -> None:
     power; the loss of a second-order method by the third; what stalls, beside second order, by the
     square of the steps; the error of a table that is left with first order, by the step; of rows
     that yield by the square of what they answer by; of a frequency without what loads turn, by
-    these."""
+    these; of rotation vectors with one product by the third power of the step, and by the second
+    where a slope of theirs is left out."""
     power, low, high = POWERS[name]
     inside = [(at, m) for at, m in measured(name).points if low <= at <= high]
     (first, least), (last, most) = inside[0], inside[-1]

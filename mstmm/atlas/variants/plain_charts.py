@@ -1,8 +1,7 @@
-"""Rotation vectors whose rate is taken for the angular velocity.
+"""Rotation vectors whose rate is taken for the angular velocity, or for little more.
 
 Within a step an attitude is q exp(theta), and theta' = w + theta x w / 2 + theta x (theta x w) / 12
-up to the third power of theta (H. Munthe-Kaas, BIT 38 (1998) 92-111).  Here the products are left
-out.
+up to the third power of theta (H. Munthe-Kaas, BIT 38 (1998) 92-111).  Here products are left out.
 """
 
 from __future__ import annotations
@@ -21,16 +20,26 @@ def turned(attitude: Array, theta: Array) -> Array:
     return np.array([w0 * w - v0 @ v, *(w0 * v + w * v0 + np.cross(v0, v))])
 
 
-def end_of(model: Model, step: float, steps: int) -> Array:
+def rate_of(theta: Array, u: Array, products: int = 2) -> Array:
+    """Rate (3,) of a rotation vector at an angular velocity, with so many of its products."""
+    once = np.cross(theta, u)
+    rate = np.asarray(u, float)
+    if products > 0:
+        rate = rate + once / 2
+    return rate + np.cross(theta, once) / 12 if products > 1 else rate
+
+
+def end_of(model: Model, step: float, steps: int, products: int = 0) -> Array:
     """q (4,) of a body on a ball after so many steps of rk4 on such charts from the start."""
     attitude, speeds = model.initial_state()
     for _ in range(steps):
         slopes: list[tuple[Array, Array]] = []
         for part in (0.0, 0.5, 0.5, 1.0):
             rate, bend = slopes[-1] if slopes else (np.zeros(3), np.zeros(3))
-            u = speeds + part * step * bend
-            q = turned(attitude, part * step * rate)
-            slopes.append((u, model.accelerations(q, u)))
+            theta, u = part * step * rate, speeds + part * step * bend
+            slopes.append(
+                (rate_of(theta, u, products), model.accelerations(turned(attitude, theta), u))
+            )
         rate, bend = step / 6 * np.tensordot([1, 2, 2, 1], np.array(slopes), 1)
         attitude, speeds = turned(attitude, rate), speeds + bend
     return attitude

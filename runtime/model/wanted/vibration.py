@@ -66,16 +66,15 @@ class Vibration:
     @property
     def fastest_damping(self) -> float:
         """Damping ratio of the fastest motions, the least of them."""
-        return float(self.dampings[self._fastest].min(initial=1.0))
+        return float(self._of_the_fastest(self.dampings).min(initial=1.0))
 
     @property
     def fastest_part(self) -> float:
         """Amplitude of coordinates in the fastest motions, the largest of them."""
-        return float(self.parts[self._fastest].max(initial=0.0))
+        return float(self._of_the_fastest(self.parts).max(initial=0.0))
 
-    @property
-    def _fastest(self) -> Array:
-        return self.rates >= _AS_FAST * self.rate
+    def _of_the_fastest(self, numbers: Array) -> Array:
+        return numbers[self.rates >= _AS_FAST * self.rate]
 
     def radians(self, asked: float) -> float:
         """Radians of the motion that takes most of them until none is above `asked`."""

@@ -1,0 +1,49 @@
+"""Rosenbrock steps on rotation vectors that may leave one slope out of their tangent.
+
+Within a step an attitude is q exp(theta), and theta' = w + theta x w / 2 + theta x (theta x w) / 12
+(H. Munthe-Kaas, BIT 38 (1998) 92-111).  At theta = 0 the slope of theta' by theta is that of
+theta x w / 2, though theta is nothing there (E. Hairer, G. Wanner, Solving Ordinary Differential
+Equations II, 1996, IV.7: the order of a table takes the whole Jacobian).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Array
+from ...runtime.integrate.steppers import get
+from ...runtime.integrate.steppers.implicit import Rosenbrock
+from ...runtime.model.model import Model
+from .plain_charts import rate_of, turned
+
+#: Of differences, rad and rad/s.
+_DIFFERENCE = 1e-5
+
+
+def end_of(model: Model, step: float, steps: int, method: str, slope: bool) -> Array:
+    """q (4,) of a body on a ball after so many steps (s) by a table from the start, with or without
+    the slope of the rotation vector's rate by itself."""
+    table = get(method)
+    assert isinstance(table, Rosenbrock)
+    attitude, speeds = model.initial_state()
+
+    def rates(y: Array) -> Array:
+        theta, u = y[:3], y[3:]
+        return np.append(rate_of(theta, u), model.accelerations(turned(attitude, theta), u))
+
+    for _ in range(steps):
+        start = np.append(np.zeros(3), speeds)
+        tangent = np.transpose([
+            (rates(start + d) - rates(start - d)) / (2 * _DIFFERENCE)
+            for d in _DIFFERENCE * np.eye(6)
+        ])  # fmt: skip
+        if not slope:
+            tangent[:3, :3] = 0.0
+        left = np.eye(6) / (table.gamma * step) - tangent
+        stages = np.zeros((table.n_stages, 6))
+        for i in range(1, table.n_stages):
+            right = rates(start + table.A[i] @ stages) + table.second[i] @ stages / step
+            stages[i] = np.linalg.solve(left, right)
+        end = start + table.B @ stages
+        attitude, speeds = turned(attitude, end[:3]), end[3:]
+    return attitude
