@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,13 @@ from ..runtime.flexible.beam.harmonic import Direction
 from ..runtime.flexible.beam.shapes import root
 from ..runtime.model.model import Model
 from ..runtime.result.result import Result
-from .scenes import LET_GO, solid_bar, sprung_rod, stiffness_of_rate
+from .scenes import LET_GO, solid_bar, spinning_top, sprung_rod, stiffness_of_rate
 
 #: Step of the vibrations of a sprung rod, s.
 STEP = 1e-3
+
+#: How long a body turns freely, s, and its angular velocity at the start, rad/s.
+TURNING, SPIN = 2.0, (0.4, 1.6, 1.1)
 
 
 def finished(run: Result) -> Result:
@@ -101,3 +105,23 @@ def root_inertia(z: float) -> float:
     beam = Direction(True, 1.0, 0.0, 1.0, np.eye(4))
     s, softened = np.array([1j * z**2]), np.ones(1, dtype=np.complex128)
     return float(-beam.stiffness_at(s, softened)[0, 0, 0].real / z**4)
+
+
+def error_of_turning(method: str | Callable[[Model, float, int], Array], step: float) -> float:
+    """Of the attitude of a body that has turned freely, by steps of about this length (s), rad; of
+    a method of runs, or of a function of the model, the step and their number."""
+    (top, exact), steps = _turned(), round(TURNING / step)
+    step = TURNING / steps
+    if callable(method):
+        found = method(top, step, steps)
+    else:
+        found = simulated(top, TURNING, method, step, output_times=[TURNING]).q[-1]
+    return 2 * float(np.linalg.norm(found * np.sign(found @ exact) - exact))
+
+
+@cache
+def _turned() -> tuple[Model, Array]:
+    """The body, and its attitude at the end."""
+    top = spinning_top("ball", SPIN)
+    run = simulated(top, TURNING, rtol=1e-13, atol=1e-15, output_times=[TURNING])
+    return top, run.q[-1]

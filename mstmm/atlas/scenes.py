@@ -121,10 +121,10 @@ def four_bar(
     speed: float = 0.0, askew: float = 0.0, closed: bool = True, ratio: float = 1.0,
     spread: float = 1.0, feet: float = 1.2,
 ) -> dict[str, Any]:  # fmt: skip
-    """A crank of 0.5 m that turns at a speed (rad/s), a coupler of 1.1 m, a rocker of 0.8 m, feet
-    so far apart, of 1 kg/m, the coupler of `ratio` times that; or these rods without the pin that
-    closes the loop.  The frames of their tips stand `askew`, rad; their moments of inertia are
-    `spread` in those of uniform rods."""
+    """A crank of 0.5 m that turns at a speed (rad/s), a coupler of 1.1 m, a rocker of 0.8 m, of
+    1 kg/m, the coupler of `ratio` times that, on feet `feet` m apart; or these rods without the pin
+    that closes the loop.  The frames of their tips stand `askew`, rad; their moments of inertia are
+    `spread` times those of uniform rods."""
 
     def link(name: str, length: float, density: float = 1.0) -> dict[str, Any]:
         mass, across = density * length, spread * density * length**3 / 12

@@ -72,6 +72,14 @@ def test_motion_that_cannot_be_told_ends_at_the_tightest_tolerance() -> None:
     assert len(rtols) < RUNS
 
 
+@pytest.mark.parametrize(("kind", "leap"), [(Kind.EXPLICIT, 1e-3), (Kind.IMPLICIT, 1e-2)])
+def test_runs_that_part_early_leap_no_farther_than_is_known(kind: Kind, leap: float) -> None:
+    """Growth to the end at the pace of the first tenth is more than there is; and where implicit
+    runs part early they do not follow a vibration, and nothing grows."""
+    found = [Look(1e-3, kind, 2.0, 0.1, parted=0.1), Look(1e-6, kind, 0.0, 1e-4)]
+    assert next_rtol(found, 1e-6, kind) == pytest.approx(leap * 1e-6)
+
+
 def test_runs_that_end_elsewhere_have_no_estimate() -> None:
     found = [Look(1e-3, Kind.EXPLICIT, math.inf, None), Look(1e-5, Kind.EXPLICIT, 0.0, None)]
     assert estimate(found) == math.inf

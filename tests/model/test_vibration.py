@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 import mstmm
+from mstmm.runtime.integrate.settings import Settings
+from mstmm.runtime.model.wanted.family import Family
+from mstmm.runtime.model.wanted.looks import Kind
 from mstmm.runtime.model.wanted.vibration import Vibration, vibration
 
 _ASKED = 1e-6
@@ -45,7 +48,7 @@ def test_a_damped_one_lasts_until_it_has_fallen_to_what_is_asked() -> None:
     assert found.radians(_ASKED) == pytest.approx(math.log(1 / _ASKED) / zeta, rel=1e-6)
     assert found.radians(2.0) == 0.0
     assert found.fastest_damping == pytest.approx(zeta, rel=1e-6)
-    assert found.fastest_part == pytest.approx(1.0)  # of the only length
+    assert found.races(1 / 101) and not found.races(1 / 99)  # its part is 1, of the only length
 
 
 def test_an_angle_is_measured_in_rad() -> None:
@@ -59,7 +62,7 @@ def test_an_angle_is_measured_in_rad() -> None:
     scene = mstmm.Scene(schema_version=1, gravity=[0.0, -9.81, 0.0], body=[rod], hinge=[pin])
     found = seen(mstmm.compile(scene, engine="looped"), 1.0)
     static = 9.81 * 0.5 / 1e5
-    assert found.fastest_part == pytest.approx(static / 2, rel=1e-3)
+    assert found.parts.max() == pytest.approx(static / 2, rel=1e-3)
     assert found.fastest_damping == pytest.approx(0.0, abs=1e-6)
     assert found.radians(static) == 0.0
     assert found.radians(static / 3) == pytest.approx(found.rate, rel=1e-6)
@@ -72,3 +75,16 @@ def test_of_slow_motion_the_rate_alone_is_looked_up() -> None:
     assert not found.known and found.rate == pytest.approx(50.0, rel=1e-6)
     assert found.radians(_ASKED) == found.rate * found.span
     assert not len(found.rates) and not np.any(found.parts)
+
+
+@pytest.mark.parametrize(
+    ("zeta", "error", "method"),
+    [(0.1, 1e-3, "dopri5"), (0.0, 1e-3, "dopri5"), (0.1, 0.5, "dopri5"), (0.0, 0.5, "dop853")],
+)
+def test_where_explicit_steps_damp_errors_the_lower_order_is_taken(
+    zeta: float, error: float, method: str
+) -> None:
+    """Of motions that are damped, or far above what is asked: here the part is 1 or 1/2."""
+    model = weight(5e3, zeta)
+    found = Family(model, Settings(10.0, method="auto"), error, *model.initial_state())
+    assert found.method(Kind.EXPLICIT, 1e-3, ()) == method

@@ -44,9 +44,8 @@ _WELL = 3.0
 
 #: The explicit method for loose tolerances, and the tolerance down to which it costs less than that
 #: of higher order; and where stability sets the steps, for at its bound that one keeps errors that
-#: this one damps: of motions that are damped by more than this ratio, or are so many times what is
-#: asked.
-_LOOSE_EXPLICIT, _LOW_ORDER, _LOW_WHERE_HELD, _DAMPED, _FAR = "dopri5", 1e-4, 1e-6, 0.03, 100.0
+#: this one damps: of motions that are damped by more than this ratio, or far above what is asked.
+_LOOSE_EXPLICIT, _LOW_ORDER, _LOW_WHERE_HELD, _DAMPED = "dopri5", 1e-4, 1e-6, 0.03
 
 #: The exponential method; for errors from this one on; steps after which its first run is given up,
 #: and that number in |lambda| T.  It pays from this |lambda| T on, for an error of _LOOSE and a
@@ -200,9 +199,7 @@ class Family:
         """Whether it pays that explicit steps at their bound of stability damp their errors: where
         the fastest motions are damped as well, or far above what is asked."""
         known = self._known
-        return known is not None and (
-            known.fastest_damping > _DAMPED or known.fastest_part > _FAR * self._error
-        )
+        return known is not None and (known.fastest_damping > _DAMPED or known.races(self._error))
 
     @property
     def _lasts(self) -> float:

@@ -68,10 +68,9 @@ class Vibration:
         """Damping ratio of the fastest motions, the least of them."""
         return float(self._of_the_fastest(self.dampings).min(initial=1.0))
 
-    @property
-    def fastest_part(self) -> float:
-        """Amplitude of coordinates in the fastest motions, the largest of them."""
-        return float(self._of_the_fastest(self.parts).max(initial=0.0))
+    def races(self, asked: float) -> bool:
+        """Whether one of the fastest motions is far above what is asked."""
+        return bool((self._of_the_fastest(self.parts) > _FAR * asked).any())
 
     def _of_the_fastest(self, numbers: Array) -> Array:
         return numbers[self.rates >= _AS_FAST * self.rate]

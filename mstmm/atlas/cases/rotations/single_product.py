@@ -5,14 +5,12 @@ from __future__ import annotations
 from functools import partial
 
 from ...definition import Definition, Method
+from ...measures import TURNING, error_of_turning
 from ...scale import LOG
 from ...variants import plain_charts
-from .plain_charts import T_END, error_of
 
-
-def _error(step: float, products: int) -> float:
-    return error_of(partial(plain_charts.end_of, products=1) if products < 2 else "kvaerno5", step)
-
+#: With one product.
+ONE = partial(plain_charts.end_of, products=1)
 
 CASE = Definition(
     name="single-product",
@@ -22,8 +20,8 @@ CASE = Definition(
     "what comes out: a table of fourth or fifth order gains nothing on shorter steps that it was "
     "chosen for. Runs on charts keep two products, enough for the fifth order of their tables.",
     parameter="length of a step", unit="s", low=4e-3, high=0.2, scale=LOG,
-    measured=f"error of the attitude after {T_END:g} s, rad", limit=1e-6,
-    method=Method("rk4, one product kept", lambda step: _error(step, 1)),
-    remedy=Method("kvaerno5, two kept", lambda step: _error(step, 2)), reach=0.2,
+    measured=f"error of the attitude after {TURNING:g} s, rad", limit=1e-6,
+    method=Method("rk4, one product kept", lambda h: error_of_turning(ONE, h)),
+    remedy=Method("kvaerno5, two kept", lambda h: error_of_turning("kvaerno5", h)), reach=0.2,
     source="Munthe-Kaas, BIT 38, 1998; Iserles, Munthe-Kaas, Norsett, Zanna, Acta Numerica 9, 2000",
 )  # fmt: skip
