@@ -3,6 +3,9 @@ set -euo pipefail
 ROOT="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 export ROOT PIP_DISABLE_PIP_VERSION_CHECK=1 PYTHONUNBUFFERED=1 MPLBACKEND=Agg
 VENV="$ROOT/.venv"
+# The same C is compiled for every environment that is made here: the first one's objects serve the others.
+export CCACHE_DIR="$ROOT/build/ccache" CCACHE_NOHASHDIR=1
+[ ! -d /usr/lib/ccache ] || PATH="/usr/lib/ccache:$PATH"
 cd "$ROOT"
 
 # step TITLE COMMAND...: runs the command under a heading, prints its time, stops at a failure.

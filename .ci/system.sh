@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What pip cannot bring: Python with venv and headers, a C compiler, a browser, LaTeX.
+# What pip cannot bring: Python with venv and headers, C compilers and a cache of theirs, a browser, LaTeX.
 # Installs only what is missing.
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
@@ -7,6 +7,7 @@ missing=()
 command -v python3 >/dev/null || missing+=(python3)
 command -v gcc >/dev/null || missing+=(gcc)
 command -v clang >/dev/null || missing+=(clang)      # the second opinion on warnings
+command -v ccache >/dev/null || missing+=(ccache)    # what one step compiles serves the next
 command -v git >/dev/null || missing+=(git)
 command -v chromium >/dev/null || missing+=(chromium)  # pages are opened and looked at
 command -v pdflatex >/dev/null || missing+=(texlive-latex-base)  # equations are compiled
