@@ -44,6 +44,11 @@ typedef struct {
     /* Inverse dynamics and the mass matrix; see derive/fuse/inverse.py. */
     int (*required)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *efforts);
     int (*mass)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *M);
+    /* A point of one body; see derive/fuse/points.py. */
+    int (*placed)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *place, double *axes);
+    int (*moving)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *velocity);
+    int (*jacobian)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *J);
+    int (*jacobian_rate)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *J);
     /* The slopes of the residual about a state; see derive/fuse/linear.py. */
     int (*linear)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *M, double *C, double *K, double *G, double *r_t);
 } mstmm_fused;

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from fractions import Fraction
 
@@ -50,11 +50,11 @@ class Replay(RowSlots):
     """One replay of sweeps.  `staged`: transport goes stage by stage, where what is known folds;
     `inverse`: accelerations are given; `refined`: they are an answer of a tree, to which that of
     what they leave over is added; `level`: "gaping" or "slipping", what is corrected of closed
-    loops."""
+    loops; `way`: the only bodies that are met, all with poses."""
 
     def __init__(
         self, state: FusionState, staged: bool = True, inverse: bool = False, level: str = "",
-        refined: bool = False,
+        refined: bool = False, way: Collection[int] | None = None,
     ) -> None:  # fmt: skip
         super().__init__(state)
         self.staged, self.inverse, self.level = staged, inverse or refined, level
@@ -64,7 +64,8 @@ class Replay(RowSlots):
         self._values: Nodes = []
         #: What couplings lack.
         self.lacks: list[tuple[CouplingStructure, Node]] = []
-        self._posed = self._bodies_with_poses()
+        self._met = range(len(state.structure.bodies)) if way is None else sorted(way)
+        self._posed = self._bodies_with_poses() if way is None else set(way)
 
     # --- passes ---------------------------------------------------------------------------------
 
@@ -89,9 +90,7 @@ class Replay(RowSlots):
         s = self.state.structure
         if whole.subject == "body":
             return [
-                self.body_subject(i)
-                for i in range(len(s.bodies))
-                if whole is not POSES or i in self._posed
+                self.body_subject(i) for i in self._met if whole is not POSES or i in self._posed
             ]
         if whole.subject == "row":
             return [row_subject(s.rows, i) for i, row in enumerate(s.rows) if row.body == GROUND]

@@ -33,7 +33,7 @@ class FusedKernels(Protocol):
 
     @property
     def kernels(self) -> Mapping[str, KernelIR]:
-        """Those of `fuse`, `fuse_implicit`, `fuse_slopes` or `fuse_inverse`."""
+        """Those of `fuse`, `fuse_implicit`, `fuse_slopes`, `fuse_inverse` or `fuse_points`."""
 
     @property
     def failures(self) -> tuple[tuple[int, int, int], ...]:
@@ -72,7 +72,7 @@ def fused_sources(fused: FusedKernels, key: str, part: str = "scalar") -> dict[s
     Part "scalar" holds the kernels for one state (accelerations, accelerations_power, gaps, slips),
     part "lanes" those for several states at once (accelerations_lanes, accelerations_many), part
     "implicit" what implicit methods ask for, part "linear" the slopes about a state, part "inverse"
-    inverse dynamics and the mass matrix.
+    inverse dynamics and the mass matrix, part "points K" kinematics of points of body K.
     """
     kernels = _written(fused, part)
     sizes = {port.name: port.length() for port in next(iter(kernels.values())).inputs}

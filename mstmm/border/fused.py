@@ -6,7 +6,7 @@ Both the printer of the C text and the opener of the library read it; no other m
 from __future__ import annotations
 
 #: Number of the layout below; changed with every change of it, and checked when a library opens.
-ABI = 9
+ABI = 10
 
 #: Name of the one variable that a library exports.
 SYMBOL = "mstmm_fused_library"
@@ -24,6 +24,7 @@ TUNING = ("-fno-tree-slp-vectorize",)
 _AT = "const double *p, const double *t, const double *q, const double *u, const double *memory, "
 _STATE = _AT + "const double *efforts, double *qdot, double *udot"
 _GIVEN = _AT + "const double *a"
+_END = _AT + "const double *end"
 
 #: `failures` holds (reason, element, code) of guard codes 1, 2, ... as mstmm_failure has them.
 #: Functions that a library does not hold are NULL.  A kernel returns 0 or a guard's code; then what
@@ -69,6 +70,11 @@ typedef struct {{
     /* Inverse dynamics and the mass matrix; see derive/fuse/inverse.py. */
     int (*required)({_GIVEN}, double *efforts);
     int (*mass)({_GIVEN}, double *M);
+    /* A point of one body; see derive/fuse/points.py. */
+    int (*placed)({_END}, double *place, double *axes);
+    int (*moving)({_END}, double *velocity);
+    int (*jacobian)({_END}, double *J);
+    int (*jacobian_rate)({_END}, double *J);
     /* The slopes of the residual about a state; see derive/fuse/linear.py. */
     int (*linear)({_GIVEN}, double *M, double *C, double *K, double *G, double *r_t);
 }} mstmm_fused;

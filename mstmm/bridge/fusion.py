@@ -83,11 +83,7 @@ class Fusion:
         made = {key: one.spec for key, one in known.items() if one.spec is not None}
         self._definitions = {**definitions, **made}
         self.obstacle = obstacle or _obstacle(packed, most)
-        self.library: FusedLibrary | None = None
-        self.lanes: FusedLibrary | None = None
-        self.implicit: FusedLibrary | None = None
-        self.linear: FusedLibrary | None = None
-        self.inverse: FusedLibrary | None = None
+        self.made: dict[str, FusedLibrary] = {}
         self.note = ""
         self._insisted = False  # engine="fused": batches too
         self.inputs: Places = ()
@@ -97,6 +93,23 @@ class Fusion:
             self.inputs = self.structure.inputs
             self.obstacle = _too_wide(self.structure, most)
         self._looped_by_nature = bool(self.obstacle)
+
+    @property
+    def library(self) -> FusedLibrary | None:
+        """The scalar library where it has been found or built; the others likewise."""
+        return self.made.get("scalar")
+
+    @property
+    def lanes(self) -> FusedLibrary | None:
+        return self.made.get("lanes")
+
+    @property
+    def implicit(self) -> FusedLibrary | None:
+        return self.made.get("implicit")
+
+    @property
+    def inverse(self) -> FusedLibrary | None:
+        return self.made.get("inverse")
 
     def find(self) -> FusedLibrary | None:
         """The scalar library if it is in the cache; no compiler is started."""
@@ -127,9 +140,7 @@ class Fusion:
         if self.obstacle or other.obstacle:
             return
         if self.structure == other.structure:
-            self.library, self.lanes, self.note = other.library, other.lanes, other.note
-            self.implicit, self.linear = other.implicit, other.linear
-            self.inverse = other.inverse
+            self.made, self.note = other.made, other.note
         elif other.library is not None:
             try:
                 self.build()
@@ -181,6 +192,12 @@ class Fusion:
             return None
         return self._of_trees("inverse", calls > self._break_even())
 
+    def ready_points(self, body: int, calls: float) -> FusedLibrary | None:
+        """The same for kinematics of points of a body of a tree."""
+        if self.obstacle or body < 0 or not self.structure.nu:
+            return None
+        return self._of_trees(f"points {body}", calls > self._break_even())
+
     def _of_small(self, part: str, pays: bool) -> FusedLibrary | None:
         if self.obstacle or not 0 < self.structure.nu <= _MOST_UNKNOWNS:
             return None
@@ -210,8 +227,7 @@ class Fusion:
         return seconds / (_SAVED_PER_BODY * max(1, sum(1 + 2 * count for count in modes)))
 
     def _get(self, part: str, build: bool) -> FusedLibrary | None:
-        attribute = "library" if part == "scalar" else part
-        found: FusedLibrary | None = getattr(self, attribute)
+        found = self.made.get(part)
         if found is not None or self.obstacle:
             return found
         recipe = self._recipe(part)
@@ -223,7 +239,8 @@ class Fusion:
         except EnvironmentFailure:
             if build:
                 raise
-        setattr(self, attribute, found)
+        if found is not None:
+            self.made[part] = found
         return found
 
     def _recipe(self, part: str) -> Recipe:
@@ -237,11 +254,16 @@ class Fusion:
     def _sources(self, part: str, key: str) -> dict[str, str]:
         from ..derive.print.scene import fused_sources
 
-        make = {
-            "implicit": self.fused_implicit, "linear": self.fused_linear,
-            "inverse": self.fused_inverse,
-        }.get(part, self.fused)  # fmt: skip
-        return fused_sources(make(self.structure), key, part)
+        what, _, body = part.partition(" ")
+        if what == "points":
+            found = self.fused_points(self.structure, int(body))
+        else:
+            make = {
+                "implicit": self.fused_implicit, "linear": self.fused_linear,
+                "inverse": self.fused_inverse,
+            }.get(what, self.fused)  # fmt: skip
+            found = make(self.structure)
+        return fused_sources(found, key, part)
 
     def columns(
         self,
@@ -308,6 +330,12 @@ class Fusion:
         from ..derive.fuse.inverse import fuse_inverse
 
         return fuse_inverse(structure, kernels_of(self._definitions))
+
+    def fused_points(self, structure: Structure, body: int) -> Fused:
+        """The same of points of one body."""
+        from ..derive.fuse.points import fuse_points
+
+        return fuse_points(structure, kernels_of(self._definitions), body)
 
     def symbolic(self, linear: Equations, keep: Sequence[str]) -> Symbolic:
         """See `Equations.symbolic`; no compiler."""

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 class Fusing(Protocol):
     """Fused libraries of a scene: `library` for one state, `lanes` for several side by side,
-    `implicit` for what implicit methods ask, `linear` for slopes about a state, `inverse` for
-    inverse dynamics and the mass matrix.
+    `implicit` for what implicit methods ask, `inverse` for inverse dynamics and the mass matrix, as
+    far as they are there.
 
     `numbers` is the vector p they read, `inputs` where inputs stand in it; `note` says where the
     library came from, `obstacle` why there can be none.  `ready(n)` gives a library if it is there
@@ -31,16 +31,19 @@ class Fusing(Protocol):
     `symbolic` is a linear model as formulas.
     """
 
-    library: FusedLibrary | None
-    lanes: FusedLibrary | None
-    implicit: FusedLibrary | None
-    linear: FusedLibrary | None
-    inverse: FusedLibrary | None
     numbers: Array
     inputs: Places
     note: str
     obstacle: str
 
+    @property
+    def library(self) -> FusedLibrary | None: ...
+    @property
+    def lanes(self) -> FusedLibrary | None: ...
+    @property
+    def implicit(self) -> FusedLibrary | None: ...
+    @property
+    def inverse(self) -> FusedLibrary | None: ...
     def find(self) -> FusedLibrary | None: ...
     def build(self) -> FusedLibrary: ...
     def follow(self, other: Any) -> None: ...
@@ -50,6 +53,7 @@ class Fusing(Protocol):
     def ready_implicit(self, evaluations: float) -> FusedLibrary | None: ...
     def ready_linear(self, pays: bool) -> FusedLibrary | None: ...
     def ready_inverse(self, calls: float) -> FusedLibrary | None: ...
+    def ready_points(self, body: int, calls: float) -> FusedLibrary | None: ...
     def fused(self, structure: Any) -> Any: ...
     def columns(
         self, structure: Any, kernels: Callable[[], Any], what: str, build: bool
@@ -66,7 +70,6 @@ class NotFused:
     library: FusedLibrary | None = None
     lanes: FusedLibrary | None = None
     implicit: FusedLibrary | None = None
-    linear: FusedLibrary | None = None
     inverse: FusedLibrary | None = None
     note: str = ""
     numbers: Array = field(default_factory=lambda: np.zeros(0))
@@ -99,6 +102,9 @@ class NotFused:
         return None
 
     def ready_inverse(self, calls: float) -> None:
+        return None
+
+    def ready_points(self, body: int, calls: float) -> None:
         return None
 
     def fused(self, structure: Any) -> Any:

@@ -228,7 +228,8 @@ class Moving(Compiled):
         from ..engine.references import References
         from ..engine.states.kinematics import Kinematics
 
-        return Kinematics(self.looped, References(self.scene.skeleton), self._bracket_entries)
+        references = References(self.scene.skeleton)
+        return Kinematics(self.looped, self.fusion, references, self._bracket_entries)
 
     @cached_property
     def _alone(self) -> Alone:

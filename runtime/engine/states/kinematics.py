@@ -18,8 +18,10 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.scene import split
 
+from ...kernels.fused import FusedLibrary
 from ...kernels.prepared import Call, nothing, prepared
 from ..calls import Probe
+from ..code import Fusing
 from ..engine import Engine
 from ..references import References
 from ..shown import COLUMNS
@@ -49,26 +51,51 @@ class Kinematics:
     """Calls on one packed scene.  Safe to make from several threads.
 
     Rows of states are arrays (n, nq), (n, nu).  `brackets` are those of the increments, None where
-    they change with the state.
+    they change with the state.  Code of the scene is looked for as bodies are asked for.
     """
 
     def __init__(
-        self, engine: Engine, references: References, brackets: Callable[[], Brackets | None]
-    ) -> None:
-        self._engine, self._references = engine.inertia_alone, references
+        self, engine: Engine, fusion: Fusing, references: References,
+        brackets: Callable[[], Brackets | None],
+    ) -> None:  # fmt: skip
+        self._engine, self._fusion, self._references = engine.inertia_alone, fusion, references
         self._brackets, self._bends = brackets, bool(engine.packed.layout.modal)
-        self._known = dict[Names, tuple[Any, int]]()
+        self._known = dict[Names, list[Probe]]()
+        self._records = dict[Names, tuple[Any, int]]()
         self._calls = dict[tuple[str, Names], Call]()
+        #: How often bodies or ends were asked for without code of the scene.
+        self._asked = dict[Names, int]()
         self._local = threading.local()
         self._numbers = int(engine.lib.MSTMM_PROBE_NUMBERS)
 
     def call(self, kind: str, of: Names) -> Call:
         """The call on one state, q (nq,) or q and u (nu,), that answers "places", "poses",
         "velocities", "jacobian" or "jacobian_rate" of bodies or ends."""
-        key = of if isinstance(of, str) else texts_of("of", of, "rod1.tip")
-        found = self._calls.get((kind, key))
+        key = tuple(of) if type(of) is list else of
+        try:
+            found = self._calls.get((kind, key))
+        except TypeError:  # no names: `texts_of` says what is wrong
+            found = None
         if found is None:
-            found = self._calls[kind, key] = self._prepared(kind, key)
+            key = of if isinstance(of, str) else texts_of("of", of, "rod1.tip")
+            found = self._calls.get((kind, key))
+        if found is None or key in self._asked:
+            found = self._sought(kind, key)
+        return found
+
+    def _sought(self, kind: str, key: Names) -> Call:
+        """The same, where code is looked for at the first call and at those numbers that double."""
+        asked = self._asked[key] = self._asked.get(key, 0) + 1
+        found = self._calls.get((kind, key))
+        if found is None or asked & (asked - 1) == 0:
+            bodies = [probe.body for probe in self._probes_of(key)]
+            loops = self._bends or min(bodies, default=-1) < 0 or bool(self._fusion.obstacle)
+            codes = [] if loops else [self._fusion.ready_points(body, asked) for body in bodies]
+            there = [one for one in codes if one is not None]
+            complete = not loops and len(there) == len(bodies)
+            found = self._calls[kind, key] = self._prepared(kind, key, there if complete else None)
+            if complete or loops:
+                del self._asked[key]
         return found
 
     def each(self, kind: str, of: Names, general: Callable[..., Array], *states: Array) -> Array:
@@ -81,18 +108,25 @@ class Kinematics:
             place[:] = general(of, *given) if answer is None else answer
         return found
 
-    def _prepared(self, kind: str, of: Names) -> Call:
+    def _prepared(self, kind: str, of: Names, codes: list[FusedLibrary] | None) -> Call:
         engine, (probes, count) = self._engine, self._probes(of)
+        if codes is not None:
+            fused = _Compiled(engine, self._fusion, self._probes_of(of), codes)
+            return self._of_record(kind, of, "compiled_points", fused)
         by_speeds = kind.startswith("jacobian")
         brackets = self._brackets() if kind == "jacobian_rate" and not self._bends else []
         if brackets is None or not small(engine) or (by_speeds and self._bends):
             return nothing
-        moving, shape = _SHAPES[kind]
-        several = () if isinstance(of, str) else (count,)
         record = _Points(engine, self._room, probes, count, brackets)
+        return self._of_record(kind, of, "points", record)
+
+    def _of_record(self, kind: str, of: Names, functions: str, record: Any) -> Call:
+        nq, nu = self._engine.nq, self._engine.nu
+        moving, shape = _SHAPES[kind]
+        several = () if isinstance(of, str) else (len(of),)
         return prepared(
-            f"mstmm_points_{kind}", record.record, (engine.nq, engine.nu)[: 1 + moving],
-            (*several, *shape, *((engine.nu,) if by_speeds else ())), kept=record,
+            f"mstmm_{functions}_{kind}", record.record, (nq, nu)[: 1 + moving],
+            (*several, *shape, *((nu,) if kind.startswith("jacobian") else ())), kept=record,
         )  # fmt: skip
 
     @cached_property
@@ -154,6 +188,14 @@ class Kinematics:
 
     def _probes(self, of: Names) -> tuple[Any, int]:
         """Records of bodies and ends for C, kept; SceneError for one that there is not."""
+        known = self._records.get(of if isinstance(of, str) else tuple(of))
+        if known is None:
+            places = self._probes_of(of)
+            known = self._engine.probes(places), len(places)
+            self._records[of if isinstance(of, str) else tuple(of)] = known
+        return known
+
+    def _probes_of(self, of: Names) -> list[Probe]:
         key = of if isinstance(of, str) else texts_of("of", of, "rod1.tip")
         known = self._known.get(key)
         if known is None:
@@ -161,8 +203,7 @@ class Kinematics:
             for name in names:
                 if split(name)[0] != "ground" and name not in self._references:
                     raise SceneError(self._references.unknown(name))
-            places = [Probe(*self._engine.packed.end(name)) for name in names]
-            known = self._known[key] = self._engine.probes(places), len(places)
+            known = self._known[key] = [Probe(*self._engine.packed.end(name)) for name in names]
         return known
 
     def _run(self, function: str, *given: Any) -> None:
@@ -188,6 +229,24 @@ class _Record:
         self.record = engine.ffi.new("mstmm_kinematics *")
         self.failure = engine.ffi.new("mstmm_failure *")
         self._pointed = _fill(self.record, engine, engine.workspace())
+
+
+class _Compiled:
+    """What C works with where there is code of the scene."""
+
+    def __init__(
+        self, engine: Engine, fusion: Fusing, probes: list[Probe], codes: list[FusedLibrary]
+    ) -> None:
+        ffi, pointer = engine.ffi, engine.pointer
+        self.record = record = ffi.new("mstmm_compiled_points *")
+        ends = np.array([[*probe.offset, *probe.axes] for probe in probes])
+        arrays = ends.ravel(), np.array(fusion.numbers), engine.start_memory(), np.zeros(engine.nu)
+        pointed = [pointer(array) for array in arrays]
+        record.ends, record.p, record.memory, record.none = pointed
+        libraries = ffi.new("mstmm_fused *[]", [ffi.cast("mstmm_fused *", one.descriptor)
+                                                for one in codes])  # fmt: skip
+        record.n_probes, record.codes = len(codes), libraries
+        self._pointed = *pointed, libraries, codes
 
 
 class _Points:
