@@ -40,9 +40,10 @@ if TYPE_CHECKING:
     from ..runtime.pack.system import System
 
 #: More bodies (ends and sections of flexible bodies count) than this are not fused unless the user
-#: asks for it: compilers take seconds (4.5 s of CPU for 50 pins, 10 for 100).
-MOST_BODIES = 64
-#: More than this are not fused at all: 400 pins take 22 s of CPU.
+#: asks for it: compilers take seconds (of CPU, on two busy cores: 7 for 64 pins, 9 for 100), and
+#: evaluations gain less (a half of the time is left at 100 pins, four fifths at 100 balls).
+MOST_BODIES = 100
+#: More than this are not fused at all: 400 pins take half a minute of CPU.
 MOST_ASKED = 400
 #: Seconds that a compiler takes for the scalar code, by bodies, and seconds that one evaluation
 #: saves per body; measured, see benchmarks/startup.  Only their ratio matters, and
