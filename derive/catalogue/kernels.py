@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import sympy as sp
 
@@ -30,7 +31,13 @@ from ..equations import force as force_kernels
 from ..equations import tangent_placed as placed
 from ..equations.complement import complement
 from ..equations.factored import eliminate_factored, recover_factored
-from ..equations.hinge import HingeMotion, hinge_derivation, hinge_quantities, motion_of
+from ..equations.hinge import (
+    HingeMotion,
+    hinge_derivation,
+    hinge_quantities,
+    motion_of,
+    place_of,
+)
 from ..equations.links import axial, turning
 from ..flexible import beam_fields, beam_second_order, modal, modal_rows, modal_sweep, section
 from ..language.derivation import Derivation, Equation, Quantity, vector
@@ -130,6 +137,7 @@ def _singularity(motion: HingeMotion, measure: sp.Expr) -> Derivation:
     )
 
 
+@cache
 def generic_kernels(nu: int) -> tuple[Kernel, ...]:
     """The sweep's steps for any hinge with `nu` free speeds."""
     return (
@@ -188,19 +196,19 @@ def loop_kernels() -> tuple[Kernel, ...]:
     )
 
 
-def links() -> dict[str, Hinge]:
+@cache
+def links() -> Mapping[str, Hinge]:
     """Built-in hinges that move about and along z alone, or turn about a point, by name."""
     hinges = [element for element in builtin_elements() if isinstance(element, Hinge)]
-    return {hinge.name: hinge for hinge in hinges if _axial(hinge) or _turning(hinge)}
+    return {
+        hinge.name: hinge for hinge in hinges
+        if _axial(hinge) or turning.turns_about_a_point(hinge)
+    }  # fmt: skip
 
 
 def _axial(hinge: Hinge) -> bool:
-    motion = motion_of(hinge)
-    return motion.nu > 0 and hinge.speeds is None and axial.along_z(motion) is not None
-
-
-def _turning(hinge: Hinge) -> bool:
-    return turning.turns_about_a_point(motion_of(hinge))
+    place = place_of(hinge)
+    return place.nu > 0 and hinge.speeds is None and axial.along_z(place) is not None
 
 
 #: What follows the name of a hinge whose speed has a rotor, in that of its link.
@@ -211,7 +219,7 @@ def link_names() -> dict[str, str]:
     """Name of every link, a hinge's with and without a rotor -> what it is of; hinges of several
     speeds have none with rotors."""
     found = {name: f"rigid body behind the {hinge.title}" for name, hinge in links().items()}
-    single = [name for name, hinge in links().items() if motion_of(hinge).nu == 1]
+    single = [name for name, hinge in links().items() if place_of(hinge).nu == 1]
     return found | {f"{name}{ROTOR}": f"{found[name]} with a rotor" for name in single}
 
 
@@ -220,7 +228,7 @@ def link_kernels(name: str) -> tuple[Kernel, ...]:
     hinge, rotor, body = links()[name.removesuffix(ROTOR)], name.endswith(ROTOR), RigidBody()
     motion = motion_of(hinge)
     guards = sweep.pivot_guards(motion.nu, motion.in_arrays(motion.subspace), axial.floor(body))
-    if _turning(hinge):
+    if turning.turns_about_a_point(hinge):
         return (
             Kernel("turn", turning.turn(motion)),
             Kernel("forward", turning.forward(motion, body)),
@@ -275,9 +283,20 @@ def classical_kernel(name: str) -> Kernel:
     return Kernel("transfer", derivation, classical_guards(derivation))
 
 
-def built_in() -> dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]:
+Table = dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]
+
+
+def built_in() -> Table:
     """(kind, name) -> its kernels, for everything that comes with the package."""
-    table: dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]] = {
+    return _but_for_links() | {
+        ("sweep", f"link_{name}"): lambda name=name: link_kernels(name)
+        for name in link_names()
+    }
+
+
+def _but_for_links() -> Table:
+    """The same of what is named without a derivation."""
+    table: Table = {
         (kind_of(e), e.name): lambda e=e: kernels_of(e)  # type: ignore[misc]
         for e in builtin_elements()
     }
@@ -289,8 +308,6 @@ def built_in() -> dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]:
     table["sweep", "modal"] = modal_kernels
     table["sweep", "tangent"] = tangent_kernels
     table["sweep", "beam"] = beam_kernels
-    for name in link_names():
-        table["sweep", f"link_{name}"] = lambda name=name: link_kernels(name)  # type: ignore[misc]
     for nu in range(MAX_SPEEDS + 1):
         table["sweep", f"generic{nu}"] = lambda nu=nu: generic_kernels(nu)  # type: ignore[misc]
     for name in CLASSICAL:
@@ -298,9 +315,14 @@ def built_in() -> dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]:
     return table
 
 
+def maker(kind: str, name: str) -> Callable[[], tuple[Kernel, ...]] | None:
+    """What makes the kernels of one built-in element; None if there is none."""
+    return _but_for_links().get((kind, name)) or built_in().get((kind, name))
+
+
 def built_in_kernels(kind: str, name: str) -> tuple[Kernel, ...]:
     """Kernels of one built-in element.  ElementError if there is none."""
-    make = built_in().get((kind, name))
+    make = maker(kind, name)
     if make is None:
         raise ElementError(f"there is no built-in {kind} called {name!r}")
     return make()

@@ -28,8 +28,8 @@ SIMPLIFY_LIMIT = 400
 
 
 @dataclass(frozen=True)
-class HingeMotion:
-    """Relative motion of a hinge as SymPy matrices in the symbols q, u, p."""
+class HingePlace:
+    """Relative place of a hinge as SymPy matrices in the symbols q, p."""
 
     hinge: Hinge
     q: Symbols
@@ -37,15 +37,21 @@ class HingeMotion:
     p: Symbols
     rotation: sp.Matrix
     position: sp.Matrix
+
+    @property
+    def nu(self) -> int:
+        return len(self.u)
+
+
+@dataclass(frozen=True)
+class HingeMotion(HingePlace):
+    """Relative motion of a hinge as SymPy matrices in the symbols q, u, p."""
+
     subspace: sp.Matrix
     velocity: sp.Matrix
     spin: sp.Matrix
     bias: sp.Matrix
     rates: sp.Matrix
-
-    @property
-    def nu(self) -> int:
-        return len(self.u)
 
     def in_arrays(self, matrix: sp.Matrix) -> sp.ImmutableDenseMatrix:
         """The same matrix over the entries of the arrays q, u, p."""
@@ -68,18 +74,25 @@ def speeds_of(hinge: Hinge) -> tuple[Param, ...]:
 
 
 @lru_cache(maxsize=32)
+def place_of(hinge: Hinge) -> HingePlace:
+    """Rotation and position as the definition states them; of these nothing is derived."""
+    q = Symbols("q", tuple(c.name for c in hinge.coordinates))
+    u = Symbols("u", tuple(s.name for s in speeds_of(hinge)))
+    p = Symbols("p", tuple(x.name for x in hinge.parameters))
+    where = f"hinge {hinge.name}"
+    rotation = stated.matrix(where, "rotation(q, p)", hinge.rotation, (3, 3), q, p)
+    position = stated.matrix(where, "position(q, p)", hinge.position, (3, 1), q, p)
+    return HingePlace(hinge, q, u, p, rotation, position)
+
+
+@lru_cache(maxsize=32)
 def motion_of(hinge: Hinge) -> HingeMotion:
     """Derive H and c, once for each definition.
 
     Raises ElementError naming the equation that a definition contradicts.
     """
-    speeds = speeds_of(hinge)
-    q = Symbols("q", tuple(c.name for c in hinge.coordinates))
-    u = Symbols("u", tuple(s.name for s in speeds))
-    p = Symbols("p", tuple(x.name for x in hinge.parameters))
-    where = f"hinge {hinge.name}"
-    rotation = stated.matrix(where, "rotation(q, p)", hinge.rotation, (3, 3), q, p)
-    position = stated.matrix(where, "position(q, p)", hinge.position, (3, 1), q, p)
+    place, where = place_of(hinge), f"hinge {hinge.name}"
+    q, u, p, rotation, position = place.q, place.u, place.p, place.rotation, place.position
     rates = stated.optional(where, "rates(q, u, p)", hinge.rates, q, u, p)
     if rates is None and len(q) != len(u):
         raise ElementError(

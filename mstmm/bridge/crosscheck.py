@@ -47,12 +47,12 @@ def crosscheck(kind: str, name: str, points: int = 2) -> Report:
     `points` random points per kernel besides the special ones.  Raises ElementError for a name
     that nobody knows.
     """
-    from ..derive.catalogue.kernels import built_in
+    from ..derive.catalogue.kernels import maker
     from ..derive.catalogue.registry import builtin_elements, kind_of
     from ..ir.stored import element_from_json
     from ..runtime.kernels import prebuilt, store
 
-    make, compiled = built_in().get((kind, name)), prebuilt.elements().get((kind, name))
+    make, compiled = maker(kind, name), prebuilt.elements().get((kind, name))
     if make is not None:
         kernels = make()
         element = next(

@@ -24,7 +24,7 @@ from ...language.element import Body
 from .. import body as body_kernels
 from ..algebra import part, stack, symbol
 from ..eliminate import REDUCED_E, REDUCED_S, eliminate, with_unit_columns
-from ..hinge import HingeMotion, hinge_quantities
+from ..hinge import HingeMotion, HingePlace, hinge_quantities
 from ..screw import OUT_E, OUT_S, Stage
 from ..sweep import (
     DELTA,
@@ -61,14 +61,14 @@ def _about_z() -> Stage:
     return Stage(2, TURN.symbol[0, 0], TURN.symbol[1, 0], SHIFT.symbol[0, 0], "_z")
 
 
-def along_z(motion: HingeMotion) -> tuple[sp.Expr, sp.Expr] | None:
+def along_z(place: HingePlace) -> tuple[sp.Expr, sp.Expr] | None:
     """Angle and shift as functions of q of a hinge that moves about and along z alone."""
-    rotation, position = motion.rotation, motion.position
+    rotation, position = place.rotation, place.position
     if any(rotation[k, 2] != (k == 2) or rotation[2, k] != (k == 2) for k in range(3)):
         return None
     if position[0] != 0 or position[1] != 0:
         return None
-    angles = [q for q in motion.q if rotation == sp.Matrix(sp.rot_axis3(-q))]
+    angles = [q for q in place.q if rotation == sp.Matrix(sp.rot_axis3(-q))]
     if not angles and rotation != sp.eye(3):
         return None
     return angles[0] if angles else sp.Integer(0), position[2]

@@ -18,12 +18,12 @@ from __future__ import annotations
 import sympy as sp
 
 from ...language.derivation import Derivation, Equation, Quantity, Triangular, tilde
-from ...language.element import Body
+from ...language.element import Body, Hinge
 from .. import body as body_kernels
 from ..algebra import part, stack, symbol
 from ..eliminate import REDUCED_E
 from ..factored import eliminate_factored
-from ..hinge import HingeMotion, hinge_quantities
+from ..hinge import HingeMotion, hinge_quantities, motion_of, place_of
 from ..screw import OUT_E, OUT_S
 from ..sweep import (
     DELTA,
@@ -49,11 +49,13 @@ TURN = Quantity(symbol("turn", 3, 3), "", "rotation, body axes to parent axes")
 NO_SHIFT = Quantity(symbol("d", 0), "m", "shift")
 
 
-def turns_about_a_point(motion: HingeMotion) -> bool:
+def turns_about_a_point(hinge: Hinge) -> bool:
     """Whether a hinge leaves its point where it is, and its speeds are the relative angular
-    velocity in the body's axes."""
+    velocity in the body's axes, which is the rate of no coordinates."""
+    if hinge.speeds is None or place_of(hinge).position.is_zero_matrix is not True:
+        return False
     turning = sp.Matrix.vstack(sp.zeros(3, 3), sp.eye(3))
-    return motion.position.is_zero_matrix is True and motion.subspace == turning
+    return bool(motion_of(hinge).subspace == turning)
 
 
 def _way() -> tuple[Equation, Equation]:
