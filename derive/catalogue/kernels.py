@@ -289,8 +289,7 @@ Table = dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]
 def built_in() -> Table:
     """(kind, name) -> its kernels, for everything that comes with the package."""
     return _but_for_links() | {
-        ("sweep", f"link_{name}"): lambda name=name: link_kernels(name)
-        for name in link_names()
+        ("sweep", f"link_{name}"): lambda name=name: link_kernels(name) for name in link_names()
     }
 
 

@@ -26,6 +26,9 @@ from ..language.switches import slope
 #: Trigonometric entries with more operations than this are left as differentiation gave them.
 SIMPLIFY_LIMIT = 400
 
+#: Digits of H at a place, and those to which numbers are the same.
+_DIGITS, _SAME = 60, 40
+
 
 @dataclass(frozen=True)
 class HingePlace:
@@ -91,21 +94,42 @@ def motion_of(hinge: Hinge) -> HingeMotion:
 
     Raises ElementError naming the equation that a definition contradicts.
     """
-    place, where = place_of(hinge), f"hinge {hinge.name}"
+    place = place_of(hinge)
     q, u, p, rotation, position = place.q, place.u, place.p, place.rotation, place.position
-    rates = stated.optional(where, "rates(q, u, p)", hinge.rates, q, u, p)
+    rates = _rates(place)
+    subspace = _simplify(_subspace(rotation, position, rates, q, u))
+    velocities = subspace * sp.Matrix(list(u)) if len(u) else sp.zeros(6, 1)
+    v, w = velocities[:3, :], velocities[3:, :]
+    bias = _simplify(_bias(v, w, rates, q))
+    return HingeMotion(hinge, q, u, p, rotation, position, subspace, v, w, bias, rates)
+
+
+def moves_as(hinge: Hinge, subspace: sp.Matrix) -> bool:
+    """Whether H is this matrix of numbers, by what it is at two places, to forty digits: what is
+    to be derived need not be derived to be named."""
+    place = place_of(hinge)
+    if (6, place.nu) != subspace.shape:
+        return False
+    found = _subspace(place.rotation, place.position, _rates(place), place.q, place.u)
+    for denominator in (7, 11):
+        symbols = (*place.q, *place.p)
+        there = {one: sp.Rational(k + 2, denominator) for k, one in enumerate(symbols)}
+        apart = (found - subspace).xreplace(there)
+        if any(abs(entry.evalf(_DIGITS)) > sp.Float(10) ** -_SAME for entry in apart):
+            return False
+    return True
+
+
+def _rates(place: HingePlace) -> sp.Matrix:
+    hinge, q, u, where = place.hinge, place.q, place.u, f"hinge {place.hinge.name}"
+    rates = stated.optional(where, "rates(q, u, p)", hinge.rates, q, u, place.p)
     if rates is None and len(q) != len(u):
         raise ElementError(
             f"{where}: {len(q)} coordinates but {len(u)} speeds; "
             "state qdot = N(q) u in rates(q, u, p)"
         )
     given = sp.Matrix(list(u)) if rates is None else rates
-    rates = stated.matrix(where, "rates(q, u, p)", lambda: given, (len(q), 1))
-    subspace = _simplify(_subspace(rotation, position, rates, q, u))
-    velocities = subspace * sp.Matrix(list(u)) if len(u) else sp.zeros(6, 1)
-    v, w = velocities[:3, :], velocities[3:, :]
-    bias = _simplify(_bias(v, w, rates, q))
-    return HingeMotion(hinge, q, u, p, rotation, position, subspace, v, w, bias, rates)
+    return stated.matrix(where, "rates(q, u, p)", lambda: given, (len(q), 1))
 
 
 def _subspace(

@@ -23,7 +23,7 @@ from .. import body as body_kernels
 from ..algebra import part, stack, symbol
 from ..eliminate import REDUCED_E
 from ..factored import eliminate_factored
-from ..hinge import HingeMotion, hinge_quantities, motion_of, place_of
+from ..hinge import HingeMotion, hinge_quantities, moves_as, place_of
 from ..screw import OUT_E, OUT_S
 from ..sweep import (
     DELTA,
@@ -55,7 +55,7 @@ def turns_about_a_point(hinge: Hinge) -> bool:
     if hinge.speeds is None or place_of(hinge).position.is_zero_matrix is not True:
         return False
     turning = sp.Matrix.vstack(sp.zeros(3, 3), sp.eye(3))
-    return bool(motion_of(hinge).subspace == turning)
+    return moves_as(hinge, turning)
 
 
 def _way() -> tuple[Equation, Equation]:
