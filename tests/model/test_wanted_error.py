@@ -128,11 +128,11 @@ def test_stiff_motion_is_reached_by_an_implicit_method() -> None:
     assert sum(one.evaluations for one in known.runs) < _counts(best).evaluations / 3
 
 
-def boom(torque: float, modes: int = 3) -> mstmm.Model:
-    """A beam of 2 m on a pin that a torque (N m) turns from the start, nothing damps it."""
+def boom(torque: float, modes: int = 3, zeta: float = 0.0) -> mstmm.Model:
+    """A beam of 2 m on a pin that a torque (N m) turns from the start."""
     beam = {
         "name": "boom", "length": 2.0, "mass_per_length": 1.0, "bending_stiffness": 1e3,
-        "modes": {"y": modes},
+        "modes": {"y": modes}, "damping": zeta,
     }  # fmt: skip
     hinge = {
         "name": "hub", "type": "pin", "axis": [0.0, 0.0, 1.0], "inboard": "ground",
@@ -176,6 +176,15 @@ def test_an_exponential_run_that_takes_too_many_steps_is_given_up(
     assert known is not None and known.met
     assert [one.method for one in known.runs if one.failure] == ["exprb32"]
     assert "exprb32" not in {one.method for one in known.runs if not one.failure}
+
+
+@pytest.mark.parametrize(("t_end", "method"), [(2.5, "exprb32"), (5.0, "rodas4p2")])
+def test_vibration_that_is_gone_soon_is_left_to_implicit_steps(t_end: float, method: str) -> None:
+    """|lambda| T of 3200 and 6400, where implicit steps, which follow it while it counts, pay from
+    1100 on."""
+    known = boom(1.0, zeta=0.05).simulate(t_end, error=1e-3).error_estimate
+    assert known is not None and known.met
+    assert known.runs[0].method == method
 
 
 def test_a_short_one_is_followed_by_explicit_steps() -> None:
