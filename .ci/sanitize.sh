@@ -19,16 +19,18 @@ printf '%s\0' "${sources[@]}" "${modules[@]}" |
 echo "--- warnings as errors: gcc; every kernel, sanitized"
 git clone -q "$ROOT" "$scratch/checkout"
 cd "$scratch/checkout"
-# cffi's own file is not ours to warn of.  Lines for what a sanitizer reports; the largest functions are
-# beyond what gcc tracks the variables of.
-cat >"$scratch/cc" <<EOF
+# Lines for what a sanitizer reports; the largest functions are beyond what gcc tracks the variables of.
+printf '#!/bin/sh\nexec gcc "$@" %s\n' "-O1 -g1 -fno-var-tracking ${sanitize[*]}" >"$scratch/cc"
+# Of what is compiled here cffi's own file is not ours to warn of.
+cat >"$scratch/strict" <<EOF
 #!/bin/sh
-case "\$*" in *._kernels.c*) ;; *-c*) set -- "\$@" ${strict[*]} ${headers[*]} ;; esac
-exec gcc "\$@" -O1 -g1 -fno-var-tracking ${sanitize[*]}
+case "\$*" in *._kernels.c*) ;; *" -c "*) set -- "\$@" ${strict[*]} ${headers[*]} ;; esac
+exec "$scratch/cc" "\$@"
 EOF
-chmod +x "$scratch/cc"
-export CC="$scratch/cc" PYTHONPATH="$scratch/checkout" ASAN_OPTIONS=detect_leaks=0
-"$VENV/bin/python" setup.py -q build_ext --inplace
+chmod +x "$scratch/cc" "$scratch/strict"
+export PYTHONPATH="$scratch/checkout" ASAN_OPTIONS=detect_leaks=0
+CC="$scratch/strict" "$VENV/bin/python" setup.py -q build_ext --inplace
+export CC="$scratch/cc"
 objects=(build/temp.*/generated/*.o build/temp.*/runtime/*/c/*.o)       # those without Python
 "$scratch/cc" "${strict[@]}" .ci/sanitize_kernels.c "${objects[@]}" -lm -o "$scratch/kernels"
 "$scratch/kernels"

@@ -6,7 +6,8 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
+from typing import Any
 
 #: Signals that ask a run to end with what it has.
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
@@ -48,12 +49,16 @@ def interruptible() -> Iterator[list[bool]]:
         elif time.monotonic() - since[0] > PATIENCE:
             raise KeyboardInterrupt
 
-    with ExitStack() as restored:
-        _open.append(flag)
-        restored.callback(_open.pop)
+    before: list[tuple[signal.Signals, Any]] = []
+    _open.append(flag)
+    try:
         for which in INTERRUPTS:
             previous = signal.getsignal(which)
             if previous is not None and previous is not signal.SIG_IGN:
-                restored.callback(signal.signal, which, previous)
+                before.append((which, previous))
                 signal.signal(which, note)
         yield flag
+    finally:
+        for which, previous in reversed(before):
+            signal.signal(which, previous)
+        _open.pop()

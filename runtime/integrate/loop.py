@@ -55,6 +55,9 @@ class Status(IntEnum):
     NOT_CONVERGED = -11
 
 
+_STATUS = {int(status): status for status in Status}
+
+
 @dataclass(frozen=True)
 class Samples:
     """Rows of a run.
@@ -259,7 +262,7 @@ class Run:
         self._run.pause_steps = steps
         while True:
             left = max(0.0, deadline - time.monotonic())
-            status = Status(self._lib.mstmm_advance(self._run, left))
+            status = _STATUS[self._lib.mstmm_advance(self._run, left)]
             self._drain()
             if status is not Status.BUFFER_FULL:
                 return status
@@ -359,7 +362,7 @@ class Run:
     @property
     def status(self) -> Status:
         """What the last `advance` returned."""
-        status = Status(self._run.count.status)
+        status = _STATUS[self._run.count.status]
         return Status.RUNNING if status is Status.BUFFER_FULL else status
 
     @property

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 from mstmm.arrays import Array
 
+from ..engine.compiled import Compiled
 from ..engine.engine import Engine
 from ..integrate.loop import Run
 from ..integrate.settings import Settings
 from .simulate import energy_at, make_run, suited, tolerances
 from .system import SceneCode, SceneSystem
 
+#: Runs of more components are long enough for all to be made anew.
+_MOST = 200
+
 
 class Beginnings:
     """Runs of one engine from one state over the same times with the same samples, one after the
-    other: the integrator of one stands at the start of the next.  On compiled code each is made
-    anew.
+    other: the integrator of one stands at the start of the next, while the code is the same.
     """
 
     def __init__(self) -> None:
@@ -25,10 +30,10 @@ class Beginnings:
         self, engine: Engine, compiled: SceneCode | None, settings: Settings, q: Array, u: Array
     ) -> tuple[SceneSystem, Run]:
         """The system and the integrator at the start of a run from (nq,), (nu,)."""
-        if compiled is not None or self._made is None:
+        if self._made is None or not self._made[0].goes_by(compiled):
             system = SceneSystem(engine, compiled)
             run = make_run(system, settings, q, u, energy=self._energy_at)
-            self._made = self._made if compiled is not None else (system, run)
+            self._made = system, run
             return system, run
         system, run = self._made
         tableau = suited(system, settings)
@@ -37,8 +42,34 @@ class Beginnings:
         run.begin(tableau, settings, start, tolerances(system, settings, start, self._energy_at))
         return system, run
 
+    def from_elsewhere(self) -> Beginnings:
+        """The same for runs from another state."""
+        self._energy = None
+        return self
+
     def _energy_at(self, system: SceneSystem, t: float, start: Array) -> float:
         """That of the start, J, looked at once."""
         if self._energy is None:
             self._energy = energy_at(system, t, start)
         return self._energy
+
+
+#: The integrator of a model's last run, and over which times with which samples.
+_waiting: WeakKeyDictionary[Compiled, tuple[object, Beginnings]] = WeakKeyDictionary()
+
+
+def taken(model: Compiled, settings: Settings) -> Beginnings:
+    """Beginnings of a run: of the model's last one where that was over the same times with the same
+    samples.  Of several threads one gets it."""
+    times, found = _waiting.pop(model, (None, None))
+    return Beginnings() if found is None or times != _times(settings) else found.from_elsewhere()
+
+
+def put_back(model: Compiled, settings: Settings, beginnings: Beginnings) -> None:
+    """Keep those of a run that has ended for the next one."""
+    if model.nq + model.nu <= _MOST:
+        _waiting[model] = _times(settings), beginnings
+
+
+def _times(settings: Settings) -> object:
+    return settings.t_start, settings.t_end, settings.output_times

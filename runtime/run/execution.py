@@ -18,7 +18,7 @@ from ..integrate.loop import Run, Samples, Status
 from ..integrate.settings import Settings
 from . import classical, second_opinion
 from . import engine_choice as compiled_run
-from .beginnings import Beginnings
+from .beginnings import Beginnings, put_back, taken
 from .checkpoint import Checkpoint, State
 from .error_estimate import ErrorEstimate, alike, compare, tighter
 from .method_choice import Choice
@@ -99,7 +99,8 @@ def first_run(
     beginnings: Beginnings | None = None,
 ) -> Trajectory:  # fmt: skip
     """The run from (q, u), or from the checkpoint.  Its failures are put down to a fixed
-    step that is too long.  `beginnings` are those of further runs from there."""
+    step that is too long.  `beginnings` are those of further runs from there; without, those of the
+    model's last run serve where they fit."""
     if settings.method in classical.METHODS or settings.method in second_opinion.METHODS:
         if watch.checkpoint is not None:
             raise SceneError(f'method "{settings.method}" keeps no checkpoints; use dop853')
@@ -109,7 +110,8 @@ def first_run(
     state, earlier = _continued(watch.checkpoint) if resume else (None, None)
     recorded = None if state is None else str(state["engine"])
     engine, compiled = model.looped, compiled_run.at_once(model, settings, recorded)
-    begin = (Beginnings() if beginnings is None else beginnings).begin
+    at_start = taken(model, settings) if beginnings is None else beginnings
+    begin = at_start.begin
     system, run = begin(engine, compiled, settings, q, u)
     watch.choice = choice_of(system, settings, run)
     message = "" if run.status is Status.RUNNING else said(system, run, run.status)
@@ -136,6 +138,8 @@ def first_run(
         found = replace(found, methods=tuple(watch.choice.stretches))
     if status is not None and not found.success:
         found = replace(found, message=_cause(engine, found, q, u))
+    if beginnings is None:
+        put_back(model, settings, at_start)
     return found
 
 

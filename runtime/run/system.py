@@ -88,6 +88,14 @@ class SceneSystem:
         self.system = ffi.new("mstmm_system *")
         engine.lib.mstmm_scene_system(run, self.system)
 
+    def goes_by(self, compiled: SceneCode | None) -> bool:
+        """Whether the right-hand side is this code, or none where none is given."""
+        code = self._code
+        if code is None or compiled is None:
+            return code is compiled
+        same = code.one is compiled.one and code.lanes is compiled.lanes
+        return same and code.numbers is compiled.numbers
+
     def offer_tangent(self) -> None:
         """Make what implicit methods ask for: residual and tangent, by code compiled for them where
         it is given."""
