@@ -24,7 +24,7 @@ from ...integrate.reached import Attempt, ReachedError
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO
 from ...result.measure import Coordinates, Measure, Quantities
-from ...run.beginnings import Beginnings
+from ...run.beginnings import put_back, taken
 from ...run.error_estimate import compare
 from ...run.execution import Watch, first_run
 from ..results import certified, result_of
@@ -75,7 +75,7 @@ class Search:
         self._wanted, self._progress = wanted, progress
         self._times = settings.output_times
         self._settings = replace(settings, output_times=_looked_at(settings))
-        self._beginnings = Beginnings()
+        self._beginnings = taken(model, self._settings)
         self._family = Family(model, settings, wanted.error, q, u)
         self._measure: Measure | None = None if wanted.of else Coordinates(model)
         self._rough = has_stops(model)
@@ -91,6 +91,7 @@ class Search:
         """
         with interruptible() as interrupted:
             found = self._found_by(interrupted)
+        put_back(self._model, self._settings, self._beginnings)
         if interrupted[0] and found.trajectory.status is not None:
             raise KeyboardInterrupt
         return found
