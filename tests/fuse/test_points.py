@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -106,6 +107,23 @@ def test_numbers_of_a_variant_are_its_own(rng: Generator) -> None:
     assert "points 2" in made(fused)
     assert apart(fused.jacobian(q, "c.tool"), longer.jacobian(q, "c.tool")) < 1e-12
     assert apart(fused.jacobian(q, "c.tool"), before) > 0.01
+
+
+def test_code_that_pays_serves_all_that_is_asked_of_its_body(
+    rng: Generator, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("MSTMM_CACHE", str(tmp_path))
+    model = mstmm.compile(machine())
+    q, u = rng.normal(size=model.nq), rng.normal(size=model.nu)
+    before = model.jacobian_rate(q, u, "c")
+    assert "points 2" not in made(model)
+    monkeypatch.setattr(Fusion, "_break_even", lambda self: 2.5)
+    for _ in range(3):  # looked for at the second call and at the fourth
+        model.positions(q, "c")
+    assert "points 2" in made(model)
+    kinematics = model._kinematics
+    assert not kinematics._asked and [kind for kind, _ in kinematics._calls] == ["places"]
+    assert apart(model.jacobian_rate(q, u, "c"), before) < 1e-12
 
 
 def test_the_ground_and_what_bends_are_left_to_the_loops(rng: Generator) -> None:

@@ -93,9 +93,12 @@ class Kinematics:
             codes = [] if loops else [self._fusion.ready_points(body, asked) for body in bodies]
             there = [one for one in codes if one is not None]
             complete = not loops and len(there) == len(bodies)
-            found = self._calls[kind, key] = self._prepared(kind, key, there if complete else None)
+            if complete:  # what goes by loops so far is made anew
+                for other in _SHAPES:
+                    self._calls.pop((other, key), None)
             if complete or loops:
-                del self._asked[key]
+                self._asked.pop(key, None)
+            found = self._calls[kind, key] = self._prepared(kind, key, there if complete else None)
         return found
 
     def each(self, kind: str, of: Names, general: Callable[..., Array], *states: Array) -> Array:
@@ -188,11 +191,11 @@ class Kinematics:
 
     def _probes(self, of: Names) -> tuple[Any, int]:
         """Records of bodies and ends for C, kept; SceneError for one that there is not."""
-        known = self._records.get(of if isinstance(of, str) else tuple(of))
+        key = of if isinstance(of, str) else tuple(of)
+        known = self._records.get(key)
         if known is None:
             places = self._probes_of(of)
-            known = self._engine.probes(places), len(places)
-            self._records[of if isinstance(of, str) else tuple(of)] = known
+            known = self._records[key] = self._engine.probes(places), len(places)
         return known
 
     def _probes_of(self, of: Names) -> list[Probe]:
