@@ -10,7 +10,7 @@ from ..engine.compiled import Compiled
 from ..engine.engine import Engine
 from ..integrate.loop import Run
 from ..integrate.settings import Settings
-from .simulate import energy_at, make_run, suited, tolerances
+from .simulate import asks_positions, energy_at, make_run, suited, tolerances
 from .system import SceneCode, SceneSystem
 
 #: Runs of more components are long enough for all to be made anew.
@@ -30,7 +30,7 @@ class Beginnings:
         self, engine: Engine, compiled: SceneCode | None, settings: Settings, q: Array, u: Array
     ) -> tuple[SceneSystem, Run]:
         """The system and the integrator at the start of a run from (nq,), (nu,)."""
-        if self._made is None or not self._made[0].goes_by(compiled):
+        if self._made is None or not self._serves(self._made[0], compiled, settings):
             system = SceneSystem(engine, compiled)
             run = make_run(system, settings, q, u, energy=self._energy_at)
             self._made = system, run
@@ -41,6 +41,10 @@ class Beginnings:
         start = system.begin(settings.t_start, q, u)
         run.begin(tableau, settings, start, tolerances(system, settings, start, self._energy_at))
         return system, run
+
+    @staticmethod
+    def _serves(system: SceneSystem, compiled: SceneCode | None, settings: Settings) -> bool:
+        return system.goes_by(compiled) and system.on_positions == asks_positions(settings)
 
     def from_elsewhere(self) -> Beginnings:
         """The same for runs from another state."""

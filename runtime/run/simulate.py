@@ -47,7 +47,7 @@ def make_run(
     who knows that of the start."""
     tableau = suited(system, settings)
     start = system.begin(settings.t_start, q, u)
-    if _is_on_positions(tableau):
+    if asks_positions(settings):
         system.ask_positions()
     known = system.engine.packed.time_map(settings.t_start, settings.t_end)
     return Run(
@@ -62,14 +62,16 @@ def suited(system: SceneSystem, settings: Settings) -> Tableau:
     tableau = get(settings.first_method, settings.radius)
     if tableau.implicit:
         refuse_method(system.engine.packed, settings.method, settings.tangent)
-        if _is_on_positions(tableau):
+        if asks_positions(settings):
             refuse_of_speeds(system.engine.packed, settings.method)
         system.offer_tangent()
     check_steps(tableau, settings.step)
     return tableau
 
 
-def _is_on_positions(tableau: Tableau) -> bool:
+def asks_positions(settings: Settings) -> bool:
+    """Whether steps ask rows of closed loops for positions where they end."""
+    tableau = get(settings.first_method, settings.radius)
     return isinstance(tableau, Alpha) and tableau.on_positions
 
 

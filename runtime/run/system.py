@@ -54,7 +54,7 @@ class SceneSystem:
         packed, ffi = engine.packed, engine.ffi
         self.engine, self.kept = engine, list[Any]()
         actions, self.event_names = _actions(engine)
-        self.switches = packed.watched.switches
+        self.switches, self.on_positions = packed.watched.switches, False
         self.memory = engine.start_memory()
         model, system = packed.model, packed.system
         self.run = run = ffi.new("mstmm_scene_run *")
@@ -119,6 +119,7 @@ class SceneSystem:
     def ask_positions(self) -> None:
         """From now on steps of implicit methods, which have been offered a tangent, ask rows of
         closed loops for positions where they end, and nothing of speeds."""
+        self.on_positions = True
         self.engine.lib.mstmm_scene_on_positions(self.run)
 
     def _implicit_by(self, code: FusedLibrary, given: Array) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import gc
 import threading
 import weakref
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,8 @@ def scene() -> mstmm.Scene:
         event=[{"name": "floor", "when": "h.q < -1.7", "do": "bounce", "restitution": 0.5}],
     )  # fmt: skip
 
+
+ROOT = Path(__file__).parents[2]
 
 STARTS = ([0.3, 0.6, 0.0, 0.8, 0.0], [-1.0, 1.0, 0.0, 0.0, 0.0], [0.3, 0.6, 0.0, 0.8, 0.0])
 TIMES = np.linspace(0.0, 1.0, 9)
@@ -61,6 +64,18 @@ def test_every_run_is_as_a_first_one(engine: str, monkeypatch: pytest.MonkeyPatc
         first = mstmm.compile(scene(), engine=engine)
         assert same(run(first, q, **each), found)
         assert first not in beginnings._waiting
+
+
+def test_among_closed_loops(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Methods that ask for positions, and others behind them."""
+    four_bar = mstmm.load_scene(ROOT / "examples" / "four_bar" / "scene.toml")
+    how = ("dop853", "genalpha-index3", "genalpha", "genalpha-index3", "rk4")
+    model = mstmm.compile(four_bar, engine="looped")
+    later = [model.simulate(0.2, one, step=2e-3, output_times=[0.2]) for one in how]
+    monkeypatch.setattr(beginnings, "_MOST", 0)
+    for one, found in zip(how, later, strict=True):
+        first = mstmm.compile(four_bar, engine="looped")
+        assert same(first.simulate(0.2, one, step=2e-3, output_times=[0.2]), found), one
 
 
 def test_other_times_and_other_models_begin_anew() -> None:
