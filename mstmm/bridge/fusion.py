@@ -194,10 +194,10 @@ class Fusion:
         return self._of_trees("inverse", calls > self._break_even())
 
     def ready_points(self, body: int, calls: float) -> FusedLibrary | None:
-        """The same for kinematics of points of a body of a tree."""
+        """The same for kinematics of points of a body, which closed loops have no say in."""
         if self.obstacle or body < 0 or not self.structure.nu:
             return None
-        return self._of_trees(f"points {body}", calls > self._break_even())
+        return self._sought(f"points {body}", calls > self._break_even())
 
     def _of_small(self, part: str, pays: bool) -> FusedLibrary | None:
         if self.obstacle or not 0 < self.structure.nu <= _MOST_UNKNOWNS:
@@ -205,8 +205,9 @@ class Fusion:
         return self._of_trees(part, pays)
 
     def _of_trees(self, part: str, pays: bool) -> FusedLibrary | None:
-        if self.structure.closes:
-            return None
+        return None if self.structure.closes else self._sought(part, pays)
+
+    def _sought(self, part: str, pays: bool) -> FusedLibrary | None:
         try:
             return self._get(part, build=self._insisted or pays)
         except EnvironmentFailure:
