@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -176,7 +177,7 @@ class Family:
         known, counted = self._known, run.statistics
         return known is not None and counted is not None and known.outruns(counted.steps)
 
-    @property
+    @cached_property
     def radians(self) -> float:
         """Those of vibration that is well above what is asked, as far as that demands short steps,
         where the motions at the start are known; else 0."""
@@ -194,7 +195,7 @@ class Family:
         """The motions at the start, where more than their rate is known."""
         return self._fast if self._fast is not None and self._fast.known else None
 
-    @property
+    @cached_property
     def _damping(self) -> bool:
         """Whether it pays that explicit steps at their bound of stability damp their errors: where
         the fastest motions are damped as well, or far above what is asked."""
@@ -206,7 +207,7 @@ class Family:
         """|lambda| T of the fastest motion; 0 where it is known to be slow."""
         return 0.0 if self._fast is None else self._fast.rate * self._span
 
-    @property
+    @cached_property
     def _many(self) -> float:
         """|lambda| T from which implicit steps cost less."""
         if self._known is None:
