@@ -50,6 +50,9 @@ MOST_ASKED = 400
 #: only for the choice of engine "auto"; fixed numbers, so that the choice is the same on every run.
 _SECONDS, _SECONDS_PER_BODY = 0.1, 0.04
 _SAVED_PER_BODY = 6e-8
+#: Calls about points of a body from which it is no look at them alone, where fused code was asked
+#: for: every body asked of has a library of its own.
+_OFTEN = 128
 #: More unknowns than this are eliminated body by body, by the looped engine: the tangent as a whole
 #: costs the square of them.
 _MOST_UNKNOWNS = 20
@@ -197,7 +200,8 @@ class Fusion:
         """The same for kinematics of points of a body, which closed loops have no say in."""
         if self.obstacle or body < 0 or not self.structure.nu:
             return None
-        return self._sought(f"points {body}", calls > self._break_even())
+        enough = _OFTEN if self._insisted else self._break_even()
+        return self._sought(f"points {body}", build=calls >= enough)
 
     def _of_small(self, part: str, pays: bool) -> FusedLibrary | None:
         if self.obstacle or not 0 < self.structure.nu <= _MOST_UNKNOWNS:
@@ -205,11 +209,11 @@ class Fusion:
         return self._of_trees(part, pays)
 
     def _of_trees(self, part: str, pays: bool) -> FusedLibrary | None:
-        return None if self.structure.closes else self._sought(part, pays)
+        return None if self.structure.closes else self._sought(part, self._insisted or pays)
 
-    def _sought(self, part: str, pays: bool) -> FusedLibrary | None:
+    def _sought(self, part: str, build: bool) -> FusedLibrary | None:
         try:
-            return self._get(part, build=self._insisted or pays)
+            return self._get(part, build)
         except EnvironmentFailure:
             return None
 
