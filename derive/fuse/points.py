@@ -26,14 +26,13 @@ MOVED = Sweep("moved", "Poses and velocities as they are given.", (*RATES.runs, 
 
 
 def fuse_points(structure: Structure, kernels: Kernels, body: int) -> Fused:
-    """Kernels about points of a rigid `body`, all of p, t, q, u, memory and the end: its
-    offset (3) and its axes (9) in those of the body.
+    """Kernels about points of a rigid `body`, all of p, t, q, u, memory and the end: its offset (3)
+    and its axes (9) in those of the body.
 
     "placed": place (3) and axes (9) of the end.  "moving": its velocity and angular velocity (6).
     "jacobian": what each speed adds to them (6 x nu), "jacobian_rate": the rate of that along u.
     Inertial axes; coordinates and speeds as they are given, those that drives impose or loops
-    decide as well.  A guard that
-    fails says no more than that the looped engine must be asked.
+    decide as well.  A guard that fails says no more than that the looped engine must be asked.
     """
     made = [
         _Point(structure, kernels, body).kernel(name)
