@@ -43,6 +43,8 @@ def search(error: Callable[[float], float], asked: float, kind: Kind) -> tuple[f
 def test_errors_that_follow_a_power_are_reached_and_told(
     kind: Kind, asked: float, growth: float, power: float
 ) -> None:
+    if kind is Kind.EXPLICIT:
+        power = max(power, 0.8)  # their local errors are held to the tolerance
     true, told = search(lambda rtol: growth * rtol**power, asked, kind)
     assert true <= 10 * told
     if growth * TIGHTEST**power < asked / 1000:  # within reach of numbers of 16 digits
@@ -72,7 +74,7 @@ def test_motion_that_cannot_be_told_ends_at_the_tightest_tolerance() -> None:
     assert len(rtols) < RUNS
 
 
-@pytest.mark.parametrize(("kind", "leap"), [(Kind.EXPLICIT, 1e-3), (Kind.IMPLICIT, 1e-2)])
+@pytest.mark.parametrize(("kind", "leap"), [(Kind.EXPLICIT, 1e-2), (Kind.IMPLICIT, 1e-1)])
 def test_runs_that_part_early_leap_no_farther_than_is_known(kind: Kind, leap: float) -> None:
     """Growth to the end at the pace of the first tenth is more than there is; and where implicit
     runs part early they do not follow a vibration, and nothing grows."""
@@ -83,7 +85,7 @@ def test_runs_that_part_early_leap_no_farther_than_is_known(kind: Kind, leap: fl
 def test_runs_that_end_elsewhere_have_no_estimate() -> None:
     found = [Look(1e-3, Kind.EXPLICIT, math.inf, None), Look(1e-5, Kind.EXPLICIT, 0.0, None)]
     assert estimate(found) == math.inf
-    assert next_rtol(found, 1e-6, kind=Kind.EXPLICIT) == pytest.approx(1e-7)
+    assert next_rtol(found, 1e-6, kind=Kind.EXPLICIT) == pytest.approx(1e-6)
 
 
 def test_an_explicit_run_after_an_implicit_one_begins_anew() -> None:
@@ -91,9 +93,9 @@ def test_an_explicit_run_after_an_implicit_one_begins_anew() -> None:
     first = next_rtol(implicit, 1e-7, kind=Kind.EXPLICIT)
     assert first == first_rtol(1e-7, kind=Kind.EXPLICIT)
     found = [*implicit, Look(first, Kind.EXPLICIT, 0.0, 1e-2)]
-    assert estimate(found) == pytest.approx(1.7 * 0.05)
+    assert estimate(found) == pytest.approx(1.4 * 0.05)
     assert next_rtol(found, 1e-7, kind=Kind.EXPLICIT) == pytest.approx(
-        max(first * (0.2 * 1e-5 / 3) ** (1 / 0.9), 1e-6 * first)
+        max(first * (0.2 * 1e-5 / 3) ** (1 / 0.9), 3e-6 * first)
     )
 
 
@@ -113,7 +115,7 @@ def test_a_third_run_suffices_where_the_second_errs_twice_as_much_as_was_believe
     rtols = [1e-3, 1e-6]
 
     def error(rtol: float) -> float:
-        return (2.0 if rtol <= rtols[1] else 1.0) * 0.1 * rtol**0.9
+        return (2.0 if rtol <= rtols[1] else 1.0) * 0.1 * rtol
 
     known = estimate(looks(error, *rtols))
     assert known is not None
@@ -133,7 +135,7 @@ def test_vibration_that_is_followed_implicitly_errs_by_more_than_local_errors() 
     second one by what they make of the same local errors."""
     kind = Kind.IMPLICIT
     still, waving = (first_rtol(1e-5, kind, radians) for radians in (0.0, 300.0))
-    assert waving == pytest.approx(20.0 * 1e-5 / 300.0)
+    assert waving == pytest.approx(10.0 * 1e-5 / 300.0)
     assert waving < still
     rtols = [
         next_rtol([Look(1e-6, kind, 0.0, 1e-5, radians=radians)], 1e-5, kind)
@@ -143,22 +145,12 @@ def test_vibration_that_is_followed_implicitly_errs_by_more_than_local_errors() 
     assert rtols[1] < rtols[0]
 
 
-def test_with_stops_errors_are_trusted_to_fall_less() -> None:
-    runs = (1e-3, 0.1), (1e-6, 0.0)
-    smooth, rough = (
-        estimate([Look(rtol, Kind.EXPLICIT, apart, rtol, False, r) for rtol, apart in runs])
-        for r in (False, True)
-    )
-    assert smooth is not None and rough is not None
-    assert rough > 1.5 * smooth
-
-
 @pytest.mark.parametrize(
     ("before", "fallen"),
     [(Kind.EXPLICIT, 0.1**0.8), (Kind.IMPLICIT, 0.1**0.8), (Kind.EXPONENTIAL, 1)],
 )
 def test_of_another_kind_less_is_believed(before: Kind, fallen: float) -> None:
     kind = Kind.IMPLICIT if before is Kind.EXPLICIT else Kind.EXPLICIT
-    safety = {Kind.IMPLICIT: 1.0, Kind.EXPLICIT: 1.7}[kind]
+    safety = {Kind.IMPLICIT: 1.0, Kind.EXPLICIT: 1.4}[kind]
     known = estimate([Look(1e-3, before, 0.05, 1e-3), Look(1e-4, kind, 0.0, 1e-4)])
     assert known == pytest.approx(safety * 0.05 * fallen)

@@ -116,13 +116,6 @@ def damps(run: Trajectory) -> bool:
     return run.settings.method == _LOOSE_EXPLICIT and held_back(run)
 
 
-def has_stops(model: Compiled) -> bool:
-    """Whether hinges of a scene may meet stops."""
-    scene = model.scene
-    hinges = (*scene.hinge, *(x for chain in scene.chain for x in chain.hinge))
-    return any(stop.yields for table in hinges for stop in table.law.limits)
-
-
 def _fastest_possible(model: Compiled) -> float:
     """|lambda| of the fastest motion that the tables of a scene allow, 1/s; looked up once."""
     if model not in _possible:

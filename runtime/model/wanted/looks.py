@@ -22,7 +22,7 @@ from mstmm.arrays import Array
 #: The tightest tolerance that has a meaning.
 TIGHTEST = 1e-13
 
-#: Below this tolerance rounding may be what is seen: two runs alone do not show errors falling.
+#: From this tolerance down rounding may be what is seen: two runs alone do not show errors falling.
 _ROUNDING = 5e-12
 
 
@@ -64,8 +64,8 @@ class _Usual:
 
 
 _USUAL = {
-    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 2.5e3, 3.0, 0.3, 0.9, 0.9, 0.2, 1.7, 0.5, 1e-6),
-    Kind.IMPLICIT: _Usual((30.0, 1e-4, 3e-2), 1e6, 1.0, 1.0, 0.8, 0.9, 0.6, 1.0, 0.1, 1e-6),
+    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 2.5e3, 3.0, 0.3, 1.0, 0.9, 0.2, 1.4, 0.7, 3e-6),
+    Kind.IMPLICIT: _Usual((30.0, 3e-5, 3e-2), 1e6, 1.0, 1.0, 0.8, 0.9, 0.6, 1.0, 0.1, 1e-6),
     Kind.EXPONENTIAL: _Usual((30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.6, 0.6, 0.4, 1.0, 0.1, 1e-4),
 }
 
@@ -76,9 +76,9 @@ _UNKNOWN = 15.0
 #: chance: one above the second number here counts as the third at least.
 _TRUSTED, _NOISE, _SURE = 0.9, 0.5, 0.75
 
-#: Powers between explicit and implicit runs, with stops, and where errors hardly fall; steps of the
-#: exponential method tell nothing of others.
-_CHANGED, _ROUGH, _HARDLY = 0.8, 0.8, 0.25
+#: Powers between explicit and implicit runs, and where errors hardly fall; steps of the exponential
+#: method tell nothing of others.
+_CHANGED, _HARDLY = 0.8, 0.25
 
 #: A next tolerance aims at this part of what is wanted once runs have been compared, by explicit
 #: steps, and by others.  A run more costs more than tighter steps of high order.
@@ -92,7 +92,7 @@ _MOST, _LATER = 0.3, 0.1
 _FOLLOWING = 1e-3
 
 #: The next tolerance in the one before, where runs have parted: at most, and at least.
-_LEAP, _FAR_LEAP = 1e-2, 1e-3
+_LEAP, _FAR_LEAP = 1e-1, 1e-2
 
 #: The error in what local errors sum up to, a radian of vibration that is followed implicitly: its
 #: phase goes on to err by what they change.
@@ -103,7 +103,7 @@ _WAVING = 0.25
 _LATE, _DOUBT = 0.8, 10.0
 
 #: The first implicit tolerance in what is asked, by radians of vibration that it has to follow.
-_A_RADIAN = 20.0
+_A_RADIAN = 10.0
 
 #: The next tolerance in the one before, at least, of calm runs: where that is at most so many times
 #: what is asked, and errors are not taken to fall; and beyond.
@@ -128,7 +128,6 @@ class Look:
         summed: its local errors added up; None where the method keeps none.
         held: stability, not accuracy, set many of its steps.
         growth: its error in what local errors sum up to, where more is known of it than is usual.
-        rough: its scene has stops, at which local errors are those of no smooth motion.
         radians: of vibration above what is asked that implicit steps have to follow.
         calm: explicit steps left vibration behind that is below it.
         parted: the part of the run after which it had left the tightest one; 1 if it never has.
@@ -139,7 +138,6 @@ class Look:
     apart: float
     summed: float | None
     held: bool = False
-    rough: bool = False
     radians: float = 0.0
     calm: bool = False
     growth: float | None = None
@@ -197,7 +195,7 @@ def next_rtol(looks: Sequence[Look], asked: float, kind: Kind) -> float:
             factor = min(max(_beyond(looks[-2], asked) / last.rtol, _FAR_LEAP), _LEAP)
     else:
         aim = _AIM if kind is Kind.EXPLICIT else _AIM_OF_OTHERS
-        factor, most = (aim * asked / known) ** (1 / _usual(last)), _MOST
+        factor, most = (aim * asked / known) ** (1 / _USUAL[kind].power), _MOST
     return max(last.rtol * min(max(factor, _USUAL[kind].least), most), tightest)
 
 
@@ -257,20 +255,14 @@ def _summed(look: Look) -> float:
     return known * (look.growth or usually + _WAVING * look.radians)
 
 
-def _usual(look: Look) -> float:
-    """The power by which errors usually fall to a run from a looser one of its kind."""
-    power = _USUAL[look.kind].power
-    return min(power, _ROUGH) if look.rough else power
-
-
 def _power(looks: Sequence[Look]) -> float:
     """The power by which the error of the last run is believed to have fallen."""
     before, last = looks[-2:]
-    seen, usual = _seen(looks), _usual(last)
+    seen, usual = _seen(looks), _USUAL[last.kind].power
     if before.kind is not last.kind:
         usual = 0.0 if before.kind is Kind.EXPONENTIAL else _CHANGED
     if seen is None:
-        return _HARDLY if last.rtol < _ROUNDING else usual
+        return _HARDLY if last.rtol <= _ROUNDING else usual
     if last.kind is Kind.EXPLICIT and seen > _NOISE:
         return min(max(seen, _SURE), usual)
     return min(max(_TRUSTED * seen, _HARDLY), usual)

@@ -29,7 +29,7 @@ from ...run.error_estimate import compare
 from ...run.execution import Watch, first_run
 from ..results import certified, result_of
 from .asked import Asked
-from .family import Family, damps, has_stops, held_back, kind_of_run
+from .family import Family, damps, held_back, kind_of_run
 from .looks import Kind, Look, estimate, first_rtol, hopeless, next_rtol
 
 if TYPE_CHECKING:
@@ -78,7 +78,6 @@ class Search:
         self._beginnings = taken(model, self._settings)
         self._family = Family(model, settings, wanted.error, q, u)
         self._measure: Measure | None = None if wanted.of else Coordinates(model)
-        self._rough = has_stops(model)
         self._made: list[_Made] = []  # the one to keep is the last
         self._looks: list[Look] = []
         self._failed: list[Attempt] = []
@@ -152,9 +151,7 @@ class Search:
         radians = self._family.radians if last.kind is Kind.IMPLICIT else 0.0
         calm = last.kind is Kind.EXPLICIT and self._family.calm(last.run)
         growth = self._growth(last)
-        self._looks.append(
-            Look(rtol, last.kind, 0.0, summed, held, self._rough, radians, calm, growth)
-        )
+        self._looks.append(Look(rtol, last.kind, 0.0, summed, held, radians, calm, growth))
 
     def _growth(self, last: _Made) -> float | None:
         """The error of explicit steps in what local errors sum up to, where it is known: shapes
