@@ -3,7 +3,8 @@
 The run at the tightest tolerance stands for the truth: how far the others are from it is about
 their error.  Its own error is that of the next looser one, less by a power of the tolerance, about
 the first for explicit methods (local errors are held to it) and less for implicit ones of stiff
-motion.  Of a power that was observed no more than the usual one is believed.
+motion.  Of a power that was observed no more than the usual one is believed.  That decides on
+whether another run is made; what is told of one that suffices is more cautious.
 
 Hairer, Norsett, Wanner, Solving ODEs I, II.4 (tolerance and global error).
 """
@@ -64,7 +65,7 @@ class _Usual:
 
 
 _USUAL = {
-    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 2.5e3, 3.0, 0.3, 1.0, 0.9, 0.2, 1.4, 0.7, 3e-6),
+    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 2.5e3, 3.0, 0.3, 1.0, 1.0, 0.2, 1.4, 0.7, 3e-6),
     Kind.IMPLICIT: _Usual((30.0, 3e-5, 3e-2), 1e6, 1.0, 1.0, 0.8, 0.9, 0.6, 1.0, 0.1, 1e-6),
     Kind.EXPONENTIAL: _Usual((30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.6, 0.6, 0.4, 1.0, 0.1, 1e-4),
 }
@@ -79,6 +80,9 @@ _TRUSTED, _NOISE, _SURE = 0.9, 0.5, 0.75
 #: Powers between explicit and implicit runs, and where errors hardly fall; steps of the exponential
 #: method tell nothing of others.
 _CHANGED, _HARDLY = 0.8, 0.25
+
+#: The power by which errors have fallen at least.
+_CAUTIOUS = 0.8
 
 #: A next tolerance aims at this part of what is wanted once runs have been compared, by explicit
 #: steps, and by others.  A run more costs more than tighter steps of high order.
@@ -163,13 +167,14 @@ def first_rtol(asked: float, kind: Kind, radians: float = 0.0) -> float:
     return max(min(wanted, _USUAL[kind].reach * asked), TIGHTEST)
 
 
-def estimate(looks: Sequence[Look]) -> float | None:
+def estimate(looks: Sequence[Look], cautious: bool = False) -> float | None:
     """Error of the last of `looks`, which come loose to tight, explicit ones behind others; None
-    for one alone."""
+    for one alone.  `cautious`: where it may have fallen by less than is likely."""
     if len(looks) < 2:
         return None
     before, last = looks[-2:]
-    fallen = (last.rtol / before.rtol) ** _power(looks) if last.rtol < before.rtol else 1.0
+    power = min(_power(looks), _CAUTIOUS) if cautious else _power(looks)
+    fallen = (last.rtol / before.rtol) ** power if last.rtol < before.rtol else 1.0
     usual = _USUAL[last.kind]
     known = usual.safety * before.apart
     if before.apart < usual.parted:
@@ -178,6 +183,15 @@ def estimate(looks: Sequence[Look]) -> float | None:
     if before.kind is last.kind is Kind.EXPLICIT and _LATE <= before.parted < 1.0:
         return min(known, _DOUBT * last.rtol * _growth(before))
     return known
+
+
+def told(looks: Sequence[Look], asked: float, size: float) -> float | None:
+    """The error of the last of `looks` that is told, of a motion of that size: up to what was asked
+    nothing is lost by being cautious."""
+    likely, cautious = estimate(looks), estimate(looks, cautious=True)
+    if likely is None or cautious is None or likely == math.inf:
+        return None
+    return min(max(likely * size, asked), cautious * size)
 
 
 def next_rtol(looks: Sequence[Look], asked: float, kind: Kind) -> float:

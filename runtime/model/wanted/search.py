@@ -30,7 +30,7 @@ from ...run.execution import Watch, first_run
 from ..results import certified, result_of
 from .asked import Asked
 from .family import Family, damps, held_back, kind_of_run
-from .looks import Kind, Look, estimate, first_rtol, hopeless, next_rtol
+from .looks import Kind, Look, estimate, first_rtol, hopeless, next_rtol, told
 
 if TYPE_CHECKING:
     from ...engine.compiled import Compiled
@@ -236,7 +236,7 @@ class Search:
 
     def _kept(self, why: str) -> Result:
         """The tightest run as a result; `why` it is not what was wanted, "" where it is."""
-        made, error, known = self._made[-1], None, estimate(self._looks)
+        made, error = self._made[-1], None
         if why and len(self._made) > 1:
             before = self._made[-2].run
             reference = f"rtol {before.settings.rtol:.0e}"
@@ -246,8 +246,8 @@ class Search:
                     "small errors grow until the motion cannot be told any more, at these "
                     f"tolerances from t = {error.horizon:.4g} s on (end earlier), and {why}"
                 )
-        finite = None if known is None or known == math.inf else known * self._size
-        reached = self._reached(made.run, finite, why, self._found())
+        known = told(self._looks, self._wanted.error, self._size)
+        reached = self._reached(made.run, known, why, self._found())
         run = replace(made.run, reached=reached, notes=(*made.run.notes, *self._notes))
         return result_of(self._model, self._as_asked(run), error)
 
