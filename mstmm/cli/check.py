@@ -191,13 +191,20 @@ def _loop_lines(loops: Loops) -> list[str]:
     """What closed loops leave free, and which loads they leave open."""
     if not loops.rows:
         return []
-    bent = f", of them {loops.shapes} of shapes" if loops.shapes else ""
-    left = f"{loops.mobility} speeds left{bent}"
-    lines = [f"  loops: {loops.rank} of {len(loops.rows)} rows count, {left}"]
+    lines = [f"  loops: {loops.counted}"]
     if loops.redundant:
-        told = ", ".join(f"{word} of {name}" for name, word in loops.redundant[:_SHOWN])
-        more = " ..." if len(loops.redundant) > _SHOWN else ""
-        lines.append(f"  loops: rows that repeat others: {told}{more}")
+        lines.append(f"  loops: rows that repeat others: {loops.repeated(_SHOWN)}")
+    if loops.singular:
+        lines.append(
+            f"  loops: the start is a singular pose: {loops.rank} rows count there, "
+            f"{loops.nearby} nearby"
+        )
+    if loops.misfit[0]:
+        gap, name, word = loops.misfit
+        lines.append(
+            f"  loops: {word} of {name} repeats others but for a gap of {gap:.1e} (m, rad): "
+            "correct axes or lengths"
+        )
     if loops.not_unique:
         lines.append(f"  loops: loads that rigid bodies leave open: {loops.open_loads}")
     return lines

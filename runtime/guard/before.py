@@ -11,7 +11,7 @@ from mstmm.arrays import Array
 from mstmm.risk import Risk
 
 from ..run.notes import foreseen
-from . import branches, fast, heavy, locked, shapes, spun
+from . import branches, fast, heavy, locked, misfit, shapes, spun
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled
@@ -26,6 +26,7 @@ _GUARDS: tuple[tuple[Callable[[Compiled], bool], Guard], ...] = (
     (heavy.concerns, heavy.lost_digits), (locked.concerns, locked.near_lock),
     (spun.concerns, spun.linear_bodies), (shapes.concerns, shapes.too_few),
     (fast.concerns, fast.many_steps), (branches.concerns, branches.at_a_branch),
+    (misfit.concerns, misfit.nearly_redundant),
 )  # fmt: skip
 
 #: The guards that the scene of a model gives reason for, found before its first run.

@@ -17,25 +17,31 @@ if TYPE_CHECKING:
     from ..engine.compiled import Compiled
     from ..run.trajectory import Trajectory
 
-#: Samples that are looked at, at most.
-_SAMPLES = 12
+#: Samples that are looked at, and rows that are named, at most.
+_SAMPLES, _NAMED = 12, 8
 
 
 @dataclass(frozen=True)
 class Closure:
-    """Largest gap (m, rad) and slip (m/s, rad/s) of the loops in samples of a run, and the
-    components of loads that rigid bodies leave open, in words.  Steps `on_positions` leave slips
-    of the size of their errors."""
+    """Largest gap (m, rad) and slip (m/s, rad/s) of the loops in samples of a run, and in words
+    how many rows count, those that repeat others, and the components of loads that rigid bodies
+    leave open.  Steps `on_positions` leave slips of the size of their errors."""
 
     gap: float
     slip: float
+    counted: str = ""
+    repeated: str = ""
     open_loads: str = ""
     on_positions: bool = False
 
     def __str__(self) -> str:
         text = f"closed within {self.gap:.1e} (m, rad), slipping by {self.slip:.1e} a second"
         text += ", which steps on positions leave" if self.on_positions else ""
-        return f"{text}; loads left open: {self.open_loads}" if self.open_loads else text
+        more = (
+            ("", self.counted), ("repeat others: ", self.repeated),
+            ("loads left open: ", self.open_loads),
+        )  # fmt: skip
+        return "; ".join((text, *(title + words for title, words in more if words)))
 
 
 def closure(model: Compiled, run: Trajectory) -> Closure | None:
@@ -50,7 +56,8 @@ def closure(model: Compiled, run: Trajectory) -> Closure | None:
         gap = max(gap, _largest(calls, calls.gap, q, u, t))
         slip = max(slip, _largest(calls, calls.slip, q, u, t))
     alone = run.settings.method.endswith(ON_POSITIONS)
-    return Closure(gap, slip, model.closed.loops.open_loads, alone)
+    loops = model.closed.loops
+    return Closure(gap, slip, loops.counted, loops.repeated(_NAMED), loops.open_loads, alone)
 
 
 def _largest(calls: LoopCalls, level: int, q: Array, u: Array, t: float) -> float:

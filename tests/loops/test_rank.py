@@ -94,12 +94,79 @@ def test_a_third_crank_repeats_a_row_of_its_own() -> None:
     assert loops.not_unique["foot"] == loops.not_unique["foot0"] == ("fx", "fz", "mx", "my")
 
 
+@pytest.mark.parametrize(("tilt", "told"), [(1e-7, False), (1e-5, True), (9e-4, True)])
+def test_rows_that_nearly_repeat_others_are_told(tilt: float, told: bool) -> None:
+    """A pin of a planar four-bar out of the normal of the plane by an angle in rad."""
+    scene = linkage("closing_pin", laws=False)
+    scene["hinge"][2]["axis"] = [np.sin(tilt), 0.0, np.cos(tilt)]
+    model = mstmm.compile(mstmm.Scene(**scene))
+    gap, name, direction = model.loops.misfit
+    assert gap == pytest.approx(tilt * told, rel=0.2)
+    assert (name, direction) == (("closing_pin", "mx") if told else ("", ""))
+    result = model.simulate(0.01)
+    assert [risk.name for risk in result.risks] == ["nearly-redundant"] * told
+    assert all(
+        "closing_pin" in risk.element and f"{gap:.1e}" in risk.means for risk in result.risks
+    )
+
+
+def test_loads_of_couplings_that_repeat_each_other_are_open() -> None:
+    hinges = [
+        {"name": name, "type": "pin", "inboard": "ground", "outboard": body}
+        for name, body in (("left", "a"), ("right", "b"), ("alone", "c"))
+    ]
+    couplings = [
+        {"name": "gear", "expression": "left.q + 3*right.q"},
+        {"name": "again", "expression": "2*left.q + 6*right.q"},
+        {"name": "other", "expression": "left.q - alone.q"},
+    ]
+    bodies = [rod(name) for name in "abc"]
+    scene = {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges, "coupling": couplings}
+    loops = loops_of(scene)
+    assert loops.redundant == (("again", "expression"),) and not loops.momentary
+    assert loops.not_unique == {"gear": ("expression",), "again": ("expression",)}
+
+
+def test_loads_of_constraints_that_repeat_each_other_are_open() -> None:
+    """Two rods on pins, side by side, their tips and middles at the distance of their feet."""
+    rods = [rod(name) | {"ends": {"tip": [1, 0, 0], "middle": [0.5, 0, 0]}} for name in "ab"]
+    hinges = [
+        {"name": f"foot_{name}", "type": "pin", "inboard": "ground", "outboard": name,
+         "position": [float(k), 0, 0], "initial": {"q": 1.0}}
+        for k, name in enumerate("ab")
+    ]  # fmt: skip
+    distances = [
+        {
+            "name": f"to_{end}",
+            "type": "distance",
+            "from": f"a.{end}",
+            "to": f"b.{end}",
+            "length": 1.0,
+        }
+        for end in ("tip", "middle")
+    ]
+    scene = {"gravity": [0, -9.81, 0], "body": rods, "hinge": hinges, "constraint": distances}
+    loops = loops_of(scene)
+    assert (loops.rank, loops.mobility) == (1, 1)
+    assert loops.not_unique["to_tip"] == loops.not_unique["to_middle"] == ("length",)
+    assert set(loops.not_unique) == {"foot_a", "foot_b", "to_tip", "to_middle"}
+
+
+def test_a_certificate_tells_rows_and_loads() -> None:
+    model = mstmm.compile(mstmm.Scene(**linkage("closing_pin", laws=False)))
+    told = str(model.simulate(0.01).certificate.closure)
+    assert "2 of 5 rows count, 1 speed left; repeat others: z of closing_pin, mx" in told
+    assert "loads left open: fz mx my of crank_pin" in told
+
+
 @pytest.mark.parametrize("count", [1, 2, 6])
 def test_flat_windows_are_a_singular_start(count: int) -> None:
     """Flat on the ground a row of each loop says nothing; a little way off it does, so it stays."""
     model = mstmm.compile(mstmm.Scene(**four_bars(count, 0.0)))
     assert model.loops.singular
-    assert model.loops.rank < 2 * count
+    assert (model.loops.rank, model.loops.nearby) == (count, 2 * count)
+    assert model.loops.momentary == tuple((f"right{k}", "x") for k in range(count))
+    assert set(model.loops.momentary) < set(model.loops.redundant)
     assert int(model.packed.model.n_rows) == 2 * count
     result = model.simulate(0.5, rtol=1e-8)
     assert result.success, result.message

@@ -120,17 +120,15 @@ def _loops(result: Result) -> str:
     if result.model.closed is None:
         return ""
     loops = result.model.closed.loops
-    repeated = ", ".join(f"{word} of {name}" for name, word in loops.redundant[:_REPEATED])
-    more = " ..." if len(loops.redundant) > _REPEATED else ""
     rows = [
         ("loops closed by", ", ".join(loops.cut[:_REPEATED]) or "constraints and couplings"),
         ("rows that count", f"{loops.rank} of {len(loops.rows)}"),
         ("speeds left free", loops.mobility),
-        ("rows that repeat others", repeated + more or "none"),
+        ("rows that repeat others", loops.repeated(_REPEATED) or "none"),
         ("loads that are not determined", loops.open_loads or "none"),
     ]
     if loops.singular:
-        rows.append(("the start", "a singular pose: fewer rows count there than nearby"))
+        rows.append(("the start", f"a singular pose: {loops.nearby} rows count nearby"))
     return "<h3>Closed loops</h3>" + table(rows)
 
 

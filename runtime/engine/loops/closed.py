@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -32,6 +32,8 @@ _OF_CONSTRAINTS = {
 #: Gaps at which it may still be that rows repeat others but for a misfit, in parts of the length of
 #: the scene.
 _NEARLY = 1e-2
+#: Misfits of rows that repeat others that are rounding, in parts of those that lock.
+_SILENT = 1e-3
 #: A pose is near a singular one where the strain is this many times that of the start.
 _STRAINED = 10.0
 #: So many hinges are named.
@@ -49,26 +51,49 @@ class Loops:
             ... for its own speeds; or (constraint, direction): "length", "normal", "x" and "y"
             where it rolls, "across1" and "across2" of a curve.
         rank: how many rows say something of their own.
+        nearby: how many do in closed states nearby; more than `rank` in a singular pose.
         redundant: rows that repeat others, so that the loads along them are not determined.
+        momentary: those of them that do so in this pose alone.
         not_unique: components of the loads of hinges, "fx" to "mz" along and about their outboard
-            axes, by name: rigid bodies do not determine them, results show one of many shares.
+            axes, and directions of the loads of constraints and couplings, by name: rigid bodies
+            do not determine them, results show one of many shares.
+        misfit: the largest gap (m, rad) that rows which repeat others leave at the start, for they
+            do so nearly alone, with the row; 0 and two empty words where there is none.
         mobility: speeds that are left free.
         shapes: how many of these are rates of the shapes of flexible bodies, as many as there are
             unless rows that nothing else can meet take some.
         width: most rows that are open across one hinge at a time.
-        singular: whether the start is a singular pose, where fewer rows count than nearby.
     """
 
     cut: tuple[str, ...] = ()
     rows: tuple[tuple[str, str], ...] = ()
     rank: int = 0
+    nearby: int = 0
     redundant: tuple[tuple[str, str], ...] = ()
+    momentary: tuple[tuple[str, str], ...] = ()
     mobility: int = 0
     width: int = 0
-    singular: bool = False
     not_unique: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    misfit: tuple[float, str, str] = (0.0, "", "")
     shapes: int = 0
     decided_by: Callable[[], tuple[str, ...]] = field(default=tuple, repr=False, compare=False)
+
+    @property
+    def singular(self) -> bool:
+        """Whether the start is a singular pose, where fewer rows count than nearby."""
+        return self.nearby > self.rank
+
+    @property
+    def counted(self) -> str:
+        """Rows, their rank and what is left free, in words."""
+        bent = f", of them {self.shapes} of shapes" if self.shapes else ""
+        speeds = "1 speed" if self.mobility == 1 else f"{self.mobility} speeds"
+        return f"{self.rank} of {len(self.rows)} rows count, {speeds} left{bent}"
+
+    def repeated(self, most: int) -> str:
+        """`redundant` in words, so many of them by name."""
+        told = ", ".join(f"{word} of {name}" for name, word in self.redundant[:most])
+        return told + (" ..." if len(self.redundant) > most else "")
 
     @property
     def open_loads(self) -> str:
@@ -142,7 +167,10 @@ class Closed:
         """What closes near q, and the rows that always repeat others."""
         rank, calls = rank_at(self.engine, q), LoopCalls(self.engine, q)
         packed, records = self.engine.packed, calls.records
-        names = self._names(calls)
+        names, loads = self._names(calls), dict(rank.open.loads)
+        for name, word in (names[row] for row in sorted(rank.open.rows)):
+            if name not in packed.layout.hinges:
+                loads[name] = (*loads.get(name, ()), word)
         if rank.stuck and not self._is_led:
             way = "give what bends there axial shapes too, or let an end of it slide"
             if not packed.flexible:
@@ -178,9 +206,10 @@ class Closed:
         self._refuse_drowned([name for name in drowned if name not in here])
         told = Loops(
             tuple(cut.hinge for cut in packed.expanded.cuts if cut.constraint is None),
-            tuple(names), rows,
+            tuple(names), rows, len(met) - rank.nearby,
             tuple(names[row] for row in sorted(rank.here)),
-            mobility, records.width, rank.singular, rank.not_unique, min(mobility, bent),
+            tuple(names[row] for row in sorted(rank.here - rank.always)),
+            mobility, records.width, loads, shapes=min(mobility, bent),
         )  # fmt: skip
         return told, {row: names[row] for row in sorted(rank.going)}
 
@@ -233,6 +262,9 @@ class Closed:
         slips = np.abs(calls.correction(calls.slip, q, u)[1])
         of_couplings = [one.row for one in calls.records.couplings]
         missing[of_couplings] = np.maximum(missing, slips)[of_couplings]
+        worst = max(repeating, key=lambda row: float(missing[row]), default=None)
+        if worst is not None and missing[worst] > much * _SILENT:
+            self.loops = replace(self.loops, misfit=(float(missing[worst]), *repeating[worst]))
         for row, (closing, direction) in repeating.items():
             if missing[row] > much:
                 if direction in _COUPLED:

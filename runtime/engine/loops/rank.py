@@ -9,7 +9,6 @@ closed states nearby is no repetition but a singular pose.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -22,7 +21,7 @@ from ...pack.loops.variants import by_hinges, geometric
 from ...pack.pack import packed_system, unmerged
 from ..engine import Engine
 from .calls import LoopCalls
-from .stress import not_unique
+from .stress import Open, not_unique
 
 #: A pivot below this share of the mobility of its row repeats others: misfits up to 4e-3 rad.
 REPEATED = 1e-6
@@ -44,7 +43,7 @@ class Rank:
     """Rows that repeat others here, those of them that do so in closed states nearby too, and those
     of these that go: the others take the place of another row of their hinge where that one says
     nothing, at a pose farther away.  `states` are those that were looked at, this one first,
-    `not_unique` the components of loads that rows which always repeat others leave open, and
+    `open` the loads that rows which always repeat others leave open, and
     `nearby` is how few repeat others in any of the states.  `stuck`: motions that close the loops
     to first order lead back to the pose from wherever they go, as of links stretched out in line.
     """
@@ -53,7 +52,7 @@ class Rank:
     always: frozenset[int]
     going: frozenset[int]
     states: tuple[Array, ...]
-    not_unique: Mapping[str, tuple[str, ...]]
+    open: Open
     nearby: int
     stuck: bool = False
 
@@ -69,7 +68,7 @@ def rank_at(engine: Engine, q: Array) -> Rank:
     level = REPEATED * calls.mobility
     here = _repeating(calls, q, level)
     if not here:
-        return Rank(here, here, here, (q,), {}, 0)
+        return Rank(here, here, here, (q,), Open(), 0)
     raised = _RAISED * np.abs(calls.pivots()) + _ROUNDING * calls.mobility
     level[list(here)] = np.minimum(level, raised)[list(here)]
     always, draw, states, nearby = here, np.random.default_rng(0), [q], len(here)
@@ -85,7 +84,7 @@ def rank_at(engine: Engine, q: Array) -> Rank:
     gaps = calls.correction(calls.gap, q, np.zeros(engine.nu))[1]
     closed = np.abs(gaps).max() <= _CLOSED
     going = always - _stand_ins(calls, q, always) if closed else always
-    loads = not_unique(calls, q if here == always else states[-1]) if always else {}
+    loads = not_unique(calls, q if here == always else states[-1]) if always else Open()
     return Rank(here, always, going, tuple(states), loads, nearby, stuck)
 
 

@@ -1,4 +1,4 @@
-"""Loads of hinges that rigid bodies do not determine: self-stress states of closed loops.
+"""Loads that rigid bodies do not determine: self-stress states of closed loops.
 
 Multipliers z of rows that repeat others may grow together without moving anything: L z = 0.  Rows
 that yield a little, (L + give f) x = give f y again and again from a random y, leave the share of
@@ -7,6 +7,9 @@ of them touches it.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,21 +28,28 @@ _ROUNDING, _OFF = 1e-5, 10.0
 _UPPER = np.triu_indices(6)
 
 
-def not_unique(calls: LoopCalls, q: Array) -> dict[str, tuple[str, ...]]:
-    """Components of the loads of hinges, by their names, that are not unique at the closed q (nq,).
+@dataclass(frozen=True)
+class Open:
+    """What is not unique: components of the loads of hinges, by their names, and rows of closures,
+    by their numbers."""
 
-    `calls` are those of a geometry in which all rows are met.
-    """
+    loads: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    rows: frozenset[int] = frozenset()
+
+
+def not_unique(calls: LoopCalls, q: Array) -> Open:
+    """At the closed q (nq,).  `calls` are those of a geometry in which all rows are met."""
     gaps = np.abs(calls.correction(calls.gap, q, np.zeros(calls.engine.nu))[1])
     rounding = max(_ROUNDING, _OFF * float(gaps.max(initial=0.0)))
-    touched = np.any([_touched(calls, q, seed, rounding) for seed in range(_DRAWN)], axis=0)
+    drawn = [_touched(calls, q, seed, rounding) for seed in range(_DRAWN)]
+    touched, rows = (np.any(marks, axis=0) for marks in zip(*drawn, strict=True))
     packed, found = calls.engine.packed, dict[str, tuple[str, ...]]()
     for number, hinge in enumerate(packed.scene.hinges):
         marks = touched[packed.topology.place_of_hinge(number)]
         words = tuple(word for word, mark in zip(_COMPONENTS, marks, strict=True) if mark)
         if words and number not in packed.layout.internal:
             found[hinge.name] = words
-    return found
+    return Open(found, frozenset(np.flatnonzero(rows).tolist()))
 
 
 def outboard_axes(calls: LoopCalls, place: int) -> Array:
@@ -49,16 +59,19 @@ def outboard_axes(calls: LoopCalls, place: int) -> Array:
     return np.reshape(packed.end(hinge.outboard)[1], (3, 3))
 
 
-def _touched(calls: LoopCalls, q: Array, seed: int, rounding: float) -> Array:
-    """(bodies, 6) whether a drawn self-stress state loads the component of the inboard hinge."""
+def _touched(calls: LoopCalls, q: Array, seed: int, rounding: float) -> tuple[Array, Array]:
+    """Whether a drawn self-stress state loads the component of the inboard hinge (bodies, 6), and
+    the row (rows,)."""
     for row in range(calls.count):
         calls.records.judge(row, 0.0)
     met = np.array([not calls.records.yields(row) for row in range(calls.count)])
     y = met * np.random.default_rng(seed).normal(size=calls.count) / np.sqrt(calls.mobility)
     for _ in range(_TIMES):
         y = met * calls.stressed(q, _GIVE * calls.mobility * y, _GIVE)
-    loads = _loads(calls)
-    return loads > rounding * loads.max(initial=0.0)
+    return tuple(
+        size > rounding * size.max(initial=0.0)
+        for size in (_loads(calls), np.abs(y) * np.sqrt(calls.mobility))
+    )
 
 
 def _loads(calls: LoopCalls) -> Array:
