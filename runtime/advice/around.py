@@ -4,6 +4,8 @@ each change is run beside the reference before it counts.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from mstmm.scene import split
@@ -37,11 +39,12 @@ def in_plane(work: Work, top: Variant, model: Model, richest: Tried) -> Tried:
     found = work.bench.tried("planar", flat.scene)
     if found.error > max(_SAME * work.asked.error, 3 * work.bench.floor):
         return richest
-    work.told[found.name] = tuple(
+    hinges = [
         f'hinge "{old.name}": {new.type} instead of {old.type}, for the motion stays in a plane'
         for old, new in zip(top.scene.hinge, flat.scene.hinge, strict=True)
         if old != new
-    )
+    ]
+    work.told[found.name] = (*hinges, _measured("in its plane the scene", found, richest))
     return found
 
 
@@ -55,7 +58,7 @@ def changed(
         return base
     names = work.measure.names_in(base.running)
     kept: list[Change] = []
-    best = base
+    best, words = base, tuple[str, ...]()
     waiting = [[one for one in changes if one.expected * work.in_measure <= _UNLIKELY * enough]]
     told = work.told[base.name]
     while waiting and work.budget.left(SEARCH):
@@ -66,14 +69,37 @@ def changed(
         name = f"{base.name}; {word}: {', '.join(one.name for one in (*kept, *more))}"
         found = work.bench.tried(name, made.scene, composed(names, made.names))
         if found.error <= enough and (not cheap or work.bench.as_cheap(found, best)):
-            kept, best = [*kept, *more], found
-            work.told[name] = (*told, *map(str, kept), *made.words)
+            kept, best, words = [*kept, *more], found, made.words
         elif len(more) > 1:
             half = len(more) // 2
             waiting += [more[half:], more[:half]]
         else:
             waiting.append(list(more[0].parts))
+    if kept:
+        alone = [_alone(work, base, word, one, names) for one in kept]
+        if len(kept) > 1:
+            alone.append(_measured(f"with these {len(kept)} changes the scene", best, base))
+        work.told[best.name] = (*told, *alone, *words)
     return best
+
+
+def _alone(work: Work, base: Tried, word: str, change: Change, names: Mapping[str, str]) -> str:
+    """What one change is, and what it does alone where there is time to see it."""
+    if not work.budget.left(SEARCH):
+        return str(change)
+    made = applied(base.scene, [change])
+    found = work.bench.tried(
+        f"{base.name}; {word}: {change.name}", made.scene, composed(names, made.names)
+    )
+    return _measured(f"{change}; with that alone the scene", found, base)
+
+
+def _measured(words: str, found: Tried, before: Tried) -> str:
+    """The error of a model beside the richest, and its time beside that of the one before."""
+    if not math.isfinite(found.error):
+        return f"{words} does not run ({found.why})"
+    part = found.cpu_s / before.cpu_s
+    return f"{words} errs by {found.error:.1e} and takes {part:.2f} of the time before"
 
 
 def lumped(work: Work, base: Tried, enough: float) -> Tried:
@@ -91,6 +117,7 @@ def lumped(work: Work, base: Tried, enough: float) -> Tried:
         still |= {old: still[new] for old, new in names_now.items() if new in still}
         tried = work.bench.tried(name, found.scene, names, still)
         if tried.error <= enough:
-            work.told[name] = (*work.told[base.name], *found.words)
+            one = _measured("with welded bodies as one the scene", tried, base)
+            work.told[name] = (*work.told[base.name], *found.words, one)
             return tried
     return base

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from advice.scenes import sprung, tip
@@ -25,6 +27,11 @@ def test_stiff_hinges_become_rigid() -> None:
     told = " ".join(made.changes)
     assert all(f'hinge "{name}": rigid' in told for name in ("spring", "bushing", "slide"))
     assert 'hinge "pivot": without its damper' in told
+    for name in ("spring", "bushing", "slide"):
+        (one,) = (text for text in made.changes if text.startswith(f'hinge "{name}": rigid'))
+        found = re.search(r"with that alone the scene errs by (\S+) and takes (\S+) of", one)
+        assert found and float(found[1]) <= 1e-2 and float(found[2]) > 0
+    assert any("with these 3 changes the scene errs by" in text for text in made.changes)
     assert mstmm.compile(made.scene, engine="looped").nu == 1
     assert made.reduced
     assert made.model_saving is not None
