@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..arguments import short, word_of, yes_or_no
-from ..errors import ElementError, SceneError
+from ..errors import ElementError, NumericalFailure, SceneError
 from ..ir.facts import builtin_hinges
 from ..ir.spec import ElementSpec
 from ..scene import Scene, load_scene
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from ..runtime.model.model import Model
 
 ENGINES = ("auto", "fused", "looped")
-SWEEPS = ("riccati", "refined", "qr", "product")
+SWEEPS = ("riccati", "auto", "refined", "qr", "product")
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,9 @@ def compile_scene(
             often as the start needs: digits stay where heavy bodies hang behind light ones; closed
             loops do so by themselves), "qr" (the same as least squares: slower, for any ratio of
             masses; rigid bodies, looped engine, and explicit methods), which both leave the
-            equilibrium and derivatives to the Riccati sweep, or
+            equilibrium and derivatives to the Riccati sweep, "auto" (the first of these three by
+            which the start of a tree keeps its digits, if the scene can have it; `model.sweep`
+            tells which), or
             "product" (the plain product of classical transfer matrices along a chain and
             loops closed on it, guarded).
         accuracy: with "product", the largest deviation from the Riccati sweep, relative to the
@@ -123,12 +126,34 @@ def compile_level(
     most = MOST_ASKED if engine == "fused" else MOST_BODIES
 
     fuser = Fuser(definitions, refused, bake, most)
-    model = Model(scene, elements, fuser, product, sweep if product is None else "riccati", words)
+
+    def made(by: str) -> Model:
+        return Model(scene, elements, fuser, product, by, words)
+
+    if sweep == "auto":
+        model = _with_digits(made, engine)
+    else:
+        model = made(sweep if product is None else "riccati")
     model.refuse_undetermined_start()
     if engine == "fused":
         model.fusion.build()
     elif engine == "auto":
         model.fusion.find()
+    return model
+
+
+def _with_digits(made: Callable[[str], Model], engine: str) -> Model:
+    """By the cheapest sweep that keeps the digits of the start, and that the scene can have."""
+    from ..runtime.guard.heavy import sweep_that_keeps_digits
+
+    model = made("riccati")
+    wanted = sweep_that_keeps_digits(model)
+    if wanted == "qr" and engine != "fused":
+        with suppress(SceneError):
+            return made("qr")
+    if wanted != "riccati":
+        with suppress(SceneError, NumericalFailure):
+            return made("refined")
     return model
 
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 from mstmm.arrays import Array
 from mstmm.risk import Risk
 
+from ..integrate.settings import Settings
+from ..pack.start import start_values
 from ..result.conditioning import LOSS, pivot_loss
 from .path import states
 
@@ -16,7 +18,6 @@ if TYPE_CHECKING:
     from mstmm.scene import Scene
 
     from ..engine.compiled import Compiled
-    from ..integrate.settings import Settings
 
 #: The loss is at most so many times the ratio of masses, or of moments of inertia.
 _WORST = 1e3
@@ -37,6 +38,17 @@ def lost_digits(model: Compiled, settings: Settings, q: Array, u: Array) -> Iter
     found = pivot_loss(model, states(model, settings, q, u, [settings.t_start]))
     if found is not None and found.risk is not None:
         yield replace(found.risk, before=True)
+
+
+def sweep_that_keeps_digits(model: Compiled) -> str:
+    """Of a model made with "riccati" the cheapest sweep by which its start keeps its digits:
+    "riccati", "refined" or "qr"."""
+    if not concerns(model):
+        return "riccati"
+    packed, settings = model.packed, Settings(0.0)
+    q, u = start_values(packed.scene, packed.layout, packed.flexible)
+    found = pivot_loss(model, states(model, settings, q, u, [settings.t_start]))
+    return "riccati" if found is None or found.risk is None else found.sweep
 
 
 def _unlike(scene: Scene) -> float:

@@ -63,18 +63,22 @@ class PivotLoss:
         return min(1e-16 * self.ratio, 1.0) ** (1 + self.refines)
 
     @property
+    def sweep(self) -> str:
+        """The sweep that keeps the digits which this one loses."""
+        return "qr" if self.refines or self.ratio > REFINED else "refined"
+
+    @property
     def risk(self) -> Risk | None:
         """That digits are lost; None up to LOSS."""
         if not self.error > 1e-16 * LOSS:
             return None
         refined = f", refined {self.refines} times" if self.refines else ""
-        keeps = 'sweep = "qr"' if self.refines or self.ratio > REFINED else 'sweep = "refined"'
         return Risk(
             "pivot-loss", f'hinge "{self.hinge}"',
             f'hinge "{self.hinge}" carries {self.ratio:.0e} times what its motion feels (a heavy '
             f"body behind light ones): accelerations may err by {self.error:.0e} of their "
-            f"size{refined}", f"{keeps} keeps them (explicit methods); or, where the root is free, "
-            "make the heavy body the first one", self.ratio, LOSS,
+            f"size{refined}", f'sweep = "{self.sweep}" keeps them (explicit methods); or, where '
+            "the root is free, make the heavy body the first one", self.ratio, LOSS,
         )  # fmt: skip
 
 

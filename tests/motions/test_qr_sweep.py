@@ -281,3 +281,40 @@ def test_the_risk_of_lost_digits_names_the_way_out_and_is_none_there(tmp_path: P
     again = mstmm.load_result(runs[0].save(tmp_path / "run.nc"))
     assert not [risk for risk in again.risks if risk.name == "pivot-loss"]
     assert np.array_equal(again.force("hinge0"), runs[0].force("hinge0"))
+
+
+# --- chosen by the guard ------------------------------------------------------------------------
+
+
+def heavy_tip(mass: float) -> mstmm.Scene:
+    return mstmm.Scene(**chain(["pin"] * COUNT, masses=[1.0] * (COUNT - 1) + [mass]))
+
+
+@pytest.mark.parametrize(
+    ("tip", "sweep"), [(1.0, "riccati"), (1e6, "riccati"), (1e10, "refined"), (1e15, "qr")]
+)
+def test_the_sweep_is_chosen_by_the_digits_that_the_start_loses(tip: float, sweep: str) -> None:
+    scene = heavy_tip(tip)
+    model = mstmm.compile(scene, sweep="auto")
+    assert model.sweep == sweep
+    usual = mstmm.compile(scene, sweep="riccati")
+    q, u = usual.initial_state()
+    risks = {
+        one: [risk.name for risk in made.simulate(1e-6, initial=(q, u)).risks]
+        for one, made in (("usual", usual), ("auto", model))
+    }
+    assert "pivot-loss" not in risks["auto"]
+    assert ("pivot-loss" in risks["usual"]) == (sweep != "riccati")
+    best = mstmm.compile(scene, sweep="qr").accelerations(q, u)
+    assert worst(model.accelerations(q, u), best) < (1e-7 if sweep == "riccati" else 1e-11)
+
+
+def test_what_a_scene_cannot_have_is_not_chosen() -> None:
+    """Flexible bodies have no rows, code of a scene has no least squares."""
+    beam = {"name": "beam", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1e4,
+            "modes": {"y": 1}}  # fmt: skip
+    tables = heavy_tip(1e15).model_dump(by_alias=True, exclude_defaults=True)
+    hinge = {"name": "last", "type": "pin", "inboard": f"rod{COUNT - 1}.tip", "outboard": "beam"}
+    bent = mstmm.Scene(**{**tables, "beam": [beam], "hinge": [*tables["hinge"], hinge]})
+    assert mstmm.compile(bent, sweep="auto").sweep in ("riccati", "refined")
+    assert mstmm.compile(heavy_tip(1e10), sweep="auto", engine="fused").sweep == "refined"

@@ -121,8 +121,9 @@ def simulate(
     sweep: Annotated[
         str,
         typer.Option("--sweep", metavar="NAME", help="riccati, refined: for heavy bodies behind "
-                     "light ones, qr: as least squares, for any ratio of masses, or product: the "
-                     "plain product of transfer matrices, for chains, guarded."),
+                     "light ones, qr: as least squares, for any ratio of masses, auto: the first "
+                     "of these that keeps the start's digits, or product: the plain product of "
+                     "transfer matrices, for chains, guarded."),
     ] = "riccati",
     engine: Annotated[
         str,
