@@ -25,7 +25,7 @@ from ..run import classical, second_opinion
 from ..run.endings import message_of
 from ..run.engine_choice import for_many
 from ..run.measured import MeasuredOutputs, refuse_one_way
-from ..run.simulate import SLICE, make_run, settled, split
+from ..run.simulate import SLICE, make_run, settled, settles, split
 from ..run.stability import check_step
 from ..run.system import SceneSystem
 from .results import result_of
@@ -74,6 +74,7 @@ class Session:
         engine = Engine(self._packed)
         system = self._system = SceneSystem(engine, self._code)
         self._run: Run = make_run(system, self.settings, q, u, _ROWS)
+        self._settles = settles(engine)
         ffi, n = engine.ffi, len(self._names)
         self._places = {name: k for k, name in enumerate(self._names)}
         self._given = ffi.new("double[]", list(self._held()) or [0.0])
@@ -169,6 +170,12 @@ class Session:
         return self._run.t
 
     @property
+    def state(self) -> tuple[Array, Array]:
+        """(nq,), (nu,): both `q` and `u`, as `initial` takes them."""
+        y, nq = self._state(), self.model.nq
+        return y[:nq], y[nq : nq + self.model.nu]
+
+    @property
     def q(self) -> Array:
         """(nq,) hinge coordinates; m, rad, unit quaternions."""
         return self._state()[: self.model.nq]
@@ -181,7 +188,10 @@ class Session:
 
     def _state(self) -> Array:
         """The state as the samples of a result have it."""
-        t, y = np.array([self.t]), self._run.y
+        y = self._run.y
+        if not self._settles:
+            return y
+        t = np.array([self.t])
         return settled(self._system, t, y[None], self._system.memory[None])[0][0]
 
     @property

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
+from ..engine.engine import Engine
 from ..host.interruptible import interruptible
 from ..integrate.loop import Run, Samples, Statistics, Status
 from ..integrate.settings import Settings
@@ -209,6 +210,16 @@ def _among(t: Array, times: Array) -> NDArray[np.bool_]:
     return np.asarray(times[np.minimum(np.searchsorted(times, t), len(times) - 1)] == t)
 
 
+def _moved(engine: Engine) -> bool:
+    """Whether drives or closed loops decide on some coordinates."""
+    return bool(engine.packed.system.driven or engine.packed.system.closures)
+
+
+def settles(engine: Engine) -> bool:
+    """Whether states of steps may differ from what a result has."""
+    return _moved(engine) or bool(len(engine.packed.layout.quaternions))
+
+
 def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Array, float]:
     """Samples (n, n_state) with unit quaternions, exact driven coordinates and closed loops.
 
@@ -216,10 +227,9 @@ def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Arr
     tolerance.  Also returns the largest distance of a quaternion's length from 1.
     """
     engine, y, residual = system.engine, y.copy(), 0.0
-    quaternions = engine.packed.layout.quaternions
-    settles = bool(engine.packed.system.driven or engine.packed.system.closures)
-    if not len(quaternions) and not settles:
+    if not settles(engine):
         return y, residual
+    quaternions = engine.packed.layout.quaternions
     entries = quaternions[:, None] + np.arange(4) if len(quaternions) else quaternions
     rows = max(1, _QUATERNIONS // max(1, len(entries)))
     for first in range(0, len(y) if len(entries) else 0, rows):
@@ -228,7 +238,7 @@ def settled(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Arr
         residual = max(residual, float(np.max(np.abs(lengths - 1), initial=0.0)))
         with np.errstate(invalid="ignore"):  # a quaternion of zeros is named by the run itself
             some[:, entries] /= lengths[:, :, None]
-    if settles:
+    if _moved(engine):
         times, known = np.ascontiguousarray(t), memory.copy()
         engine.lib.mstmm_scene_settle_many(
             system.run, len(y), y.shape[1], engine.pointer(times), engine.pointer(known),

@@ -60,6 +60,8 @@ def test_ticks_are_bit_for_bit_the_steps_of_one_run(engine: str, method: str) ->
     assert stepped.t == run.t[-1]
     np.testing.assert_array_equal(stepped.q, run.q[-1])
     np.testing.assert_array_equal(stepped.u, run.u[-1])
+    for one, other in zip(stepped.state, (stepped.q, stepped.u), strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

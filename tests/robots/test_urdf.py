@@ -238,3 +238,23 @@ def test_meshes_lie_in_packages_above_and_collision_shapes_stand_in(tmp_path: Pa
     told = [f"{note.element}: {note.text}" for note in found.notes]
     assert "link 'tool': drawn by its collision shapes" in told
     assert "link 'tool': no mesh 'package://other/none.stl' to draw it with" in told
+
+
+def test_names_that_a_scene_takes_stay_and_others_are_told(tmp_path: Path) -> None:
+    inertia = '<inertia ixx="1" iyy="1" izz="1"/>'
+    links = "".join(
+        f'<link name="{name}"><inertial><mass value="{mass}"/>{inertia}</inertial></link>'
+        for name, mass in (("c-1", 1), ("c_1", 2))
+    )
+    joints = "".join(
+        f'<joint name="{name}" type="continuous"><parent link="{on}"/><child link="{link}"/>'
+        '<axis xyz="0 0 1"/></joint>'
+        for name, on, link in (("j-1", "base", "c-1"), ("j_1", "c-1", "c_1"))
+    )
+    text = f'<robot><link name="base"/>{links}{joints}</robot>'
+    found = mstmm.import_robot(written(tmp_path, text))
+    assert found.names["c_1"] == "c_1" and found.names["j_1"] == "j_1"
+    assert found.names["c-1"] == "c_1_2" and found.names["j-1"] == "j_1_2"
+    assert {body.name: body.mass for body in found.scene.body} == {"c_1_2": 1.0, "c_1": 2.0}
+    (note,) = (str(note) for note in found.notes)
+    assert "'c-1' is c_1_2, 'j-1' is j_1_2" in note

@@ -27,6 +27,8 @@ BASES = (FIXED, "free")
 COUPLED, HELD = MIMICS = ("coupled", "held")
 #: Types of joints with one coordinate.
 _OF_ONE = ("pin", "prismatic")
+#: So many names are told.
+_NAMED = 6
 
 
 @dataclass(frozen=True)
@@ -109,18 +111,26 @@ class _Writer:
         for link in tree.outward:
             self.place[link.name] = self._placed(link)
         self._names = Names()
-        self._bodies = {name: self._names.take(name, "link") for name in self.bodies()}
+        self._bodies = self._names.take_all(self.bodies(), "link")
         hinges = Names()
-        self.joints = {
-            joint.name: hinges.take(joint.name, "joint") for joint in robot.joints
-            if self.place[joint.child][0] == joint.child
-        }  # fmt: skip
+        moving = [one.name for one in robot.joints if self.place[one.child][0] == one.child]
+        self.joints = hinges.take_all(moving, "joint")
+        self._tell_names()
         #: What the joints that move go with.
         self.mimics = {mimic.of: mimic for mimic in mimics if self._moves(mimic.of)}
         self._roots = {name: hinges.take(f"{name}_base", "link")
                        for name in tree.roots if name in self._bodies}  # fmt: skip
         self._ends: defaultdict[str, dict[str, Any]] = defaultdict(dict)
         self.links = {link.name: self._frame(link) for link in robot.links}
+
+    def _tell_names(self) -> None:
+        """Links and joints that have other names in the scene, the first by name."""
+        named = (*self._bodies.items(), *self.joints.items())
+        others = [f"{old!r} is {new}" for old, new in named if old != new]
+        if others:
+            some = ", ".join(others[:_NAMED]) + (", ..." if others[_NAMED:] else "")
+            text = f"{len(others)} that a scene does not take: {some}"
+            self.notes.append(Note(self.robot.where, "names", text))
 
     def bodies(self) -> list[str]:
         """Links that are bodies, in the order of the file."""

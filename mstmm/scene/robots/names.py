@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 from ..rules.values import GROUND
 
-_OTHER = re.compile("[^A-Za-z0-9_]+")
+_OTHER, _TAKEN = re.compile("[^A-Za-z0-9_]+"), re.compile("[A-Za-z][A-Za-z0-9_]*")
 _LONGEST = 60
 
 
@@ -15,6 +16,13 @@ class Names:
 
     def __init__(self) -> None:
         self._taken = {GROUND}
+
+    def take_all(self, names: Iterable[str], instead: str) -> dict[str, str]:
+        """The same of several, by the names of the file; those that a scene takes stay."""
+        waiting = list(names)
+        first = sorted(waiting, key=lambda name: not _TAKEN.fullmatch(name))
+        found = {name: self.take(name, instead) for name in first}
+        return {name: found[name] for name in waiting}
 
     def take(self, name: str, instead: str) -> str:
         """The name with _ for what a scene has not in names; `instead` is put before what does not
