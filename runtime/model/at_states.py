@@ -216,16 +216,19 @@ class AtStates(Moving):
         t: ArrayLike = 0.0,
         efforts: ArrayLike | None = None,
         parameters: Sequence[str] = (),
+        out: Derivatives | None = None,
     ) -> Derivatives:
         """Exact derivatives of the accelerations by q, u, efforts, t and named numbers.
 
         Arguments as for `accelerations`; `parameters` are names as in `with_parameters`.  With
         respect to q: nu tangent increments dphi, dq = N(q) dphi where qdot = N(q) u (rotation
-        vectors in outboard axes for quaternions).  No compiler is needed.
+        vectors in outboard axes for quaternions).  No compiler is needed.  `out` is what an
+        earlier call gave, whose arrays are written into and which is returned.
 
         Raises SceneError for a name that the scene does not have and for scenes with releases,
         NumericalFailure where `accelerations` does and where a derivative does not exist.
         """
         names = texts_of("parameters", parameters, "rod1.mass")
         by = self._differentiations.get(names) or self._differentiated_by(names)
-        return by(q, u, t, efforts, lambda: self.accelerations(q, u, t, efforts))
+        found = by(q, u, t, efforts, lambda: self.accelerations(q, u, t, efforts))
+        return found if out is None else found.kept_in(out)

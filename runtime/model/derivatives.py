@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arrays import Array, batch
+from mstmm.arguments import short
+from mstmm.arrays import Array, batch, into
 from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.live import LiveInputs
@@ -66,6 +67,19 @@ class Derivatives:
     def state_matrix(self) -> Array:
         """A (..., 2 nu, 2 nu): d/dt (dphi, du) = A (dphi, du) of motions near this one."""
         return np.block([[self.rate_q, self.rate_u], [self.q, self.u]])
+
+    def kept_in(self, out: Derivatives) -> Derivatives:
+        """`out` with these numbers.  SceneError unless it is of the same shapes and parameters."""
+        if not isinstance(out, Derivatives) or list(out.parameters) != list(self.parameters):
+            raise SceneError(
+                f"out = {short(out)}: expected what an earlier call of derivatives gave, with the "
+                "same parameters"
+            )
+        for name in _FOUND:
+            into(getattr(out, name), getattr(self, name))
+        for name, numbers in self.parameters.items():
+            into(out.parameters[name], numbers)
+        return out
 
 
 class Differentiation:

@@ -168,3 +168,18 @@ def test_numbers_whose_squares_are_none_raise_no_warning(model: mstmm.Model) -> 
     assert ended.q.shape[0] == 3
     with pytest.raises(mstmm.SceneError, match=r"initial u\[0, 0\] = inf"):
         model.simulate_batch((far, np.full((3, model.nu), np.inf)), t_end=0.1)
+
+
+@pytest.mark.parametrize("names", [(), ("rod0.mass",)])
+def test_derivatives_are_written_into_those_of_an_earlier_call(
+    model: mstmm.Model, names: tuple[str, ...]
+) -> None:
+    room, found = (model.derivatives(q, U, parameters=names) for q in (Q, Q + 0.5))
+    kept = [room.q, room.udot, *room.parameters.values()]
+    assert model.derivatives(Q + 0.5, U, parameters=names, out=room) is room
+    for a, b in zip(kept, [found.q, found.udot, *found.parameters.values()], strict=True):
+        np.testing.assert_array_equal(a, b)
+    with pytest.raises(mstmm.SceneError, match="out: expected a writeable float64 array"):
+        model.derivatives(MANY, U, parameters=names, out=room)
+    with pytest.raises(mstmm.SceneError, match="what an earlier call of derivatives gave"):
+        model.derivatives(Q, U, parameters=["rod1.mass"], out=room)
