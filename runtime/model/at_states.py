@@ -105,11 +105,12 @@ class AtStates(Moving):
         lead, (times, coordinates, speeds, rates) = batch(
             ("t", t, None), ("q", q, self.nq), ("u", u, nu), ("udot", udot, nu)
         )
-        rows = [
-            engine.inverse_dynamics(float(at), a, b, c, memory)
-            for at, a, b, c in zip(times, coordinates, speeds, rates, strict=True)
-        ]
-        return into(out, np.array(rows).reshape(*lead, nu))
+        rows = np.empty((len(times), nu))
+        states = zip(times.tolist(), coordinates, speeds, rates, strict=True)
+        for k, (at, a, b, c) in enumerate(states):
+            found = alone.efforts(at, a, b, c)
+            rows[k] = engine.inverse_dynamics(at, a, b, c, memory) if found is None else found
+        return into(out, rows.reshape(*lead, nu))
 
     def bias(
         self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0, *, out: Array | None = None
@@ -182,8 +183,11 @@ class AtStates(Moving):
 
             found = np.array([reduced_mass(self, one_state) for one_state in states])
             return into(out, found.reshape(*lead, *found.shape[1:]))
-        matrices = [self.looped.mass_matrix(one_state) for one_state in states]
-        return into(out, np.array(matrices).reshape(*lead, self.nu, self.nu))
+        rows = np.empty((len(states), self.nu, self.nu))
+        for k, one_state in enumerate(states):
+            matrix = alone.mass(one_state)
+            rows[k] = self.looped.mass_matrix(one_state) if matrix is None else matrix
+        return into(out, rows.reshape(*lead, self.nu, self.nu))
 
     def solve(self, q: ArrayLike, rhs: ArrayLike, *, out: Array | None = None) -> Array:
         """M(q)^-1 rhs: accelerations (..., nu) or (..., nu, k) that efforts rhs alone give.

@@ -82,7 +82,7 @@ _TRUSTED, _NOISE, _SURE = 0.9, 0.5, 0.75
 _CHANGED, _HARDLY = 0.8, 0.25
 
 #: The power by which errors have fallen at least.
-_CAUTIOUS = 0.8
+_CAUTIOUS = 0.75
 
 #: A next tolerance aims at this part of what is wanted once runs have been compared, by explicit
 #: steps, and by others.  A run more costs more than tighter steps of high order.
