@@ -258,3 +258,19 @@ def test_names_that_a_scene_takes_stay_and_others_are_told(tmp_path: Path) -> No
     assert {body.name: body.mass for body in found.scene.body} == {"c_1_2": 1.0, "c_1": 2.0}
     (note,) = (str(note) for note in found.notes)
     assert "'c-1' is c_1_2, 'j-1' is j_1_2" in note
+
+
+def test_what_says_too_little_is_told(tmp_path: Path) -> None:
+    turned = joint("revolute", "base", "bob", '<limit lower="1" upper="-1" effort="9"/>')
+    slid = joint("prismatic", "bob", "dot", '<limit lower="0" upper="0.5"/>', "slide")
+    links = (
+        '<link name="base"/><link name="bob"><inertial><mass value="2"/></inertial></link>'
+        '<link name="dot"><inertial><inertia ixx="1" iyy="1" izz="1"/></inertial></link>'
+    )
+    path = written(tmp_path, f"<robot>{links}{turned}{slid}</robot>")
+    told = {note.element: note.text for note in mstmm.import_robot(path, stops=1e4).notes}
+    assert told["link 'bob'"] == "a mass without <inertia>: a point mass"
+    assert told["link 'dot'"] == "moments of inertia without a mass"
+    notes = [note.text for note in mstmm.import_robot(path, stops=1e4).notes]
+    assert "limits from 1 to -1 leave no way, and are left out" in notes
+    assert not any("from 0 to 0.5" in text for text in notes)

@@ -15,7 +15,7 @@ from ...numbers.rotations import Matrix, Vector, from_rpy, perpendicular, produc
 from ..rules.inertia import negative_moment, without_dust
 from ..rules.messages import near
 from .markup import Element, parsed
-from .robot import FIXED, Joint, Link, Look, Mimic, Note, Robot, color
+from .robot import FIXED, NOTHING, Joint, Link, Look, Mimic, Note, Robot, color
 
 
 class _Kind(NamedTuple):
@@ -91,6 +91,10 @@ class _Reader:
             )
         given = _inertia(inertial.first("inertia"))
         inertia = without_dust(given, kg)
+        if kg > 0 and inertial.first("inertia") is None:
+            self.note(one, f"link {name!r}", "a mass without <inertia>: a point mass")
+        elif kg == 0 and inertia != NOTHING:
+            self.note(one, f"link {name!r}", "moments of inertia without a mass")
         if inertia != given:
             self.note(one, f"link {name!r}", "moments of inertia below 0 by rounding taken as 0")
         turned = product(product(frame.rotation, inertia), transpose(frame.rotation))
@@ -152,6 +156,9 @@ class _Reader:
             lower, upper = (limit.number(key, 0.0, unit) for key in ("lower", "upper"))
             if lower < upper:
                 law["limits"] = {"lower": lower, "upper": upper}
+            elif {"lower", "upper"} & set(limit.attributes):
+                what = f"limits from {lower:g} to {upper:g} leave no way, and are left out"
+                self.note(one, f"joint {name!r}", what)
         if limit is not None and {"effort", "velocity"} & set(limit.attributes):
             self.note(one, f"joint {name!r}", "limits of effort and velocity left out")
         return {"law": law} if law else {}
