@@ -19,7 +19,7 @@ from mstmm.scene.checks.closures import coordinate
 from .calls import Calls, Probe
 
 if TYPE_CHECKING:
-    from mstmm.scene import Hinge, Scene
+    from mstmm.scene import Constraint, Hinge, Scene
     from mstmm.scene.tables.loads import Spring
 
 #: What the messages that name an expression end with.
@@ -113,8 +113,8 @@ def _of_hinge(where: str, hinge: Hinge) -> Iterator[tuple[str, Expression, Hinge
 def _with_values(
     engine: Calls, t: float, q: Array, u: Array
 ) -> Iterator[tuple[str, Expression, Callable[[Name], float]]]:
-    """Place and expression of every effort, load and coupling that the engine evaluates and that is
-    no constant, and what its names stand for at a state."""
+    """Place and expression of every effort, load, coupling and curve that the engine evaluates and
+    that is no constant, and what its names stand for at a state."""
     evaluated, scene = engine.packed.model, engine.packed.described
     seen = _State(engine, t, q, u)
     for where, expression, own in _efforts(scene) if evaluated.n_values else ():
@@ -129,6 +129,11 @@ def _with_values(
         yield f"{where}{coupling.key}", coupling.row, seen.of_coupling
         if coupling.equals is not None:
             yield f"{where}equals", coupling.equals, partial(seen.of, own=None)
+    for constraint in scene.constraint:
+        for k, entry in enumerate(constraint.curve or ()):
+            if not entry.is_constant:
+                where = f'constraint "{constraint.name}": curve[{k}]'
+                yield where, entry, partial(seen.of_curve, own=constraint)
 
 
 class _State:
@@ -144,6 +149,8 @@ class _State:
         inputs = self.engine.packed.channels
         if name.text in inputs:
             return inputs[name.text].value(self.t)
+        if name.hinge and name.quantity in ("s", "s_rate"):
+            return self._along(name.text)
         if name.quantity not in ("q", "u") and own is not None:
             return own.parameters[name.quantity]
         slots = self.engine.packed.layout.hinges[name.hinge or (own.name if own else "")]
@@ -157,6 +164,17 @@ class _State:
         number, quantity, entry = coordinate(scene, name)
         slots = self.engine.packed.layout.hinges[scene.hinges.name(number)]
         return float(self.q[slots.q + entry] if quantity == "q" else self.u[slots.u + entry])
+
+    def of_curve(self, _: Name, own: Constraint) -> float:
+        """How far along its curve a constraint is: s, the one name in it."""
+        return self._along(f"{own.name}.s")
+
+    def _along(self, name: str) -> float:
+        """s of a constraint, or its rate."""
+        layout = self.engine.packed.layout
+        if name in (names := layout.q_names):
+            return float(self.q[names.index(name)])
+        return float(self.u[layout.u_names.index(name)])
 
     def of_spring(self, name: Name, own: Spring) -> float:
         """The same, where q and u alone are the spring's length and its rate."""

@@ -53,3 +53,13 @@ def test_a_bead_against_its_own_equation(when: str, entry: int) -> None:
 def test_what_a_curve_does_not_have(when: str) -> None:
     with pytest.raises(mstmm.SceneError, match=r"unknown; .* there is wire.s and wire.s_rate"):
         mstmm.Scene(**bead(when))
+
+
+def test_a_curve_that_ends_on_the_way_is_named() -> None:
+    """A wire that is there up to s = 1 alone."""
+    scene = bead("wire.s > 9")
+    scene["constraint"][0] |= {"curve": ["s", "sqrt(1-s)", "0"], "start": 0.5}
+    scene["hinge"][0]["initial"] = {"q": [0.5, 0.5**0.5, 0, 1, 0, 0, 0], "u": [0] * 6}
+    run = mstmm.compile(mstmm.Scene(**scene), engine="looped").simulate(3.0, "rk4", 1e-3)
+    assert not run.success
+    assert 'constraint "wire": curve[1] = "sqrt(1-s)" is nan at t = ' in run.message
