@@ -56,11 +56,6 @@ class Rank:
     nearby: int
     stuck: bool = False
 
-    @property
-    def singular(self) -> bool:
-        """Whether the pose is singular."""
-        return len(self.here) > self.nearby
-
 
 def rank_at(engine: Engine, q: Array) -> Rank:
     """Rows that repeat others at a closed state q (nq,) and around it."""
