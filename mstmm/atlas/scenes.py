@@ -23,7 +23,8 @@ LET_GO = 1e-3
 
 
 def model(scene: dict[str, Any], **options: Any) -> Model:
-    """A scene by the looped engine: no compiler, the same numbers everywhere."""
+    """A scene by the looped engine and the Riccati sweep: no compiler, no guard that chooses."""
+    options.setdefault("sweep", "riccati")
     return compile_scene(Scene(**scene), engine="looped", **options)
 
 
@@ -76,6 +77,21 @@ def sprung_rod(stiffness: float, damping: float = 0.0) -> Model:
     return model({"gravity": [0, 0, 0], "body": [rod("rod")], "hinge": [hinge]})
 
 
+def hanging_rod(rate: float) -> Model:
+    """A rod that hangs from a pin, let go at 1e-3 rad: its weight gives it this angular frequency
+    (1/s)."""
+
+    def weighing(weight: float) -> Model:
+        pin = {
+            "name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod",
+            "initial": {"q": [LET_GO]},
+        }  # fmt: skip
+        return model({"gravity": [weight, 0, 0], "body": [rod("rod")], "hinge": [pin]})
+
+    slope = float(weighing(1.0).derivatives(np.zeros(1), np.zeros(1)).q[0, 0])
+    return weighing(rate**2 / -slope)
+
+
 def stiffness_of_rate(rate: float) -> float:
     """The stiffness, N*m/rad, of which a rod has this angular frequency."""
     return rate**2 * float(sprung_rod(1.0).mass_matrix([0.0])[0, 0])
@@ -83,7 +99,7 @@ def stiffness_of_rate(rate: float) -> float:
 
 def double_pendulum(stiffness: float | None = None, stretch: float = 0.0) -> Model:
     """Two rods that fall from the horizontal, on pins, or on undamped bushings of this stiffness
-    (N/m), of which the first begins stretched (m)."""
+    (N/m), which turn freely in space, and of which the first begins stretched (m)."""
     names = ("upper", "lower")
     kind: dict[str, Any] = {"type": "pin"}
     if stiffness is not None:

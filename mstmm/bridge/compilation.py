@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..runtime.model.model import Model
 
 ENGINES = ("auto", "fused", "looped")
-SWEEPS = ("riccati", "auto", "refined", "qr", "product")
+SWEEPS = ("auto", "riccati", "refined", "qr", "product")
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Generated:
 def compile_scene(
     scene: Scene | str | os.PathLike[str],
     engine: str = "auto",
-    sweep: str = "riccati",
+    sweep: str = "auto",
     accuracy: float = 1e-8,
     bake: bool = False,
     flexibility: str | None = None,
@@ -50,15 +50,14 @@ def compile_scene(
             of this scene alone, compiled now or found in the cache; a C compiler is needed, pays
             up to about 60 bodies, possible up to 400), or "auto": fused code that is in the cache
             is used, and a run or batch long enough to repay the compiler has it built.
-        sweep: "riccati" (any tree), "refined" (what its answer leaves over is answered again, as
-            often as the start needs: digits stay where heavy bodies hang behind light ones; closed
-            loops do so by themselves), "qr" (the same as least squares: slower, for any ratio of
-            masses; rigid bodies, looped engine, and explicit methods), which both leave the
-            equilibrium and derivatives to the Riccati sweep, "auto" (the first of these three by
-            which the start of a tree keeps its digits, if the scene can have it; `model.sweep`
-            tells which), or
-            "product" (the plain product of classical transfer matrices along a chain and
-            loops closed on it, guarded).
+        sweep: "auto" (the first of the next three by which the start of a tree keeps its digits,
+            if the scene can have it; `model.sweep` tells which), "riccati" (any tree), "refined"
+            (what its answer leaves over is answered again, as often as the start needs: digits
+            stay where heavy bodies hang behind light ones; closed loops do so by themselves), "qr"
+            (the same as least squares: slower, for any ratio of masses; rigid bodies, looped
+            engine, and explicit methods), which both leave the equilibrium and derivatives to the
+            Riccati sweep, or "product" (the plain product of classical transfer matrices along a
+            chain and loops closed on it, guarded).
         accuracy: with "product", the largest deviation from the Riccati sweep, relative to the
             largest acceleration, that is not an error.
         bake: with "fused", make the scene's numbers part of the code instead of reading them at run
@@ -89,7 +88,7 @@ def compile_scene(
 def compile_level(
     scene: Scene,
     engine: str = "auto",
-    sweep: str = "riccati",
+    sweep: str = "auto",
     accuracy: float = 1e-8,
     bake: bool = False,
     flexibility: str | None = None,

@@ -30,7 +30,7 @@ def use_files(paths: list[str]) -> None:
 def compiled(
     path: str,
     scene: Scene,
-    sweep: str = "riccati",
+    sweep: str = "auto",
     engine: str = "auto",
     flexibility: str | None = None,
     simplify: bool | Mapping[str, bool | float] = True,

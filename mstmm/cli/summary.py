@@ -44,6 +44,12 @@ def simplified(result: Result) -> str:
     )  # fmt: skip
 
 
+def engine(result: Result) -> str:
+    """The engine, and the sweep where it is not the usual one."""
+    model = result.model
+    return f"{model.engine} engine" + (f", sweep {model.sweep}" if model.sweep != "riccati" else "")
+
+
 def count(n: int, one: str, many: str = "") -> str:
     """3 bodies, 1 body."""
     return f"{n} {one if n == 1 else many or one + 's'}"
@@ -117,6 +123,7 @@ def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
         "simplifications": [asdict(one) for one in result.model.simplifications],
         "engine": result.model.engine,
         "engine_choice": result.model.engine_choice,
+        "sweep": result.model.sweep,
         "seconds": seconds,
         "statistics": None if counted is None else asdict(counted),
         "error_estimate": None if reached is None else reached.to_dict(),

@@ -110,6 +110,15 @@ class Tangent:
         self._call("tangent_solve", np.ascontiguousarray(r, float), known, x)
         return x
 
+    def solve_laws(self, r: Array, d_q: Array | None = None, d_u: Array | None = None) -> Array:
+        """Changes (nu,) of accelerations by which, behind `factor_laws` and beside known changes of
+        coordinates and speeds (nu,), R changes by r (nu,)."""
+        found = np.empty(self.nu)
+        still = np.zeros(self.nu)
+        known = (still if d_q is None else d_q, still if d_u is None else d_u)
+        self._call("laws_solve", r, *known, found)
+        return found
+
     def count_negative(self) -> int | None:
         """How many eigenvalues of the last factorisation of a symmetric tangent are negative: as
         many as of all its pivots, by Sylvester's law.  None where loads reach across the tree,

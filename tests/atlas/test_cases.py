@@ -51,6 +51,12 @@ EXPECTED = {
     "order-reduction": ((1e3, 1e5), 1e10),
     # the length falls by (h w / 2)^6 / 144 a step, w = 1.98 rad/s: 1e-6 of 50 s at h = 0.078
     "quaternion-drift": ((0.074, 0.083), 0.5),
+    # (h omega / 2)^2 an iteration, 1e-8 of what a step changes within 100: 1.82
+    "laws-iterations": ((1.6, 2.0), 30.0),
+    # h^3 k on rods of 1 kg that swing at some 4 rad/s, beside their weight: k of 1e5 to 1e6
+    "predicted-loads": ((1e5, 2e6), 1e12),
+    # derived beside: 1.3e-2 m, and 1.16e-2 of a rigid rod, at rho A g L^3 / EI = 1.96
+    "linear-weight": ((0.3, 1.96), 6.0),
     "laws-tangent": ((0.1, 1.0), 1e3),
     # of first order: 7.1e-5 at 3.9 ms
     "laws-order": ((5e-4, 6.1e-4), 2e-2),

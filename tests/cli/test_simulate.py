@@ -180,6 +180,33 @@ def test_the_sweep_is_chosen(mstmm: Command, folder: Path) -> None:
         assert "riccati" in refused.err and "qr" in refused.err
 
 
+@pytest.mark.parametrize(("tip", "sweep"), [(1.0, "riccati"), (1e11, "refined")])
+def test_the_sweep_that_the_start_needs_is_chosen_and_told(
+    mstmm: Command, folder: Path, tip: float, sweep: str
+) -> None:
+    rods = "".join(
+        f"""
+        [[body]]
+        name = "rod{i}"
+        mass = {tip if i == 3 else 1.0}
+        inertia = [0.1, 0.1, 0.1]
+        ends.tip = [1, 0, 0]
+        [[hinge]]
+        name = "pin{i}"
+        type = "pin"
+        inboard = "{f"rod{i - 1}.tip" if i else "ground"}"
+        outboard = "rod{i}"
+        """
+        for i in range(4)
+    )
+    (folder / "heavy.toml").write_text(f"gravity = [0, -9.81, 0]\n{rods}")
+    done = mstmm("simulate", "heavy.toml", "--t-end", "1e-6")
+    assert ("looped engine, sweep refined" in done.out) == (sweep == "refined")
+    found = json.loads(mstmm("simulate", "heavy.toml", "--t-end", "1e-6", "--json").out)
+    assert found["sweep"] == sweep
+    assert "pivot-loss" not in [risk["name"] for risk in found["risks"]]
+
+
 def test_plot_of_quantities(mstmm: Command, folder: Path) -> None:
     options = ("--t-end", "0.5", "--plot", "a.png", "-q", "rod.tip.position", "-q", "energy")
     done = mstmm("simulate", "pendulum.toml", *options)

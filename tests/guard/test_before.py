@@ -14,7 +14,7 @@ from mstmm.runtime.integrate.settings import Settings
 
 
 def seen(scene: mstmm.Scene, t_end: float = 10.0, **settings: Any) -> list[Risk]:
-    model = mstmm.compile(scene, engine="looped")
+    model = mstmm.compile(scene, engine="looped", sweep="riccati")
     found = look(model, Settings(t_end, **settings), *model.initial_state()).risks
     assert all(risk.before for risk in found)
     return list(found)

@@ -21,6 +21,7 @@ GUARDED = {
     "rk4-shapes": ("step-stability", 3, 9),
     "narrow-pulse": ("narrow-load", 0.3, 3e-3),
     "linear-beam": ("stiffening", 0.7, 5.0),
+    "linear-weight": ("stiffening", 0.1, 3.0),
     "one-way": ("one-way-coupling", 300.0, 1.0),
     "single-frame": ("slope", 0.1, 1.0),
     "end-moment": ("shapes", 20, 2),

@@ -45,7 +45,7 @@ OF_RESULTS: dict[str, tuple[Callable[[Any], Any], str]] = {
 #: Where a word is expected, and what of it is said of anything else.
 WORDS: dict[str, tuple[Callable[[Any, Any], Any], str]] = {
     "engine": (lambda r, x: mstmm.compile(r.model.scene, engine=x), "expected one of auto, fused"),
-    "sweep": (lambda r, x: mstmm.compile(r.model.scene, sweep=x), "expected one of riccati"),
+    "sweep": (lambda r, x: mstmm.compile(r.model.scene, sweep=x), "expected one of auto"),
     "accuracy": (lambda r, x: mstmm.compile(r.model.scene, accuracy=x), "a positive number"),
     "bake": (lambda r, x: mstmm.compile(r.model.scene, bake=x), "expected True or False"),
     "flexibility": (

@@ -194,7 +194,7 @@ def test_scenes_without_a_matrix_are_named(change: Any, named: str) -> None:
 
 
 def test_an_unknown_sweep_is_named() -> None:
-    there_are = 'sweep "plain" is not known; there are: riccati, auto, refined, qr, product'
+    there_are = 'sweep "plain" is not known; there are: auto, riccati, refined, qr, product'
     with pytest.raises(mstmm.SceneError, match=there_are):
         compiled(chain(["pin"]), sweep="plain")
 

@@ -15,35 +15,25 @@ from ...runtime.model.model import Model
 from .plain_rosenbrock import Steps
 
 
-class _ByLaws(Tangent):
-    """What is known of a change goes by the laws as well."""
-
-    def accelerations(self, d_q: Array, d_u: Array) -> Array:
-        """Changes (nu,) of accelerations that belong to known ones of coordinates and speeds."""
-        found = np.empty(self.nu)
-        self._call("laws_solve", np.zeros(self.nu), d_q, d_u, found)
-        return found
-
-
 class LawsSteps(Steps):
     """Steps of scenes whose speeds are the rates of their coordinates, and which go not by time."""
 
     def __init__(self, model: Model, method: str) -> None:
         super().__init__(model, method)
-        self._evaluate, self._laws = model.accelerations, _ByLaws(model.looped)
+        self._evaluate, self._laws = model.accelerations, Tangent(model.looped)
 
     def _step(self, t: float, h: float, y: Array) -> tuple[Array, Array]:
         table = self._table
         s = 1.0 / (table.gamma * h)
         self._laws.residual(t, *y)
         self._laws.factor_laws(s, s)
-        stages = np.zeros((table.n_stages, *y.shape))
+        stages, still = np.zeros((table.n_stages, *y.shape)), np.zeros_like(y[0])
         for i in range(1, table.n_stages):
             q, u, _ = y + np.tensordot(table.A[i], stages, 1)
             slopes = np.array([u, self._evaluate(q, u)])
             slopes += np.tensordot(table.second[i], stages[:, :2], 1) / h
             known = slopes[1] / s
-            x = self._laws.accelerations((known + slopes[0]) / s, known)
+            x = self._laws.solve_laws(still, (known + slopes[0]) / s, known)
             moved = x / s + known
             stages[i] = (moved + slopes[0]) / s, moved, x
         end = y + np.tensordot(table.B, stages, 1)

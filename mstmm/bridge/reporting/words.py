@@ -74,7 +74,7 @@ def made(result: Result) -> str:
     rows = [
         ("time", f"{settings.t_start:g} to {settings.t_end:g} s, {len(result.t)} samples"),
         ("outcome", result.message), ("method", f"{settings.method}, {by}"),
-        ("engine", model.engine_choice or model.engine),
+        ("engine", model.engine_choice or model.engine), ("sweep", model.sweep),
     ]  # fmt: skip
     if counted is not None:
         rows.append(("steps", f"{counted.steps}, {counted.rejected} rejected"))

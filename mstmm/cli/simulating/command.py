@@ -124,7 +124,7 @@ def simulate(
                      "light ones, qr: as least squares, for any ratio of masses, auto: the first "
                      "of these that keeps the start's digits, or product: the plain product of "
                      "transfer matrices, for chains, guarded."),
-    ] = "riccati",
+    ] = "auto",
     engine: Annotated[
         str,
         typer.Option("--engine", metavar="NAME", help="auto, looped, or fused: code compiled for "

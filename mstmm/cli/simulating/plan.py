@@ -34,7 +34,7 @@ class Plan:
     quantities: tuple[str, ...]
     certify: bool | None
     resume: bool
-    sweep: str = "riccati"
+    sweep: str = "auto"
     engine: str = "auto"
     flexibility: str | None = None
     accuracy: float | None = None

@@ -61,7 +61,7 @@ def _say(plan: Plan, result: Result, seconds: float, made: list[str]) -> None:
     verdict, told = _verdict(plan, result), result.trajectory.told
     for line in summary.verdict_lines(verdict, console.width, told):
         output.say(line)
-    output.say(f"{plan.scene}: {summary.sizes(result)}, {result.model.engine} engine")
+    output.say(f"{plan.scene}: {summary.sizes(result)}, {summary.engine(result)}")
     output.say(summary.effort(result, seconds))
     if packed := summary.simplified(result):
         output.say(f"  {packed}")

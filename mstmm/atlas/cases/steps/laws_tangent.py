@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ...definition import Definition, Method
 from ...measures import growth
 from ...scale import LOG
-from ...scenes import LET_GO, model, rod
+from ...scenes import hanging_rod
 
 STEP, STEPS = 0.01, 400
 
 
-def _hanging(weight: float) -> dict[str, object]:
-    pin = {
-        "name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod",
-        "initial": {"q": [LET_GO]},
-    }  # fmt: skip
-    return {"gravity": [weight, 0, 0], "body": [rod("rod")], "hinge": [pin]}
-
-
 def _growth(rate: float, tangent: str) -> float:
-    """`rate` is the step times the angular frequency of a rod that hangs still."""
-    still = model(_hanging(1.0))
-    slope = float(still.derivatives(np.zeros(1), np.zeros(1)).q[0, 0])
-    swinging = model(_hanging((rate / STEP) ** 2 / -slope))
-    return growth(swinging, STEP, STEPS, "ros34pw2", tangent=tangent)
+    """`rate` is the step times the angular frequency of the rod."""
+    return growth(hanging_rod(rate / STEP), STEP, STEPS, "ros34pw2", tangent=tangent)
 
 
 CASE = Definition(

@@ -19,8 +19,7 @@ CASE = Definition(
     title="One linearised equation a step: an unresolved stiff motion",
     why="Where a bushing begins stretched, its end moves far within a step, and an expansion about "
     "the predicted motion is one about the wrong place: energy appears from nowhere. Iterating "
-    "to the end, the remedy, holds as long as the iteration finds its way; a step in hinge "
-    "coordinates from a slack spring never meets this.",
+    "to the end, the remedy, holds as long as the iteration finds its way.",
     parameter="stiffness of bushings (stretched by 1 mm)", unit="N/m", low=1e3, high=1e9, scale=LOG,
     measured="largest energy in 2 s, of that exchanged", limit=1.05,
     method=Method("dttmm, h = 10 ms", lambda k: _gained(k, "dttmm")),

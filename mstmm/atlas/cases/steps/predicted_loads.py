@@ -1,0 +1,37 @@
+"""One linearised equation a step beside stiff springs, about the loads that the predictor gives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...definition import Definition, Method
+from ...measures import energy_gain, simulated
+from ...scale import LOG
+from ...scenes import FALL, double_pendulum
+
+STEP = 0.01
+
+
+def _gained(stiffness: float, method: str, **options: Any) -> float:
+    run = simulated(double_pendulum(stiffness), 1.0, method, STEP, **options)
+    return energy_gain(run, FALL)
+
+
+CASE = Definition(
+    name="predicted-loads",
+    title="One linearised equation a step: turns by the loads of a predictor",
+    why="A predictor misses the length of a spring by the third power of the step, and the load "
+    "there by stiffness times that. How loads turn with their bodies is linearised about it: from "
+    "slack springs, which hold some 40 N, it makes a step of meganewtons, and these the next. Runs "
+    "stop at the pivot that changes its sign. The classical form in absolute coordinates, damped, "
+    "turns no more than the springs held before.",
+    parameter="stiffness of bushings (slack at the start)", unit="N/m", low=1e3, high=1e9,
+    scale=LOG, measured="largest energy in 1 s, of that exchanged", limit=1.05,
+    method=Method("dttmm, h = 10 ms", lambda k: _gained(k, "dttmm")),
+    remedy=Method(
+        "dttmm-classical, generalised-alpha:0.8",
+        lambda k: _gained(k, "dttmm-classical", scheme="generalised-alpha:0.8"),
+    ), reach=1e12,
+    source="Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, 2019, ch. 7; Negrut, "
+    "Jay, Khude, Journal of Computational and Nonlinear Dynamics 4, 2009",
+)  # fmt: skip

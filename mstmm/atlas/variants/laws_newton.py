@@ -1,0 +1,39 @@
+"""Steps of the trapezoidal rule iterated by inertia and the slopes of laws alone, whatever comes.
+
+Runs notice how slowly such an iteration contracts, and take the exact tangent in its place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import NumericalFailure
+from ...runtime.engine.tangent import Tangent
+from ...runtime.model.model import Model
+
+#: Change of speeds in an iteration at which it has come to its end, as a part of the step's.
+_END = 1e-8
+
+
+def iterations(model: Model, step: float, steps: int, most: int) -> float:
+    """Iterations that a step takes, of so many steps (s) from the start; for scenes whose speeds
+    are the rates of their coordinates.
+
+    Raises NumericalFailure where one takes more than `most`.
+    """
+    tangent, taken, rate = Tangent(model.looped), 0, 2.0 / step
+    q, u = model.initial_state()
+    a = model.accelerations(q, u)
+    for number in range(1, steps + 1):
+        q, u, speed = q + step * u + step**2 / 2 * a, u + step * a, u
+        for _ in range(most):
+            taken += 1
+            residual = tangent.residual(number * step, q, u, a)
+            tangent.factor_laws(rate, rate)
+            change = tangent.solve_laws(-residual)
+            q, u, a = q + change / rate**2, u + change / rate, a + change
+            if np.abs(change).max() <= _END * rate * np.abs(u - speed).max():
+                break
+        else:
+            raise NumericalFailure(f"step {number}: no end after {most} iterations")
+    return taken / steps
