@@ -166,6 +166,16 @@ class Calls:
             points, loads, efforts, udot, sums, rows, tuple(map(_first, failures.values()))
         )
 
+    def sums(self, t: float, q: Array, u: Array, memory: Array) -> tuple[Array, str]:
+        """`sums` of one state (nq,), (nu,), nan where it cannot be evaluated, and why not."""
+        found = np.full(int(self.lib.MSTMM_SUM_NUMBERS), np.nan)
+        wanted, failure = self.ffi.new("mstmm_observation *"), self.ffi.new("mstmm_failure *")
+        wanted.sums = self.pointer(found)
+        state = (self.pointer(np.ascontiguousarray(x, dtype=np.float64)) for x in (q, u, memory))
+        if self.lib.mstmm_observe(self.packed.model, self.workspace(), t, *state, wanted, failure):
+            return found, self.failure_text(failure, t)
+        return found, ""
+
     # --- words ----------------------------------------------------------------------------------
 
     def hinge_name(self, position: int) -> str:

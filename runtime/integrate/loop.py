@@ -199,8 +199,8 @@ class Run:
         run.max_step, run.max_steps = settings.max_step, settings.max_steps
         run.tangents = TANGENTS.index(settings.tangent)
         self.call_back(0)
-        given = np.asarray(settings.atol if atol is None else atol, dtype=np.float64)
-        run.atol = self._atol = self._doubles(np.broadcast_to(given, (system.n_error,)))
+        given = np.full(system.n_error, settings.atol if atol is None else atol)
+        run.atol = self._atol = self._ffi.from_buffer("double[]", given)
         run.workspace = self._space = self._room(run.tableau)
         self._samples: list[Samples] = []
         self.kept_bytes = 0  # of all samples so far
@@ -223,7 +223,7 @@ class Run:
     def _room(self, tableau: Any) -> Any:
         """Workspace for a method; it lives as long as what is returned."""
         size = self._lib.mstmm_workspace_size(self._system, tableau)
-        return self._ffi.from_buffer("double[]", np.zeros(max(size, 1)))
+        return self._ffi.from_buffer("double[]", np.empty(max(size, 1)))
 
     def _doubles(self, array: ArrayLike) -> Any:
         """`double *` to a contiguous copy, which lives as long as what is returned."""
@@ -298,6 +298,11 @@ class Run:
         """
         self._run.sign_steps, self._run.look_steps = signs, look
         self._run.short_step = short_step
+
+    @property
+    def steps(self) -> int:
+        """How many steps have been made."""
+        return int(self._run.count.steps)
 
     @property
     def asked(self) -> bool:

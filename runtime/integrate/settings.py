@@ -61,8 +61,9 @@ def times_of(output_times: ArrayLike | Sequence[float] | None) -> tuple[float, .
     if found.ndim > 1:
         raise SceneError(f"output_times have shape {found.shape}, expected (n,): times in s")
     times = np.atleast_1d(found)
-    falls = np.flatnonzero(~(np.diff(times) > 0))
-    if len(falls):
+    rises = times[1:] > times[:-1]
+    if not rises.all():
+        falls = np.flatnonzero(~rises)
         before, after = times[falls[0]], times[falls[0] + 1]
         raise SceneError(
             f"output_times: {after:g} s follows {before:g} s; expected increasing times in s"

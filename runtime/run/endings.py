@@ -46,6 +46,8 @@ _FARTHER, _FARTHEST = 4.0, 1e-9
 
 def message_of(system: SceneSystem, run: Run) -> str:
     """How a run ended or stands, as a sentence."""
+    if run.status is Status.FINISHED:
+        return run.message()
     failure = run.failure
     cause = ""
     if failure is not None:

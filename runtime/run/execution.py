@@ -120,7 +120,7 @@ def first_run(
         watch.before = float(state["seconds"])
     look = 0 if compiled else compiled_run.look_after(model, settings)
     status: Status | None = run.status
-    if status is Status.RUNNING and run.statistics.steps < look:
+    if look and status is Status.RUNNING and run.steps < look:
         watch.engine = compiled_run.LOOPED
         status, message = _advanced(system, run, watch, earlier, look)
         if status is Status.RUNNING:

@@ -104,13 +104,13 @@ class Choice:
         if run.signs >= _NOT_STIFF and rate * run.last_step < _STABLE:
             self._change(run, AUTO_EXPLICIT, rate)
             return
-        gone = max(_NOT_STIFF, run.statistics.steps - self._since)
+        gone = max(_NOT_STIFF, run.steps - self._since)
         signs = run.signs + _NOT_STIFF if run.signs >= _NOT_STIFF else _NOT_STIFF
         self._ask(run, signs, self._since + 2 * gone, _short(rate))
 
     def _change(self, run: Run, method: str, rate: float) -> None:
         implicit = method != AUTO_EXPLICIT
-        steps = run.statistics.steps
+        steps = run.steps
         if implicit:
             self._system.offer_tangent()
         run.change(get(method))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -93,20 +94,19 @@ def energy_at(system: SceneSystem, t: float, y: Array) -> float:
 
     Raises NumericalFailure where the motion can, but not what the state shows.
     """
-    engine, memory = system.engine, system.memory[None]
-    q, u = y[None, : engine.nq].copy(), y[None, engine.nq : engine.nq + engine.nu].copy()
-    seen = engine.observe(np.array([t]), q, u, memory, parts=("sums",))
-    energy = float(np.abs(seen.sums[0, :3]).sum())
-    if np.isfinite(energy):
+    engine, memory = system.engine, system.memory
+    q, u = y[: engine.nq], y[engine.nq : engine.nq + engine.nu]
+    sums, failure = engine.sums(t, q, u, memory)
+    energy = sum(map(abs, sums[:3].tolist()))
+    if math.isfinite(energy):
         return energy
     try:
-        engine.accelerations(t, q, u, memory.copy())
+        engine.accelerations(t, q[None].copy(), u[None].copy(), memory[None].copy())
     except NumericalFailure:
         return 0.0
     raise NumericalFailure(
-        seen.failures[0]
-        if seen.failures
-        else f"the energy at t = {t:.9g} s is not finite; see "
+        failure
+        or f"the energy at t = {t:.9g} s is not finite; see "
         "whether masses, speeds and stiffnesses are of the size that was meant"
     )
 
@@ -132,7 +132,7 @@ def advance(
             if choice is not None:
                 choice.look(run)
                 status = Status.RUNNING if choice.rescue(run) else status
-            if status is not Status.RUNNING or run.statistics.steps == steps:
+            if status is not Status.RUNNING or run.steps == steps:
                 return status
             if observe is not None:
                 observe(run)

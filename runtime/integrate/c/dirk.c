@@ -30,7 +30,7 @@ static int move(const mstmm_work *work, const mstmm_newton_equations *stage) {
 }
 
 /* y_stage = y* + gamma h k with k as the stages before foretell it */
-static int start(const mstmm_work *work, int i, const mstmm_newton_equations *stage) {
+MSTMM_WIDE static int start(const mstmm_work *work, int i, const mstmm_newton_equations *stage) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
   const mstmm_terms terms = mstmm_second_terms(work->tableau, i);
   double *k = work->k + i * work->row, *y = work->y_stage;

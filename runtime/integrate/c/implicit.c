@@ -239,7 +239,7 @@ static double norm(const mstmm_work *work, const double *other) {
                  rms(work, other, n_q + n_u, work->system->n_state, 0));
 }
 
-static void estimate(const mstmm_work *work) {
+MSTMM_WIDE static void estimate(const mstmm_work *work) {
   const mstmm_terms terms = mstmm_error_terms(work->tableau, 0);
   for (int64_t i = 0; i < work->row; i += WIDE) {
     wide sum;

@@ -17,21 +17,22 @@ MSTMM_INLINE void mix_nodes(const mstmm_work *work, int nodes, int lanes, int fi
   const double h = work->run->real.h, *restrict base = work->y, *restrict k0 = work->k;
   const double *restrict k = work->lanes_k;
   double *restrict to = work->lanes_y;
-  wide at = {0.0}, weights[WIDE];
-  for (int j = 0; j < nodes; j++) at[j] = tableau->c[1 + j];
-  for (int j = 0; j < nodes; j++) weights[j] = *(const wide *)(tableau->mix + WIDE * j);
+  double at[GROUP] = {0.0}, state[GROUP];
+  memcpy(at, tableau->c + 1, (size_t)nodes * sizeof *at);
   for (int64_t i = 0; i < n; i++) {
-    wide sum = {0.0}, state;
-    if (first) {
-      sum = at * k0[i];
-    } else {
+    for (int part = 0; part < GROUP; part += WIDE) {
+      wide sum = {0.0};
+      if (first) {
+        sum = *(const wide *)(at + part) * k0[i];
+      } else {
 #pragma GCC unroll 8
-      for (int j = 0; j < nodes; j++) sum += weights[j] * k[place(n, lanes, i, j)];
+        for (int j = 0; j < nodes; j++)
+          sum += *(const wide *)(tableau->mix + GROUP * j + part) * k[place(n, lanes, i, j)];
+      }
+      *(wide *)(state + part) = base[i] + h * sum;
     }
-    state = base[i] + h * sum;
-    for (int j = 0; j < WIDE; j += lanes)
-      memcpy(to + place(n, lanes, i, j), (const double *)&state + j,
-             (size_t)lanes * sizeof(double));
+    for (int j = 0; j < GROUP; j += lanes)
+      memcpy(to + place(n, lanes, i, j), state + j, (size_t)lanes * sizeof(double));
   }
 }
 
@@ -40,9 +41,9 @@ static int evaluate_in_turn(const mstmm_work *work, const double *t) {
   const int64_t n = work->system->n_state;
   int status = 0;
   for (int j = 0; j < work->tableau->n_nodes && !status; j++) {
-    for (int64_t i = 0; i < n; i++) work->y_stage[i] = work->lanes_y[place(n, WIDE, i, j)];
+    for (int64_t i = 0; i < n; i++) work->y_stage[i] = work->lanes_y[place(n, GROUP, i, j)];
     status = mstmm_evaluate(work, t[j], work->y_stage, work->y_event);
-    for (int64_t i = 0; i < n; i++) work->lanes_k[place(n, WIDE, i, j)] = work->y_event[i];
+    for (int64_t i = 0; i < n; i++) work->lanes_k[place(n, GROUP, i, j)] = work->y_event[i];
   }
   return status;
 }
@@ -50,7 +51,7 @@ static int evaluate_in_turn(const mstmm_work *work, const double *t) {
 static int evaluate_lanes(const mstmm_work *work, const double *t) {
   const mstmm_system *system = work->system;
   const int nodes = work->tableau->n_nodes, lanes = system->lanes;
-  int codes[WIDE] = {0};
+  int codes[GROUP] = {0};
   for (int j = 0; j < nodes; j += lanes) {
     const int64_t start = place(system->n_state, lanes, 0, j);
     if (!system->rhs_lanes(system->context, t + j, work->lanes_y + start, work->lanes_k + start,
@@ -73,9 +74,9 @@ MSTMM_INLINE void keep_block(const mstmm_work *work, int nodes, int lanes, int i
 
 MSTMM_INLINE int iterate(const mstmm_work *work, int nodes, int lanes) {
   const mstmm_tableau *tableau = work->tableau;
-  double t[WIDE];
+  double t[GROUP];
   int status = 0;
-  for (int j = 0; j < WIDE; j++)
+  for (int j = 0; j < GROUP; j++)
     t[j] = mstmm_time_in(work->run, tableau->c[1 + (j < nodes ? j : nodes - 1)]);
   for (int iteration = 0; iteration < tableau->n_iterations && !status; iteration++) {
     mix_nodes(work, nodes, lanes, iteration == 0);
@@ -89,5 +90,5 @@ MSTMM_WIDE int mstmm_iterate(const mstmm_work *work) {
   const int nodes = work->tableau->n_nodes, lanes = work->system->lanes;
   if (lanes == 4) return iterate(work, nodes, 4);
   if (lanes == 2) return iterate(work, nodes, 2);
-  return nodes == WIDE ? iterate(work, WIDE, WIDE) : iterate(work, nodes, WIDE);
+  return nodes == GROUP ? iterate(work, GROUP, GROUP) : iterate(work, nodes, GROUP);
 }

@@ -10,7 +10,7 @@
 #include "lanes_step.h"
 
 static int64_t row_of(const mstmm_system *system) {
-  return ((int64_t)system->n_state * system->lanes + WIDE - 1) / WIDE * WIDE;
+  return ((int64_t)system->n_state * system->lanes + GROUP - 1) / GROUP * GROUP;
 }
 
 int64_t mstmm_group_size(const mstmm_system *system, const mstmm_tableau *tableau) {
@@ -18,7 +18,7 @@ int64_t mstmm_group_size(const mstmm_system *system, const mstmm_tableau *tablea
                     !mstmm_n_watched(system) && !system->n_memory &&
                     mstmm_workspace_size(system, tableau) > 0;
   const int64_t rows = tableau->n_stages + 1 + tableau->n_extra + tableau->n_dense + 4;
-  return sound ? rows * row_of(system) + system->n_state + WIDE : 0;
+  return sound ? rows * row_of(system) + system->n_state + GROUP : 0;
 }
 
 static mstmm_cut_group cut(mstmm_group *group) {
@@ -129,7 +129,7 @@ static mstmm_slopes slopes(const mstmm_cut_group *c, int lane) {
 static void choose_first_steps(const mstmm_cut_group *c, const int *fresh) {
   double *f1 = c->k + c->row;
   mstmm_attempt a = {.h = {0.0}};
-  double guess[WIDE] = {0.0};
+  double guess[GROUP] = {0.0};
   for (int lane = 0; lane < c->lanes; lane++) {
     const mstmm_run *run = &c->group->runs[lane];
     const mstmm_slopes at = fresh[lane] ? slopes(c, lane) : (mstmm_slopes){.n = 0};
@@ -155,7 +155,7 @@ static void choose_first_steps(const mstmm_cut_group *c, const int *fresh) {
 /* First stages that are not known yet; lanes where there is none end. */
 static void first_stages(const mstmm_cut_group *c) {
   mstmm_group *group = c->group;
-  int missing[WIDE] = {0}, fresh[WIDE] = {0}, any = 0, any_fresh = 0;
+  int missing[GROUP] = {0}, fresh[GROUP] = {0}, any = 0, any_fresh = 0;
   mstmm_attempt a = {.h = {0.0}};
   for (int lane = 0; lane < c->lanes; lane++) {
     const mstmm_run *run = &group->runs[lane];
@@ -203,7 +203,7 @@ static int aim(const mstmm_cut_group *c, mstmm_attempt *a) {
     a->active[lane] = 1;
     any = 1;
   }
-  for (int i = 0; i < WIDE; i++) {
+  for (int i = 0; i < GROUP; i++) {
     const mstmm_run *run = &group->runs[i % c->lanes];
     a->h[i] = run->real.h;
     a->start[i] = run->real.t;
@@ -272,7 +272,7 @@ static int accept(const mstmm_cut_group *c, mstmm_attempt *a, int lane) {
 /* Accepts or rejects the attempt of each lane. */
 static void judge(const mstmm_cut_group *c, mstmm_attempt *a) {
   mstmm_group *group = c->group;
-  int moved[WIDE] = {0}, kept_stage[WIDE] = {0}, any_dense = 0;
+  int moved[GROUP] = {0}, kept_stage[GROUP] = {0}, any_dense = 0;
   for (int lane = 0; lane < c->lanes; lane++) {
     mstmm_run *run = &group->runs[lane];
     if (a->active[lane] && !a->failed[lane] && !isfinite(a->error[lane]))
@@ -312,7 +312,7 @@ int mstmm_group_start(mstmm_group *group) {
     return MSTMM_BAD_ARGUMENT;
   memset(group->workspace, 0, (size_t)size * sizeof(double));
   memset(group->runs, 0, sizeof group->runs);
-  for (int lane = 0; lane < WIDE; lane++) group->trajectory[lane] = -1;
+  for (int lane = 0; lane < GROUP; lane++) group->trajectory[lane] = -1;
   const mstmm_cut_group c = cut(group);
   for (int64_t i = 0; i < c.row; i++) {
     const int64_t component = i / c.lanes;

@@ -19,11 +19,11 @@ typedef struct mstmm_cut_group {
 
 /* What is known of the attempt that all lanes make. */
 typedef struct mstmm_attempt {
-  wide h;                                        /* of each place of a vector */
-  wide start, end, t;                            /* of the lanes: of the step, and of a stage */
+  double h[GROUP];                               /* of each place of a row */
+  double start[GROUP], end[GROUP], t[GROUP];     /* of the lanes: of the step, and of a stage */
   int meets_break;                               /* a lane's step starts or ends at a break */
-  int active[WIDE], failed[WIDE], wants_dense[WIDE];
-  double error[WIDE];
+  int active[GROUP], failed[GROUP], wants_dense[GROUP];
+  double error[GROUP];
 } mstmm_attempt;
 
 /* First component of a lane that is not finite, -1 if all are */

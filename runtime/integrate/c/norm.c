@@ -5,7 +5,7 @@
 #include "implicit_step.h"
 #include "step.h"
 
-/* 1 / (atol + rtol size) of eight components, 0 where that would not be a number */
+/* 1 / (atol + rtol size) of four components, 0 where that would not be a number */
 MSTMM_INLINE void scales(const mstmm_work *work, int64_t i, const wide *size, wide *scale) {
   const wide unit = *(const wide *)(work->atol + i) + work->run->rtol * *size, none = {0.0};
   const wide inverse = 1.0 / unit;

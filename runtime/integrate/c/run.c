@@ -16,7 +16,7 @@ typedef struct cutting {
 
 static double *take(cutting *at, int64_t count) {
   double *const start = at->base ? at->base + at->used : NULL;
-  at->used += (count + WIDE - 1) / WIDE * WIDE;
+  at->used += (count + GROUP - 1) / GROUP * GROUP;
   return start;
 }
 
@@ -65,8 +65,8 @@ static int64_t cut(double *base, mstmm_work *work, int64_t *kept) {
   const mstmm_tableau *tableau = work->tableau;
   const mstmm_implicit *implicit = tableau->kind == MSTMM_EXPLICIT ? NULL : system->implicit;
   const int64_t wide_state = system->n_state + accelerations(implicit, tableau);
-  const int64_t ne = mstmm_n_watched(system), row = (wide_state + WIDE - 1) / WIDE * WIDE;
-  const int64_t lanes = tableau->n_nodes ? WIDE * row : 0;
+  const int64_t ne = mstmm_n_watched(system), row = (wide_state + GROUP - 1) / GROUP * GROUP;
+  const int64_t lanes = tableau->n_nodes ? GROUP * row : 0;
   cutting at = {.base = base, .used = 0};
   work->row = row;
   work->implicit = implicit;
@@ -119,9 +119,9 @@ static int sizes_are_sound(const mstmm_system *system, const mstmm_tableau *tabl
          system->rhs && implicit_is_sound(system, tableau) && (!system->n_events || system->fire) &&
          (!mstmm_n_watched(system) || system->events) &&
          (!system->n_memory || system->memory) &&
-         (lanes == 0 || ((lanes == 2 || lanes == 4 || lanes == WIDE) && system->rhs_lanes)) &&
+         (lanes == 0 || ((lanes == 2 || lanes == 4 || lanes == GROUP) && system->rhs_lanes)) &&
          tableau->n_stages >= 1 && tableau->n_extra >= 0 && tableau->n_dense >= 1 &&
-         tableau->n_nodes >= 0 && tableau->n_nodes <= WIDE &&
+         tableau->n_nodes >= 0 && tableau->n_nodes <= GROUP &&
          (!tableau->n_nodes ||
           tableau->n_stages == 1 + tableau->n_nodes * tableau->n_iterations);
 }

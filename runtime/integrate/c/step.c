@@ -36,7 +36,7 @@ MSTMM_WIDE int mstmm_stages(const mstmm_work *work) {
   double *last = work->k + tableau->n_stages * row;
   if (work->implicit) return mstmm_implicit_stages(work);
   int status = tableau->n_nodes ? mstmm_iterate(work)
-               : row == WIDE    ? explicit_stages(work, WIDE)
+               : row == GROUP   ? explicit_stages(work, GROUP)
                                 : explicit_stages(work, row);
   if (status) return status;
   mstmm_combine(work, mstmm_step_terms(tableau), row, work->y_new);

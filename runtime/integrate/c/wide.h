@@ -1,15 +1,17 @@
-/* Eight numbers at once, in GNU C's portable vectors, and the weighted sums that every step of a
- * Runge-Kutta method consists of. */
+/* Four numbers at once, in GNU C's portable vectors, and the weighted sums that every step of a
+ * Runge-Kutta method consists of.  Longer vectors are kept in memory by compilers that may not
+ * count on AVX-512, and are slower than one number at a time. */
 #ifndef MSTMM_WIDE_H
 #define MSTMM_WIDE_H
 
 #include <math.h>
 #include <stdint.h>
 
-enum { WIDE = 8 };
+/* Numbers of a vector; those of which rows are whole multiples, and as many lanes as there may be. */
+enum { WIDE = 4, GROUP = 8 };
 
-typedef double wide __attribute__((vector_size(64), aligned(8), may_alias));
-typedef int64_t wide_mask __attribute__((vector_size(64), aligned(8), may_alias));
+typedef double wide __attribute__((vector_size(32), aligned(8), may_alias));
+typedef int64_t wide_mask __attribute__((vector_size(32), aligned(8), may_alias));
 
 /* Compiled once per width of registers, chosen when the program starts.  No contraction (see the
  * flags): all of them, and the plain one, give the same bits. */
@@ -28,7 +30,7 @@ typedef struct mstmm_terms {
   const double *weights;
 } mstmm_terms;
 
-/* *sum = sum_j w_j k_j over eight components; k points to those of stage 0, stages lie `row`
+/* *sum = sum_j w_j k_j over four components; k points to those of stage 0, stages lie `row`
  * doubles apart.  Terms are added in their order, so that the bits do not depend on the width. */
 MSTMM_INLINE void mstmm_add_terms(const mstmm_terms *terms, const double *k, int64_t row,
                                   wide *sum) {
@@ -39,8 +41,7 @@ MSTMM_INLINE void mstmm_add_terms(const mstmm_terms *terms, const double *k, int
 }
 
 MSTMM_INLINE void mstmm_size(const double *x, wide *size) {
-  const wide_mask bits = {INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX,
-                          INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX};
+  const wide_mask bits = {INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX};
   *size = (wide)(*(const wide_mask *)x & bits);
 }
 
@@ -50,15 +51,15 @@ MSTMM_INLINE void mstmm_choose(const wide_mask *mask, const wide *first, const w
   *chosen = (wide)((*mask & (wide_mask)*first) | (~*mask & (wide_mask)*second));
 }
 
-/* Keeps the first `count` of eight numbers, the others become 0. */
+/* Keeps the first `count` of four numbers, the others become 0. */
 MSTMM_INLINE void mstmm_keep(int64_t count, wide *x) {
-  const wide_mask place = {0, 1, 2, 3, 4, 5, 6, 7};
+  const wide_mask place = {0, 1, 2, 3};
   *x = (wide)((wide_mask)*x & (place < count));
 }
 
 MSTMM_INLINE double mstmm_total(const wide *x) {
   const wide v = *x;
-  return ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
+  return (v[0] + v[1]) + (v[2] + v[3]);
 }
 
 #endif

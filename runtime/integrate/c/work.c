@@ -15,7 +15,7 @@ int64_t mstmm_first_not_finite(int64_t n, const double *x) {
   return -1;
 }
 
-int mstmm_all_finite(int64_t n, const double *x) {
+MSTMM_WIDE int mstmm_all_finite(int64_t n, const double *x) {
   wide zeros = {0.0}; /* 0 * x is 0 for finite x and NaN otherwise */
   double rest = 0.0;
   int64_t i = 0;
