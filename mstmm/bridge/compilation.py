@@ -66,8 +66,9 @@ def compile_scene(
             the run, then respond elastically to its motion and loads) or "rigid"; None takes each
             body's own `model`.
         simplify: what may be packed otherwise than the scene says it: True, False, or a list of
-            "welds" (rigid bodies on fixed hinges as one) and "turns" (orientations within 1e-11
-            rad of quarter turns are these); a table changes one and leaves the other
+            "welds" (rigid bodies on fixed hinges as one), "turns" (orientations within 1e-11 rad of
+            quarter turns are these) and "links" (the looped engine's kernels that know how pins,
+            prismatics, rotors on them, and balls move); a table changes one and leaves the others
             ({"turns": 1e-5}: another tolerance, rad; {"turns": 0}: none).
             `model.simplifications` tells what was done.
 

@@ -101,6 +101,7 @@ def _checker(what: str) -> Callable[[str], Report]:
 def _scene(path: str) -> Report:
     """Validate, compile, and evaluate the accelerations once."""
     import mstmm
+    from mstmm.runtime.pack.merge.simplification import COUNTED
 
     from .models import compiled
 
@@ -113,7 +114,7 @@ def _scene(path: str) -> Report:
         "events": len(scene.event),
     }  # fmt: skip
     notes = [f"{name}: {note}" for name, body in model.flexible.items() for note in body.notes]
-    notes += map(str, model.simplifications)
+    notes += [str(one) for one in model.simplifications if one.kind in COUNTED]
     warnings = [*scene.warnings, *(w for body in model.flexible.values() for w in body.warnings)]
     report = {"ok": True, "kind": "scene", **sizes, "warnings": warnings, "choices": notes}
     lines = [_scene_text(path, scene, sizes, warnings, notes), *_loop_lines(model.loops)]

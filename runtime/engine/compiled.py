@@ -15,7 +15,7 @@ from ..pack import parameters as named_parameters
 from ..pack import product
 from ..pack.elements import Known
 from ..pack.layout import Layout
-from ..pack.merge.simplification import NOTHING, Simplification, Words
+from ..pack.merge.simplification import LINKED, Simplification, Words
 from ..pack.pack import pack, unmerged
 from ..pack.packed import Packed, resize
 from .code import Fusing, NotFused
@@ -52,11 +52,11 @@ class Compiled:
         fusing: Callable[[Packed, Known], Fusing] | None = None,
         product_accuracy: float | None = None,
         sweep: str = "riccati",
-        simplify: Words = NOTHING,
+        simplify: Words = LINKED,
     ) -> None:
         self.scene = scene
         self._fusing, self._product_accuracy, self.sweep = fusing, product_accuracy, sweep
-        self._simplify = simplify if product_accuracy is None else NOTHING
+        self._simplify = simplify if product_accuracy is None else LINKED
         self.looped = Engine(
             pack(scene, known, product_accuracy, sweep=sweep, simplify=self._simplify)
         )

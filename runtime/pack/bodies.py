@@ -44,11 +44,13 @@ class Bodies:
         elements: Elements,
         releases: Mapping[str, int],
         align: bool,
+        linked: bool,
         carried: Carried,
     ) -> None:
         self.expanded, self.scene, self.topology = expanded, expanded.scene, topology
         self.layout, self.elements = layout, elements
-        self.releases, self.align, self.carried = releases, align, carried
+        self.releases, self.carried = releases, carried
+        self.align, self.linked = align and linked, linked
         #: First body of a run -> placements of one period.
         self._placements: dict[int, list[Placement]] = {}
         #: First body of a chain -> placement of its last member.
@@ -106,7 +108,7 @@ class Bodies:
             ("hinge", kernel_type(hinge, self.releases)), ("body", body.type), slots.nq, slots.nu,
             slots.straight, slots.steady, slots.turning, connection, link, place.height, hinge_p,
             body_p, body_frame, rotor, imposed, self.releases.get(hinge.name, -1), modal, section,
-            body.name in self.expanded.idle,
+            body.name in self.expanded.idle, self.linked,
         )  # fmt: skip
 
     def _flexible(

@@ -30,8 +30,9 @@ from .loops.couplings import couplings_of
 from .loops.curves import elements_of
 from .loops.may_close import may_close
 from .loops.opened import opened
+from .merge import links
 from .merge.carried import Carried, carried_in, contracted
-from .merge.simplification import NOTHING, TURNS, WELDS, Simplification, Words
+from .merge.simplification import LINKED, LINKS, TURNS, WELDS, Simplification, Words
 from .merge.turns import with_exact_turns
 from .slots import layout_of
 from .system import Held, LoadNumbers, Numbers, System
@@ -66,7 +67,7 @@ def system_of(
     align: bool = True,
     flexible: Mapping[str, ModalBody] | None = None,
     moving: Mapping[int, Any] | None = None,
-    simplify: Words = NOTHING,
+    simplify: Words = LINKED,
 ) -> tuple[System, Frames]:
     """The numbers of a scene, and where everything lies; `known` are elements beyond the prebuilt.
 
@@ -84,8 +85,10 @@ def system_of(
     tree = contracted(tree, carried)
     releases = {name: i for i, name in enumerate(releasable(scene))}
     layout = layout_of(expanded, releases, elements)
-    bodies = Bodies(expanded, tree, layout, elements, releases, align, carried)
+    bodies = Bodies(expanded, tree, layout, elements, releases, align, LINKS in simplify, carried)
     runs = tuple(map(bodies.run, tree.runs))
+    if not may_close(scene):
+        told += links.told(runs, (nodes.hinges.name(run.hinge) for run in tree.runs))
     frames = Frames(
         nodes, tree, layout, elements, releases, Lookup(nodes.bodies, bodies.placement),
         Lookup(nodes.bodies, tree.place_of_body), Lookup(nodes.hinges, tree.place_of_hinge),

@@ -13,7 +13,7 @@ from . import product, qr
 from .elements import Known
 from .frames import Frames
 from .internal import system_of
-from .merge.simplification import NOTHING, WELDS, Words
+from .merge.simplification import LINKED, WELDS, Words
 from .packed import Packed, refine, resize
 from .records.model import write
 from .system import System
@@ -27,7 +27,7 @@ def pack(
     sweep: str = "riccati",
     align: bool = True,
     flexible: Mapping[str, ModalBody] | None = None,
-    simplify: Words = NOTHING,
+    simplify: Words = LINKED,
 ) -> Packed:
     """Engine arrays of a scene; as `system_of`.
 

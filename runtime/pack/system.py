@@ -80,7 +80,7 @@ class BodyNumbers:
     (`alignment`), else empty.  `height` is that of the frame over the hinge's own P, along z.
     `body_frame` is the frame in the user's (rotation, origin), empty for a rigid body.  `rotor` and
     `imposed` go by speed, `release` is a place in memory or -1.  `idle` is an end that nothing
-    hangs on or acts on.
+    hangs on or acts on.  `linked` says that it may be swept as a link.
     """
 
     hinge: Key
@@ -102,6 +102,7 @@ class BodyNumbers:
     modal: ModalNumbers | None
     section: SectionNumbers | None
     idle: bool
+    linked: bool = True
 
 
 @dataclass(frozen=True, slots=True)

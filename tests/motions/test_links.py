@@ -174,3 +174,31 @@ def test_nearly_parallel_axes_keep_the_hinges_own_frames() -> None:
     assert all(abs(body.height) < 4.0 for body in found.system.distinct)
     q, u = np.full(3, 0.3), np.full(3, -0.2)
     assert worst(swept(found, q, u), swept(packed(scene, align=False), q, u)) < 1e-13
+
+
+# --- told and switched off ------------------------------------------------------------------------
+
+
+def test_links_are_told_with_their_rotors_and_can_be_switched_off(rng: np.random.Generator) -> None:
+    scene = chain(["pin", "pin", "ball", "prismatic"], 0.4, gravity=(0, -9.81, 0))
+    scene["hinge"][1]["law"] = {"inertia": 0.2}
+    model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
+    told = {one.elements: str(one) for one in model.simplifications}
+    assert {one.kind for one in model.simplifications} == {"links"}
+    assert set(told) == {("hinge0",), ("hinge1",), ("hinge2",), ("hinge3",)}
+    assert 'type "pin" with rotor inertia' in told["hinge1",]
+    assert 'type "ball":' in told["hinge2",]
+    assert linked(model.packed) == 4
+    q, u = model.initial_state()
+    u = rng.uniform(-1, 1, len(u))
+    for without in (False, ["welds"], {"links": False}):
+        plain = mstmm.compile(mstmm.Scene(**scene), engine="looped", simplify=without)
+        assert not plain.simplifications and linked(plain.packed) == 0
+        assert worst(plain.accelerations(q, u), model.accelerations(q, u)) < ACCURACY
+
+
+def test_hinges_of_a_chain_are_counted_together() -> None:
+    rod = {"mass": 1.0, "inertia": [0.1, 0.1, 0.1], "ends": {"tip": [1, 0, 0]}}
+    row = {"name": "row", "count": 50, "inboard": "ground", "body": rod, "hinge": {"type": "pin"}}
+    (one,) = mstmm.compile(mstmm.Scene(gravity=[0, 0, 0], chain=[row])).simplifications
+    assert one.elements == ("row[0].hinge",) and str(one).startswith('50 hinges of type "pin"')

@@ -223,7 +223,7 @@ def _model(plan: Plan) -> Model:
     if plan.inputs:
         scene = with_inputs(scene, plan.inputs)
     turns = plan.simplify if plan.turns is None else plan.turns
-    words = {"welds": plan.simplify, "turns": turns}
+    words = {"welds": plan.simplify, "turns": turns, "links": plan.simplify}
     model = compiled(plan.scene, scene, plan.sweep, plan.engine, level, words)
     if plan.quantities:
         start = model.simulate(t_end=0.0, method="dop853")

@@ -9,10 +9,11 @@ from mstmm.arguments import texts_of
 from mstmm.arrays import real
 from mstmm.errors import SceneError
 
-#: Rigid bodies on fixed hinges are packed as one; orientations near quarter turns are exact.
-WELDS, TURNS = "welds", "turns"
+#: Rigid bodies on fixed hinges are packed as one; orientations near quarter turns are exact; bodies
+#: behind hinges that move about and along one axis, or turn about a point, are swept as links.
+WELDS, TURNS, LINKS = "welds", "turns", "links"
 
-#: Kind -> what is counted of it, one and many, and what becomes of them.
+#: Kind -> what is counted of it, one and many, and what becomes of them: what a user may wonder at.
 COUNTED = {
     WELDS: ("body", "bodies", "on fixed hinges packed as part of what holds them"),
     TURNS: ("orientation", "orientations", "within a tolerance of quarter turns taken as these"),
@@ -23,7 +24,8 @@ Words = Mapping[str, bool | float]
 #: so many rad: files write quarter turns as 1.57079632679, which is off by 4.9e-12, and two such
 #: angles add up.  Numbers of fewer digits (1.570796327: 2e-10 off, 1.5708: 4e-6) change results by
 #: more than rounding does, so that a larger tolerance has to be asked for.
-USUAL: Words = {WELDS: True, TURNS: 1e-11}
+USUAL: Words = {WELDS: True, TURNS: 1e-11, LINKS: True}
+LINKED: Words = {LINKS: True}
 NOTHING: Words = {}
 #: The largest tolerance, rad.
 _MOST = 0.01
@@ -34,7 +36,7 @@ class Simplification:
     """One thing that is packed otherwise.
 
     Attributes:
-        kind: the word that switches it on: "welds" or "turns".
+        kind: the word that switches it on: "welds", "turns" or "links".
         elements: names of the hinges, bodies and ends concerned.
         text: what was done, and why.
     """

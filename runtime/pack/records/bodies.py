@@ -137,6 +137,8 @@ def connection_of(body: BodyNumbers) -> Numbers:
 def link_of(body: BodyNumbers) -> str:
     """The link that a body with its hinge is swept as; none where it is no link, where something
     imposes the speed, for several speeds with rotors, and for hinges of the user's."""
+    if not body.linked:
+        return ""
     rotor, about_a_point = any(body.rotor), body.turning and body.nu > 1
     if not (body.link or about_a_point) or body.body[1] != RIGID or body.section or body.modal:
         return ""
