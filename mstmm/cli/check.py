@@ -116,7 +116,10 @@ def _scene(path: str) -> Report:
     notes = [f"{name}: {note}" for name, body in model.flexible.items() for note in body.notes]
     notes += [str(one) for one in model.simplifications if one.kind in COUNTED]
     warnings = [*scene.warnings, *(w for body in model.flexible.values() for w in body.warnings)]
-    report = {"ok": True, "kind": "scene", **sizes, "warnings": warnings, "choices": notes}
+    report = {
+        "ok": True, "kind": "scene", **sizes, "warnings": warnings, "choices": notes,
+        "loops": _loops(model.loops),
+    }  # fmt: skip
     lines = [_scene_text(path, scene, sizes, warnings, notes), *_loop_lines(model.loops)]
     text = "\n".join(lines)
     return {**report, "toml": scene.to_toml(), "text": text, "model": model}
@@ -186,6 +189,25 @@ def _tree_lines(scene: Scene) -> list[str]:
     if len(tree.cut) > _SHOWN:
         lines.append(f"  ... and {len(tree.cut) - _SHOWN} more loops")
     return lines
+
+
+def _loops(loops: Loops) -> Report | None:
+    """What `model.loops` tells, for other programs; None where nothing closes."""
+    if not loops.rows:
+        return None
+    gap, name, direction = loops.misfit
+    return {
+        "rows": len(loops.rows), "rank": loops.rank, "mobility": loops.mobility,
+        "shapes": loops.shapes, "cut": list(loops.cut),
+        "dropped": [
+            {"of": of, "direction": word, "momentary": (of, word) in loops.momentary}
+            for of, word in loops.redundant
+        ],
+        "singular": loops.singular, "nearby": loops.nearby,
+        "misfit": {"gap": gap, "of": name, "direction": direction} if name else None,
+        "reactions_unique": not loops.not_unique,
+        "not_unique": {of: list(words) for of, words in loops.not_unique.items()},
+    }  # fmt: skip
 
 
 def _loop_lines(loops: Loops) -> list[str]:

@@ -97,6 +97,34 @@ def test_starts_of_loops_are_written_as_they_close(mstmm: Command, folder: Path)
     assert mstmm("check", "closed.toml", "--assembled").code == 0
 
 
+def test_json_tells_what_loops_leave_free(mstmm: Command, folder: Path) -> None:
+    """Three equal cranks that carry one bar in a plane: two would do."""
+    rod = {"mass": 1.0, "center_of_mass": [0.5, 0, 0], "inertia": [0.01, 0.1, 0.1],
+           "ends": {"tip": [1, 0, 0], "middle": [0.5, 0, 0]}}  # fmt: skip
+    bodies = [rod | {"name": name} for name in ("a", "b", "c", "bar")]
+    hinges: list[dict[str, object]] = [
+        {"name": f"foot_{name}", "type": "pin", "inboard": "ground", "outboard": name,
+         "position": [place, 0, 0], "initial": {"q": 0.8}}
+        for name, place in (("a", 0.0), ("b", 0.5), ("c", 1.0))
+    ]  # fmt: skip
+    hinges += [
+        {"name": f"top_{name}", "type": "pin", "inboard": f"{name}.tip", "outboard": end,
+         "initial": {"q": -0.8}, "cut": name != "a"}
+        for name, end in (("a", "bar"), ("b", "bar.middle"), ("c", "bar.tip"))
+    ]  # fmt: skip
+    scene = package.Scene(gravity=[0, -9.81, 0], body=bodies, hinge=hinges)
+    (folder / "cranks.toml").write_text(scene.to_toml())
+    reports = json.loads(mstmm("check", "cranks.toml", "pendulum.toml", "--json").out)["checked"]
+    told, loops = reports[0]["loops"], package.compile(scene).loops
+    assert reports[1]["loops"] is None
+    assert (told["rows"], told["rank"], told["mobility"], told["nearby"]) == (10, 3, 1, 3)
+    assert told["cut"] == ["top_b", "top_c"] and not told["singular"] and told["misfit"] is None
+    assert [(one["of"], one["direction"]) for one in told["dropped"]] == list(loops.redundant)
+    assert not any(one["momentary"] for one in told["dropped"]) and len(told["dropped"]) == 7
+    assert not told["reactions_unique"]
+    assert {of: tuple(words) for of, words in told["not_unique"].items()} == loops.not_unique
+
+
 def test_every_file_is_looked_at(mstmm: Command, folder: Path) -> None:
     (folder / "bad.toml").write_text("gravity = 3\n")
     done = mstmm("check", "bad.toml", "pendulum.toml", "none.toml", "--json")
