@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from mstmm.scene import Constraint, Hinge, Scene
     from mstmm.scene.tables.loads import Spring
 
+#: A motion has come to the end of a curve where it is this near, in parts of 1 or of s.
+_BESIDE = 1e-6
+
 #: What the messages that name an expression end with.
 REMEDY = "keep it finite where the motion goes"
 
@@ -66,6 +69,50 @@ def steep(engine: Calls, t: float, q: Array, u: Array) -> str:
                     "dop853"
                 )
     return ""
+
+
+def ended(engine: Calls, t: float, q: Array, u: Array, ahead: float) -> str:
+    """'constraint "wire": curve[1] = "sqrt(1-s)" ends at s = 1, ...' where a curve ends on the way
+    within `ahead` (s) of a state, or next to it; empty where none does."""
+    seen = _State(engine, t, q, u)
+    for constraint in engine.packed.described.constraint if engine.packed.system.closes else ():
+        for k, entry in enumerate(constraint.curve or ()):
+            s, rate = (seen.along(f"{constraint.name}.{name}") for name in ("s", "s_rate"))
+            end = _end(partial(_along, entry), s, rate, ahead)
+            if end is not None:
+                where = _equation(f'constraint "{constraint.name}": curve[{k}]', entry)
+                return (
+                    f"{where} ends at s = {end:.9g}, which the motion reaches near t = {t:.9g} s; "
+                    f"{REMEDY}, or stop the run before by an [[event]]"
+                )
+    return ""
+
+
+def _along(entry: Expression, s: float) -> float:
+    return entry.evaluate(lambda _: s)
+
+
+def _end(value: Callable[[float], float], s: float, rate: float, ahead: float) -> float | None:
+    """The last s next to `s`, or within `ahead` (s) at a rate, at which a value is a number."""
+    if not math.isfinite(value(s)):
+        return None
+    rate = rate if math.isfinite(rate) else 0.0
+    onward = math.copysign(1.0, rate)
+    beside = _BESIDE * max(1.0, abs(s))
+    for way, reach in ((onward, max(abs(rate) * ahead, beside)), (-onward, beside)):
+        far = 4 * math.ulp(s)
+        while far < 2 * reach and math.isfinite(value(s + way * far)):
+            far *= 2
+        if not far < 2 * reach:
+            continue
+        inside, outside = s, s + way * far
+        while (middle := (inside + outside) / 2) not in (inside, outside):
+            if math.isfinite(value(middle)):
+                inside = middle
+            else:
+                outside = middle
+        return inside
+    return None
 
 
 def _equation(where: str, expression: Expression) -> str:
@@ -150,7 +197,7 @@ class _State:
         if name.text in inputs:
             return inputs[name.text].value(self.t)
         if name.hinge and name.quantity in ("s", "s_rate"):
-            return self._along(name.text)
+            return self.along(name.text)
         if name.quantity not in ("q", "u") and own is not None:
             return own.parameters[name.quantity]
         slots = self.engine.packed.layout.hinges[name.hinge or (own.name if own else "")]
@@ -167,9 +214,9 @@ class _State:
 
     def of_curve(self, _: Name, own: Constraint) -> float:
         """How far along its curve a constraint is: s, the one name in it."""
-        return self._along(f"{own.name}.s")
+        return self.along(f"{own.name}.s")
 
-    def _along(self, name: str) -> float:
+    def along(self, name: str) -> float:
         """s of a constraint, or its rate."""
         layout = self.engine.packed.layout
         if name in (names := layout.q_names):

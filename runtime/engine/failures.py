@@ -9,6 +9,7 @@ from mstmm.border.failures import Failed
 from mstmm.ir.statements import NEGATIVE
 from mstmm.scene import Bushing
 
+from ..pack.layout import OF_CONSTRAINT
 from ..pack.packed import Packed
 
 
@@ -65,7 +66,11 @@ def _expression(engine: Naming, element: int, at: str, code: int) -> str:
 
 
 def _hinge(engine: Naming, element: int, at: str, code: int) -> str:
-    return f'hinge "{engine.hinge_name(element)}" {at}: its definition fails in this state'
+    name = engine.hinge_name(element)
+    if name.endswith(OF_CONSTRAINT):
+        curve = name.removesuffix(OF_CONSTRAINT)
+        return f'constraint "{curve}" {at}: its curve, or a slope of it, is no number there'
+    return f'hinge "{name}" {at}: its definition fails in this state'
 
 
 def _product_pivot(engine: Naming, element: int, at: str, code: int) -> str:

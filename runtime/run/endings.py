@@ -10,7 +10,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
-from ..engine.culprit import culprit, steep
+from ..engine.culprit import culprit, ended, steep
 from ..engine.engine import Engine
 from ..flexible.definiteness import is_definite_at
 from ..flexible.support import Supports
@@ -51,6 +51,9 @@ def message_of(system: SceneSystem, run: Run) -> str:
     failure = run.failure
     cause = ""
     if failure is not None:
+        end = end_of_curve(system, run.t, run.y, failure.time)
+        if end:
+            return f"{end}; last good state at t = {run.t:.9g} s"
         implicit = run.tableau.implicit
         cause = cause_of(system, failure.status, run.t, run.y, failure.time, implicit)
     if failure is not None and failure.code and failure.status in _EVALUATIONS:
@@ -83,12 +86,20 @@ def cause_of(
 ) -> str:
     """The expression that stopped a run whose last good state is (t, y); empty if none did.
     Implicit methods are stopped by slopes as well."""
-    if status not in _BY_EXPRESSIONS:
-        return ""
+    found = end_of_curve(system, t, y, failed_at)
+    if found or status not in _BY_EXPRESSIONS:
+        return found
     engine = system.engine
     q, u = y[: engine.nq], y[engine.nq : engine.nq + engine.nu]
     found = _culprit_ahead(engine, t, q, u, system.memory, failed_at)
     return found or (steep(engine, t, q, u) if implicit else "")
+
+
+def end_of_curve(system: SceneSystem, t: float, y: Array, failed_at: float) -> str:
+    """The curve whose end stopped a run whose last good state is (t, y); empty if none did."""
+    engine = system.engine
+    q, u = y[: engine.nq], y[engine.nq : engine.nq + engine.nu]
+    return ended(engine, t, q, u, 2 * max(failed_at - t, 4 * math.ulp(t)))
 
 
 def _culprit_ahead(

@@ -25,7 +25,7 @@ from ..integrate.loop import Failure, Samples, Statistics, Status, failure_text
 from ..integrate.settings import Settings
 from . import sundials
 from .crossings import Crossings, Sight, dip, just_before
-from .endings import busiest, cause_of, rest_of
+from .endings import busiest, cause_of, end_of_curve, rest_of
 from .notes import endless
 from .simulate import split, tolerances
 from .system import SceneSystem
@@ -290,6 +290,10 @@ class _Loop:
 
     def endless(self) -> _Ended:
         """At the pace of the last steps the run would never end."""
+        end = end_of_curve(self.system.scene, self.t, self.last, self.t)
+        if end:
+            text = f"{end}; last good state at t = {self.t:.9g} s"
+            return _Ended(Status.TOO_MANY_STEPS, text)
         sticks = Failure(Status.TOO_MANY_STEPS, self.t, None, None, 1)
         text = failure_text(sticks, implicit=self.implicit)
         if self.crossings.chatter is not None:
