@@ -128,10 +128,13 @@ def _controller(engine: Naming, element: int, at: str, code: int) -> str:
 
 
 def _loop(engine: Naming, element: int, at: str, code: int) -> str:
+    way = engine.packed.behind() or (
+        "start from model.assemble(q, u), or see whether links are stretched out in line "
+        "(model.loops.singular), or a drive asks for more than the mechanism can do"
+    )
     return (
         f"{engine.closing(element)} {at}: the loop that it closes is open, and no state near "
-        "closes it; start from model.assemble(q, u), or see whether links are stretched out in "
-        "line (model.loops.singular), or a drive asks for more than the mechanism can do"
+        f"closes it; {way}"
     )
 
 

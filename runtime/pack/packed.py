@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -27,7 +28,8 @@ class Packed(Frames):
     `scratch` is the first number of the workspace behind what the bodies need, `tape_slots` the
     largest workspace of a tape, `workspace` the whole length; `qr` is whether the sweep is that of
     least squares, `refined` whether accelerations of a tree are refined.
-    `held` are the inputs that are set during a run, by name.
+    `held` are the inputs that are set during a run, by name.  `behind` says, where it is known,
+    what is behind closed loops that cannot go on, and what to do.
     """
 
     system: System
@@ -42,6 +44,7 @@ class Packed(Frames):
     qr: bool = False
     refined: bool = False
     held: frozenset[str] = frozenset()
+    behind: Callable[[], str] = str
     _time_maps: dict[tuple[float, float], TimeMap] = field(default_factory=dict)
     _slopes: Slopes | None = None
 

@@ -8,7 +8,7 @@ correction, as slips are linear in them.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ...pack.loops.variants import held, stiff
 from ...pack.pack import packed_system
 from ..engine import Engine
 from .calls import LoopCalls
+from .parallel import COUNTING, skewed, skewed_by_gap
 
 #: Longest step of a coordinate (rad, m), and most steps.
 _LONGEST, _STEPS = 0.5, 300
@@ -52,10 +53,16 @@ def with_held(engine: Engine, hinges: Collection[str]) -> Engine:
 
 
 class Assembly:
-    """Assembly of one packed scene with some hinges held; `q` (nq,) is near what is asked."""
+    """Assembly of one packed scene with some hinges held; `q` (nq,) is near what is asked.
 
-    def __init__(self, engine: Engine, q: Array, hinges: Collection[str] = ()) -> None:
-        self.held = tuple(hinges)
+    `behind` says, as words that end a message, what is behind loops that do not close near a q.
+    """
+
+    def __init__(
+        self, engine: Engine, q: Array, hinges: Collection[str] = (),
+        behind: Callable[[Array], str] = lambda q: "",
+    ) -> None:  # fmt: skip
+        self.held, self._behind = tuple(hinges), behind
         self.calls = LoopCalls(with_held(engine, hinges), q)
         if self.calls.engine is not engine:
             self.calls.judge_by([q])
@@ -81,7 +88,7 @@ class Assembly:
         if self._largest(missing) <= max(much, _CLOSED):
             return nearest
         gap = self._largest(missing)
-        raise OpenLoop(self._open(missing), gap, self._by_names(nearest))
+        raise OpenLoop(self._open(nearest, missing), gap, self._by_names(nearest))
 
     def _nearest(self, q: Array) -> tuple[Array, Array]:
         """q of the least gap that steps from q lead to, and what the rows lack there."""
@@ -119,10 +126,11 @@ class Assembly:
                 self.calls.records.judge(k, floor)
         row = self._slipping(u, missing)
         if row is not None:
+            known = self._behind(q) or skewed(self.calls.engine.packed, COUNTING)
             raise SceneError(
                 f"scene: the speeds given for {self._names()} contradict each other by "
                 f"{self._amount(row, missing, '.3g', '/s')} {self._where(row)}; "
-                "give fewer of them, or others"
+                f"{known or 'give fewer of them, or others'}"
             )
         return u
 
@@ -143,12 +151,13 @@ class Assembly:
         return int(np.abs(missing).argmax()) if self._largest(missing) > much else None
 
     def _free_speeds(self) -> Array:
-        found, layout = np.ones(self.calls.engine.nu), self.calls.engine.packed.layout
-        for hinge in self.calls.engine.packed.described.hinge:
-            slots = layout.hinges[hinge.name]
-            drive = hinge.drive or (None,) * slots.nu
+        engine, packed = self.calls.engine, self.calls.engine.packed
+        driven = {(engine.hinge_name(place), k) for place, k in packed.system.driven}
+        found = np.ones(engine.nu)
+        for hinge in packed.described.hinge:
+            slots = packed.layout.hinges[hinge.name]
             for k in range(slots.nu):
-                bound = hinge.name in self.held or hinge.is_weld or drive[k] is not None
+                bound = hinge.name in self.held or hinge.is_weld or (hinge.name, k) in driven
                 found[slots.u + k] = float(not bound)
         return found
 
@@ -201,12 +210,12 @@ class Assembly:
 
     # --- words ------------------------------------------------------------------------------------
 
-    def _open(self, missing: Array) -> str:
+    def _open(self, q: Array, missing: Array) -> str:
         row = int(np.abs(missing).argmax())
         while_held = f" with {self._names()} held" if self.held or self._driven() else ""
         return (
             f"scene: {self._subject(row)}: the nearest pose leaves "
-            f"{self._amount(row, missing, '.7g')}{while_held}; {self._remedy(row)}"
+            f"{self._amount(row, missing, '.7g')}{while_held}; {self._remedy(row, q, missing)}"
         )
 
     def _by_names(self, q: Array) -> dict[str, tuple[float, ...]]:
@@ -221,7 +230,8 @@ class Assembly:
         return ", ".join(names[:_NAMED]) + (" ..." if names[_NAMED:] else "")
 
     def _driven(self) -> list[str]:
-        hinges = self.calls.engine.packed.described.hinge
+        packed = self.calls.engine.packed
+        hinges = packed.described.hinge if packed.system.driven else ()
         return [hinge.name for hinge in hinges if hinge.drive and hinge.name not in self.held]
 
     def _where(self, row: int) -> str:
@@ -234,9 +244,12 @@ class Assembly:
             return f"{closing} cannot hold"
         return f"the loop that {closing} closes stays open"
 
-    def _remedy(self, row: int) -> str:
+    def _remedy(self, row: int, q: Array, missing: Array) -> str:
         if self.calls.coupling_of(row):
             return "leave it or another coupling out, or correct what they equal"
+        known = self._behind(q) or skewed_by_gap(self.calls.engine.packed, self._largest(missing))
+        if known:
+            return known
         less = ", hold or drive less" if self.held or self._driven() else ""
         return f"correct lengths or axes{less}, or start nearer to where it closes"
 

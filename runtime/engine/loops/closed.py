@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from ...pack.start import start_values
 from ..engine import Engine
 from .assembly import Assembly
 from .calls import LoopCalls
+from .drives import sharing
+from .parallel import COUNTING, skewed, skewed_by_gap
 from .rank import REPEATED, rank_at
 from .refinement import refinements, unlike_masses
 from .stress import outboard_axes
@@ -121,6 +124,7 @@ class Closed:
 
     def __init__(self, engine: Engine, free_speeds: int) -> None:
         packed, self.engine = engine.packed, engine
+        self._whole = engine  #: with all rows there are
         hinges = [hinge for hinge in packed.described.hinge if not hinge.is_weld]
         holds = [hinge.name for hinge in hinges if hinge.hold]
         #: Hinges whose start speeds are kept.
@@ -133,11 +137,12 @@ class Closed:
         q, u = calls.driven(q, u)
         length = length_of(packed.system)
         try:
-            near = Assembly(engine, q, holds).positions(q, _NEARLY * length)
+            near = self._assembly(q, holds).positions(q, _NEARLY * length)
         except OpenLoop as error:
             more = self._too_many(q, holds, free_speeds)
             raise OpenLoop(f"{error}{more}", error.gap, error.pose) from None
         self._keep(near)
+        self._whole = self.engine
         self.loops, repeating = self._judged(near, free_speeds)
         self._refuse_structure()
         self.start = self.assembled(near, u, holds, self.fast)
@@ -145,6 +150,8 @@ class Closed:
             self.engine, *self.start, self.loops.mobility
         )
         self._refuse_locked(calls, repeating, LOCKED * length)
+        if self._whole is not self.engine:
+            self.engine.packed.behind = partial(_behind, self._whole, self.start[0])
 
     def assembled(
         self, q: Array, u: Array, holds: Collection[str], fast: Collection[str]
@@ -153,8 +160,15 @@ class Closed:
 
         Raises SceneError where there is none.
         """
-        q = Assembly(self.engine, q, holds).positions(q)
-        return q, Assembly(self.engine, q, fast).speeds(q, u)
+        q = self._assembly(q, holds).positions(q)
+        return q, self._assembly(q, fast).speeds(q, u)
+
+    def _assembly(self, q: Array, hinges: Collection[str]) -> Assembly:
+        return Assembly(self.engine, q, hinges, self._sharing)
+
+    def _sharing(self, q: Array) -> str:
+        """Drives that move the same freedom near q, in words."""
+        return sharing(self._whole, q)
 
     def _keep(self, q: Array) -> None:
         """Couplings without a value keep what they have at q."""
@@ -178,7 +192,7 @@ class Closed:
                 way += " more than this pose"
             raise SceneError(
                 f"scene: {_ending(names[row][0] for row in sorted(rank.here))} in a pose that no "
-                f"motion leaves, stretched out or folded in line; {way}"
+                f"motion leaves, stretched out or folded in line; {skewed(packed, COUNTING) or way}"
             )
         met = [row for row in range(calls.count) if not records.yields(row)]
         rows = len(met) - len(rank.here)
@@ -231,9 +245,11 @@ class Closed:
         """SceneError where nothing can move, and nothing that goes by time moves it."""
         if self.loops.mobility > 0 or self._is_led:
             return
+        way = skewed(self.engine.packed, COUNTING)
+        way = way or "take a hinge with more coordinates, or a [[spring]] in place of one of them"
         raise SceneError(
             f"scene: no freedom is left, and {_ending(name for name, _ in self.loops.rows)}: a "
-            "structure; take a hinge with more coordinates, or a [[spring]] in place of one of them"
+            f"structure; {way}"
         )
 
     def _refuse_drowned(self, rows: Sequence[tuple[str, str]]) -> None:
@@ -272,10 +288,13 @@ class Closed:
                         f'scene: coupling "{closing}" contradicts what others ask, by '
                         f"{missing[row]:.3g} at the start; leave it out, or correct what it equals"
                     )
+                way = skewed_by_gap(self.engine.packed, float(missing[row]))
+                if not way:
+                    way = "make axes parallel and points meet, or use a ball or cylindrical hinge"
                 raise SceneError(
                     f"scene: direction {direction} of {calls.closing(row)} repeats what others "
                     f"do, but for a gap of {missing[row]:.3g}: as a rigid mechanism it would lock; "
-                    "make axes parallel and points meet, or use a ball or cylindrical hinge"
+                    f"{way}"
                 )
 
     def _shared(self) -> int:
@@ -305,6 +324,12 @@ class Closed:
                 coupling.coupling.name, _COUPLED[coupling.coupling.of_speeds]
             )  # fmt: skip
         return names
+
+
+def _behind(engine: Engine, q: Array) -> str:
+    """What is behind loops that close at the start q (nq,) but not later, and what to do; empty
+    where neither drives nor axes are."""
+    return sharing(engine, q) or skewed(engine.packed, COUNTING)
 
 
 def _ending(closing: Iterable[str]) -> str:

@@ -73,6 +73,30 @@ def undriven(system: System) -> System:
     return replace(system, drives=None, driven=())
 
 
+def freed(system: System) -> System:
+    """With what drives impose free, but for hinges of chains, which stand still."""
+    driven = set(system.driven)
+    runs = tuple(_run_freed(run, driven) for run in system.bodies)
+    closures = tuple(_closure_freed(one, system, driven) for one in system.closures)
+    return replace(undriven(system), bodies=runs, closures=closures)
+
+
+def _run_freed(run: BodyRun, driven: Collection[tuple[int, int]]) -> BodyRun:
+    if run.count != 1:
+        return run
+    body = run.alike[0]
+    imposed = tuple(x and (run.place, k) not in driven for k, x in enumerate(body.imposed))
+    return replace(run, alike=(replace(body, imposed=tuple(map(int, imposed))),))
+
+
+def _closure_freed(
+    one: ClosureNumbers, system: System, driven: Collection[tuple[int, int]]
+) -> ClosureNumbers:
+    rotor = system.body(one.frame).rotor
+    free = {k for k, inertia in enumerate(rotor) if (one.frame, k) in driven and not inertia}
+    return replace(one, directions=tuple(k for k in one.directions if k not in free))
+
+
 def torn(system: System) -> System:
     """With the loops open: a tree in which a hinge that closes one carries a frame without mass."""
     return replace(system, closures=(), couplings=(), coupled=None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -49,18 +50,25 @@ def fast(**speeds: float) -> Scene:
 
 
 REST = angles(0.9)[1]
+SHARED = r'the drives of hinges "foot" and "end" move the same freedom .*; leave out one of these'
+LEAD = {"name": "lead", "expression": "end.q", "equals": "1 + t"}
 REFUSED = {
     "drives that cannot be": (driven(foot="0.9", end="1.2"),
-                              r'leaves 0\.10.* m with "foot", "end" held.*drive less'),
+                              r'leaves 0\.10.* m with "foot", "end" held; ' + SHARED),
     "drives at odds in speed": (driven(foot="0.9 + t", end=f"{REST!r}"),
-                                r'speeds given for "foot", "end" contradict .* m/s'),
+                                r'speeds given for "foot", "end" contradict .* m/s.*; ' + SHARED),
+    "drives of cut hinges": (driven(foot="0.9 + t", tip="0.3 + t"),
+                             r'rad with "foot", "tip" held; '
+                             r'the drives of hinges "foot" and "tip" move the same freedom'),
+    "a drive and a wish": (driven(foot="0.9 + t") | {"coupling": [LEAD]},
+                           r'with "foot" held.*drive less'),
     "more held than is free": (held("foot", "end", off=0.2),
                                r'with "foot", "end" held.*hold or drive less.*; hold keeps 2 '
                                r"coordinates, the mechanism has 1 freedom$"),
     "one held out of reach": (held("end", off=-1.3), r'with "end" held; [^;]*$'),
     "speeds at odds": (fast(foot=1.0, end=5.0), r'speeds given for "foot", "end" contradict'),
     "an axis off by a hundredth": (four_bar(end={"axis": [math.sin(0.01), 0, math.cos(0.01)]}),
-                                   "lengths or axes"),
+                                   'axis of hinge "end" is 0.01 rad'),
 }  # fmt: skip
 
 
@@ -70,6 +78,39 @@ def test_what_is_refused_is_told(what: str) -> None:
     with pytest.raises(mstmm.SceneError, match=words) as caught:
         compiled(scene)
     assert "; " in str(caught.value)
+
+
+def test_drives_that_part_on_the_way_are_told() -> None:
+    """At rest at the start they agree."""
+    result = compiled(driven(foot="0.9", end=f"{REST!r} + t^2")).simulate(0.5, "dop853")
+    assert not result.success
+    assert re.search(f"no state near closes it; {SHARED}", result.message)
+
+
+def test_three_drives_on_two_freedoms() -> None:
+    """Two four-bars, one of them driven twice: only its own drives are named."""
+    one, other = driven(foot="0.9 + t", end=f"{REST!r}"), driven(foot="0.9 + t")
+    for body in other["body"]:
+        body["name"] += "2"
+    for joint in other["hinge"]:
+        joint["name"] += "2"
+        for key in ("inboard", "outboard"):
+            joint[key] = re.sub("^(crank|coupler|rocker)", r"\g<1>2", joint[key])
+    scene = {**one, "body": one["body"] + other["body"], "hinge": one["hinge"] + other["hinge"]}
+    with pytest.raises(mstmm.SceneError, match=SHARED):
+        compiled(scene)
+
+
+def test_one_drive_too_many_of_a_chain_of_windows() -> None:
+    """Two rows of cranks side by side, all driven."""
+    scene = four_bars(2, angle=1.1)
+    for k, pace in enumerate((1.0, 2.0, 1.0)):
+        foot = hinge(scene, f"foot{k}")
+        foot.pop("initial")
+        foot["drive"] = f"1.1 + {pace}*t"
+    told = 'hinges "foot0", "foot1", "foot2" move the same freedom .*; leave out 2 of these drives'
+    with pytest.raises(mstmm.SceneError, match=told):
+        compiled(scene)
 
 
 def test_what_agrees_is_taken() -> None:

@@ -1,0 +1,71 @@
+"""Drives that move the same freedom of closed loops: one decides what the others may do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import MstmmError
+
+from ...pack.loops.variants import freed
+from ...pack.pack import packed_system
+from ..engine import Engine
+from .assembly import Assembly
+from .rank import REPEATED, judging
+
+#: Random motions beyond as many as there are drives.
+_MORE = 2
+#: Shares of motions that are rounding, and of combinations of drives in which one has no part.
+_ROUNDING, _NO_PART = 1e-6, 1e-4
+#: So many drives are named.
+_NAMED = 8
+
+
+def sharing(engine: Engine, q: Array) -> str:
+    """Which drives move the same freedom near q (nq,), and what to do, as words that end a message;
+    empty where each moves its own, and where loops stay open without them too."""
+    driven = engine.packed.system.driven
+    if len(driven) < 2:
+        return ""
+    try:
+        moved = _moved(engine, q)
+    except MstmmError:
+        return ""
+    sizes = np.linalg.norm(moved, axis=1)
+    moving = np.flatnonzero(sizes > _ROUNDING * sizes.max())
+    left, lengths, _ = np.linalg.svd(moved[moving] / sizes[moving, None])
+    rank = int((lengths > _ROUNDING).sum())
+    shared = moving[np.linalg.norm(left[:, rank:], axis=1) > _NO_PART].tolist()
+    names = dict.fromkeys(engine.hinge_name(driven[k][0]) for k in shared)
+    return _words(list(names), len(shared), len(moving) - rank) if shared else ""
+
+
+def _moved(engine: Engine, q: Array) -> Array:
+    """(drives, n) the driven speeds in random motions of the mechanism without its drives."""
+    packed = engine.packed
+    free = Engine(packed_system(freed(packed.system), packed))
+    closed = Assembly(free, q).positions(q)
+    calls = judging(free, closed)
+    for row, mobility in enumerate(calls.mobility.tolist()):
+        calls.records.judge(row, REPEATED * mobility)
+    places = [
+        packed.layout.hinges[engine.hinge_name(place)].u + k for place, k in packed.system.driven
+    ]
+    count = len(places) + _MORE
+    trials = np.random.default_rng(0).standard_normal((count, engine.nu))
+    still = calls.correction(calls.slip, closed, np.zeros(engine.nu))[0]
+    motions = [one + calls.correction(calls.slip, closed, one)[0] - still for one in trials]
+    return np.array(motions)[:, places].T
+
+
+def _words(names: list[str], drives: int, surplus: int) -> str:
+    told = ", ".join(f'"{name}"' for name in names[:_NAMED]) + " ..." * bool(names[_NAMED:])
+    if len(names) == 2:
+        told = told.replace(", ", " and ")
+    freedoms = drives - surplus
+    moved = "the same freedom" if freedoms == 1 else f"the same {freedoms} freedoms"
+    less = "one of these drives" if surplus == 1 else f"{surplus} of these drives"
+    return (
+        f"the drives of hinges {told} move {moved} of the mechanism; leave out {less}, "
+        "or take a [[bushing]], which yields, in place of a hinge of the loop"
+    )
