@@ -20,7 +20,7 @@ def test_gear_pair() -> None:
     model = pair(GEAR, a={"law": {"effort": 1.5}}, b={"law": {"damping": 0.1}})
     wanted = (-3 * 1.5 - 0.1 * 0.7) / (9 * 0.02 + 0.3)
     found = model.accelerations([0.2, -0.1], [-2.1, 0.7])
-    assert np.abs(found - wanted * np.array([-3.0, 1.0])).max() < 1e-13
+    assert np.abs(found - wanted * np.array([-3.0, 1.0])).max() < 1e-14
     assert model.loops.rows == (("gear", "expression"),) and model.loops.mobility == 1
 
 
@@ -47,7 +47,7 @@ def test_screw() -> None:
     fall = -9.81 / (1 + 0.01 / (2.0 * lead**2))
     wanted = {"displacement": fall, "angle": fall / lead}
     found = dict(zip(names, model.accelerations([0, 0], [0, 0]), strict=True))
-    assert found == pytest.approx(wanted, rel=1e-13)
+    assert found == pytest.approx(wanted, rel=1e-14)
 
 
 def test_differential() -> None:

@@ -46,9 +46,9 @@ def off(model: mstmm.Model, kept: tuple[str, ...], size: float, draw: np.random.
 def test_every_start_nearby_closes(
     scene: dict[str, Any], kept: tuple[str, ...], size: float
 ) -> None:
-    """Twenty starts; what is held stays to the bit, and no end is off its partner."""
+    """Forty starts; what is held stays to the bit, and no end is off its partner."""
     model, draw = mstmm.compile(mstmm.Scene(**scene)), np.random.default_rng(12)
-    for _ in range(20):
+    for _ in range(40):
         wish = off(model, kept, size, draw)
         q, u = model.assemble(wish, np.zeros(model.nu), hold=kept)
         for place in (model.layout.hinges[name].q_slice for name in kept):
