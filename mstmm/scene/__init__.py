@@ -20,11 +20,12 @@ from .tables.hinge_keys import Initial
 from .tables.law import Friction, Law, LawEntry, Limits, SpringLaw
 from .tables.loads import Event, Load, Spring
 from .tables.outside.inputs import Input, Output, Signal
+from .tables.outside.names import Names
 from .tables.outside.shape import Shape
 
 __all__ = [
     "Arrays", "Beam", "Body", "Box", "Bushing", "Chain", "Constraint", "Coupling", "Damping",
     "Elastic", "ElasticEnd", "End", "Event", "Friction", "Hinge", "Initial", "Input", "Law",
-    "LawEntry", "Limits", "Load", "Modes", "Output", "Scene", "Section", "Shape", "Shapes",
+    "LawEntry", "Limits", "Load", "Modes", "Names", "Output", "Scene", "Section", "Shape", "Shapes",
     "Signal", "Spring", "SpringLaw", "Start", "load_scene", "read", "split",
 ]  # fmt: skip

@@ -10,11 +10,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mstmm.scene import Scene
+from mstmm.scene import Names, Scene
 from mstmm.scene.tables.beam import Beam
 from mstmm.scene.tables.beam_keys import DIRECTIONS, Modes, Shapes
 from mstmm.scene.tables.elastic import Elastic
 
+from ..engine.references import References
 from ..flexible.beam.bodies import BeamBodies
 from ..flexible.elastic.bodies import AUTO_MODES
 from ..pack.flexible.rigidified import LEVELS
@@ -101,9 +102,13 @@ def with_shapes(beam: Beam, whole: Modes, kept: Modes) -> Beam:
 
 
 def with_tables(scene: Scene, **tables: Any) -> Scene:
-    """The scene with other tables, which need no check."""
-    fields = {key: getattr(scene, key) for key in type(scene).model_fields}
-    return Scene.model_construct(**(fields | tables))
+    """The scene with other tables, which need no check; of its names those of what is there."""
+    fields = {key: getattr(scene, key) for key in type(scene).model_fields} | tables
+    found = Scene.model_construct(**fields)
+    if scene.names == Names():
+        return found
+    names = scene.names.among(References(found.skeleton), found.hinges.by_name)
+    return Scene.model_construct(**(fields | {"names": names}))
 
 
 def _at_most(modes: Modes, n: int) -> Modes:

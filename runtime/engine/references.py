@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 
+from mstmm.errors import SceneError
 from mstmm.scene import split
 from mstmm.scene.rules.messages import near
+from mstmm.scene.rules.values import GROUND
 from mstmm.scene.tables.all import SceneTables
 from mstmm.scene.tables.body import BodyTable
 
@@ -20,7 +22,11 @@ class References(Collection[str]):
         self.scene, self.bodies = scene, scene.bodies
 
     def canonical(self, reference: str) -> str | None:
-        """The reference with the number of a chain's member; None if there is no such end."""
+        """The reference as the scene has it: with the number of a chain's member, and for what has
+        this name elsewhere; None if there is no such end."""
+        return self._known(reference) or self._known(self.scene.names.reference(reference))
+
+    def _known(self, reference: str) -> str | None:
         name, at = split(reference)
         number = self.bodies.find(name)
         ends = self.bodies.ends(name)
@@ -28,12 +34,21 @@ class References(Collection[str]):
             return None
         return self.bodies.name(number) + (f".{at}" if at else "")
 
+    def place(self, reference: str) -> str:
+        """`canonical`, or the ground; SceneError for what there is not."""
+        found = self.canonical(reference)
+        if found is not None:
+            return found
+        if GROUND in (split(reference)[0], self.scene.names.reference(reference)):
+            return GROUND
+        raise SceneError(self.unknown(reference))
+
     def unknown(self, reference: str) -> str:
         """That there is no such body or end, and what is near."""
         body = split(reference)[0]
         if self.bodies.of_chain(body) and self.bodies.find(body) is None:
             return f'"{reference}": {self.bodies.missing(body)}'
-        hint = near(reference, self)
+        hint = near(reference, (*self, *self.scene.names.body))
         return f'"{reference}": there is no such body or end in the scene{hint}'
 
     def __contains__(self, reference: object) -> bool:

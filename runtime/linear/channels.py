@@ -131,7 +131,8 @@ def channel(model: Compiled, name: str) -> Channel:
             end = owner.removesuffix(f".{kind}")
             long = end != owner and last == component
             if (long or last == letter + component) and end in ends:
-                return Channel(f"{end}.{kind}.{component}", unit, end=end, kind=kind, axis=axis)
+                own = ends.canonical(end) or end
+                return Channel(f"{end}.{kind}.{component}", unit, end=own, kind=kind, axis=axis)
     given_names = [one.name for one in model.scene.input]
     known = [
         *given_names,

@@ -24,6 +24,7 @@ def assemble(
             raise SceneError(f"hold = {hold!r:.60}: expected names of hinges")
         if name not in hinges or name in modal:
             raise SceneError(f'hold: there is no hinge "{name}"{near(name, list(hinges))}')
+    hold = [hinges[name].name for name in hold]
     if compiled.closed is None:
         return q.copy(), u.copy()
     q, u = LoopCalls(compiled.looped, q).driven(q, u)

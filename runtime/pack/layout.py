@@ -136,7 +136,7 @@ class Layout:
         #: Numbers of hinges that stand for sections of flexible bodies.
         self.internal = internal
         self.inputs = {name: place for place, name in enumerate(inputs)}
-        self._numbers = scene.hinges
+        self._numbers, self._names = scene.hinges, scene.names
         self.hinges: Mapping[str, HingeSlots] = _ByName(self)
 
     def __len__(self) -> int:
@@ -293,13 +293,16 @@ class StateNames(Sequence[str]):
 
 
 class _ByName(Mapping[str, HingeSlots]):
-    """Slots by the hinge's name; those of a flexible body by its name, though not listed."""
+    """Slots by the hinge's name, also that of `[names]`; those of a flexible body by its name,
+    though not listed."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
 
     def __getitem__(self, name: str) -> HingeSlots:
         number = self.layout._numbers.find(name)
+        if number is None:
+            number = self.layout._numbers.find(self.layout._names.of_hinge(name))
         if number is not None and number not in self.layout.internal:
             return self.layout.slots(number)
         return self.layout.modal[name]

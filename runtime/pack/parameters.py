@@ -80,7 +80,7 @@ def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
     there: dict[str, float] | None = None
     for path, given in by_name("parameters", changes).items():
         value = real(f'parameter "{path}"', given)
-        if not _set(data, path, value):
+        if not any(_set(data, own, value) for own in scene.names.meant(path)):
             there = there or read(scene)
             raise _unknown(path, there)
     for beam in data.get("beam", []):  # an end "tip" with axes of its own stays at the tip
@@ -122,7 +122,9 @@ def resolved(scene: Scene, names: Sequence[str]) -> list[str]:
     there = read(scene)
     alone = {name.replace("[0]", ""): name for name in there}
     found = []
-    for name in names:
+    for asked in names:
+        meant = (name for name in scene.names.meant(asked) if name in there or name in alone)
+        name = next(meant, asked)
         full = name if name in there else alone.get(name, "")
         if not full or (full != name and full.replace("[0]", "[1]") in there):
             raise _unknown(name, there)

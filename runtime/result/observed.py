@@ -14,8 +14,6 @@ import numpy as np
 
 from mstmm.arguments import word_of
 from mstmm.arrays import Array
-from mstmm.errors import SceneError
-from mstmm.scene import split
 
 from ..engine.calls import PARTS, Probe
 from ..engine.references import References
@@ -50,11 +48,9 @@ class Observed:
         """(n, 24): motion of "body" or "body.end", see `Observation`."""
         word_of("body", reference, "the name of a body or an end, such as 'rod1.tip'")
         if reference not in self._points:
-            known = self.references.canonical(reference)
-            if known is None and split(reference)[0] != "ground":
-                raise SceneError(self.references.unknown(reference))
-            self._observe("points", known or reference)
-            self._points[reference] = self._points[known or reference]
+            known = self.references.place(reference)
+            self._observe("points", known)
+            self._points[reference] = self._points[known]
         return self._points[reference]
 
     def node(self, name: str) -> Array:

@@ -6,6 +6,7 @@ Every name gives values over time with their unit and one label per column.  Axe
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -60,6 +61,7 @@ class Quantities:
         self.observed, self.run = observed, observed.run
         self._flexible, self.acting = flexible, Acting(observed)
         self.layout = observed.engine.packed.layout
+        self._named = observed.references.scene.names
         self._orientations: dict[str, Array] = {}
         self._tables: dict[str, Table] = {}
         #: What adds the quantities of whatever else acts or closes loops, by its name.
@@ -97,7 +99,7 @@ class Quantities:
             hinges = self.observed.references.scene.hinges
             if hinges.of_chain(hinge):
                 raise SceneError(f'"{hinge}": {hinges.missing(hinge)}')
-            hint = near(hinge, self.layout.hinges)
+            hint = near(hinge, (*self.layout.hinges, *self._named.hinge))
             raise SceneError(f'"{hinge}": there is no such hinge in the scene{hint}')
         return found
 
@@ -108,8 +110,8 @@ class Quantities:
                 f'"{hinge}": {kind} is known of hinges; this is a flexible body: ask for the hinge '
                 "that holds it"
             )
-        self.slots(hinge)
-        return self.observed.loads(hinge, 0 if kind == "force" else 3)
+        own = self.slots(hinge).name
+        return self.observed.loads(own, 0 if kind == "force" else 3)
 
     def effort(self, hinge: str) -> Array:
         """(n, nu): what laws and drives put in along the speeds."""
@@ -129,14 +131,18 @@ class Quantities:
         """The quantity of this name; SceneError with the nearest name if there is none."""
         if not isinstance(name, str):
             raise SceneError(f"quantity {name!r}: expected a name, such as energy")
-        owners = self._owners_in(name)
-        for owner in ["", *owners]:
-            entry = self.of(owner).entries.get(name)
-            if entry is not None:
-                return entry()
+        for own in self._named.meant(name):
+            if (entry := self._entry(own)) is not None:
+                return entry() if own == name else replace(entry(), name=name)
+        owners = [one for own in self._named.meant(name) for one in self._owners_in(own)]
         known = [n for owner in owners for n in self.of(owner).entries]
         hint = near(name, (*known, *self._every()))
         raise SceneError(f'"{name}": there is no such quantity{hint}')
+
+    def _entry(self, name: str) -> Callable[[], Quantity] | None:
+        """How to get what has this name in the scene; None if nothing has."""
+        tables = map(self.of, ["", *self._owners_in(name)])
+        return next((table.entries[name] for table in tables if name in table.entries), None)
 
     def _owners_in(self, name: str) -> list[str]:
         """Hinges, bodies and ends with which a name begins."""
@@ -181,8 +187,9 @@ class Quantities:
         """Names of one owner."""
         if owner not in self._tables:
             table = Table({}, [])
-            if owner in self.layout.hinges and owner not in self.layout.modal:
-                add_hinge(table, self.acting, self.layout.hinges[owner])
+            hinges, others = self.layout.hinges, (self.layout.modal, self._named.hinge)
+            if owner in hinges and not any(owner in known for known in others):
+                add_hinge(table, self.acting, hinges[owner])
             elif owner in self.observed.references:
                 self._body(table, owner)
             elif not owner:

@@ -74,3 +74,13 @@ def test_lengths_and_masses_in_other_units(mstmm: Command) -> None:
     assert body["ends"]["tool"]["position"][0] == pytest.approx(0.0006)
     done = mstmm("import", "arm.urdf", "-o", "b.toml", "--length", "furlong")
     assert done.code == 2 and "expected one of m, cm, mm, in" in done.err
+
+
+def test_runs_show_quantities_by_the_names_of_the_file(mstmm: Command) -> None:
+    Path("arm.urdf").write_text(ARM)
+    assert mstmm("import", "arm.urdf").code == 0
+    asked = ("--t-end", "0.05", "-q", "shoulder-1.angle", "-q", "1st arm.z", "-q", "tool.x")
+    done = mstmm("simulate", "arm.toml", *asked)
+    assert done.code == 0
+    (head,) = (line for line in done.out.splitlines() if "tool.x" in line)
+    assert "shoulder-1.angle" in head and "1st arm.z" in head

@@ -15,7 +15,7 @@ from ..rules.inertia import negative_moment, triangle_excess
 from ..rules.messages import MAX_PROBLEMS, TABLES, Problem, near
 from ..rules.values import GROUND, Location, split
 from ..tables.closures import CURVE
-from . import constraints, couplings, inputs, topology
+from . import constraints, couplings, inputs, outside_names, topology
 from . import flexible as flexible_bodies
 from .angles import notes
 from .names import Scope, flexible, problem_with
@@ -30,7 +30,8 @@ def problems(scene: SceneTables) -> list[Problem]:
     if not (scene.body or scene.chain or scene.beam or scene.elastic):
         return [(("body",), "a scene needs at least one body; add a [[body]]")]
     found = _first(_duplicates(scene), _references(scene), _inertias(scene),
-                   inputs.problems(scene), flexible_bodies.problems(scene))  # fmt: skip
+                   inputs.problems(scene), flexible_bodies.problems(scene),
+                   outside_names.problems(scene))  # fmt: skip
     return found or _first(
         _expressions(scene), inputs.drives(scene), constraints.problems(scene),
         couplings.problems(scene), _tree(scene), flexible_bodies.spins(scene),

@@ -13,6 +13,9 @@ from ..rules.written import Written
 if TYPE_CHECKING:
     from ..tables.all import SceneTables
 
+#: The table of tables of names, with keys in quotes.
+_NAMES = "names"
+
 
 def to_toml(scene: SceneTables, evaluated: bool = False) -> str:
     """TOML text that loads back to an equal scene; `evaluated`, numbers that are written as
@@ -30,7 +33,7 @@ def as_toml(data: Mapping[str, Any], evaluated: bool = False) -> str:
     lines = [
         f"{key} = {_value(value, evaluated)}"
         for key, value in data.items()
-        if key not in TABLES and value not in (None, {}, ())
+        if key not in (*TABLES, _NAMES) and value not in (None, {}, ())
     ]
     for table in TABLES:
         for element in data.get(table, ()):
@@ -40,6 +43,10 @@ def as_toml(data: Mapping[str, Any], evaluated: bool = False) -> str:
                 f"{key} = {_value(value, evaluated)}"
                 for key, value in named.items() if value is not None and value != {}
             ]  # fmt: skip
+    for table, known in data.get(_NAMES, {}).items():
+        if known:
+            lines += ["", f"[{_NAMES}.{table}]"]
+            lines += [f"{_string(name)} = {_string(one)}" for name, one in known.items()]
     return "\n".join(lines) + "\n"
 
 

@@ -18,7 +18,7 @@ from ..rules.values import GROUND
 from ..scene import Scene
 from .masses import joined, without_dust
 from .meshes import Meshes
-from .names import Names
+from .names import Names, kept
 from .robot import FIXED, NOTHING, Joint, Link, Mimic, Note, Robot
 from .tree import Tree
 from .units import doubts
@@ -111,7 +111,7 @@ class _Writer:
         for link in tree.outward:
             self.place[link.name] = self._placed(link)
         self._names = Names()
-        self._bodies = self._names.take_all(self.bodies(), "link")
+        self._bodies = self._names.take_all(self.bodies(), "link", tree.links)
         hinges = Names()
         moving = [one.name for one in robot.joints if self.place[one.child][0] == one.child]
         self.joints = hinges.take_all(moving, "joint")
@@ -149,7 +149,20 @@ class _Writer:
             found["coupling"] = couplings
         if shapes := list(self._shapes(folder)):
             found["shape"] = shapes
+        ends = {f"{self._bodies[name]}.{end}" for name in self._ends for end in self._ends[name]}
+        own = {GROUND, *self._bodies.values(), *ends}
+        if names := kept(self._named_links(), self.joints, own):
+            found["names"] = names
         return found
+
+    def _named_links(self) -> dict[str, str]:
+        """Links by the bodies and ends that they are, bodies first; of those that stand on the
+        ground the ones at its origin."""
+        bodies = dict.fromkeys((*self._bodies, *self.links))
+        return {
+            name: self.links[name] for name in bodies
+            if self.place[name] == (GROUND, IN_PLACE) or self.links[name] != GROUND
+        }  # fmt: skip
 
     def _tell(self, one: Link | Joint, element: str, text: str) -> None:
         self.notes.append(Note(one.where, element, text))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ...arguments import short
@@ -75,25 +75,48 @@ class _Reader:
         self.scene, self.notes = scene, list[Note]()
         _refuse(scene)
         self.bodies = {body.name: body for body in scene.bodies}
-        self.world = "world" if "world" not in self.bodies else GROUND
+        #: Bodies, ends and the ground by the names that a robot's file has for them, if any.
+        self.named = _others(scene.names.body)
+        self.joints = {one: names[0] for one, names in _others(scene.names.hinge).items()}
+        links = [*map(self._link_name, self.bodies), *scene.names.body]
+        self.world = self.named.get(GROUND, [GROUND if "world" in links else "world"])[0]
         held = {hinge.outboard_body: hinge.outboard_end for hinge in scene.hinges}
         #: Axes of a body's link in those of the body.
         self.frames = {name: _end(body, held.get(name, "")) for name, body in self.bodies.items()}
         #: Ends that are not the place of a joint alone.
         self.ends = [
             (body.name, end) for body in scene.bodies for end in body.ends
-            if end != held.get(body.name) and not self._is_of_joint(body.name, end)
+            if f"{body.name}.{end}" in self.named
+            or (end != held.get(body.name) and not self._is_of_joint(body.name, end))
         ]  # fmt: skip
-        self._once = Counter([*self.bodies, *(end for _, end in self.ends)])
+        self._once = Counter([*dict.fromkeys(links), *(end for _, end in self.ends)])
 
     def robot(self, name: str) -> Robot:
-        ends = [self._end_link(*one) for one in self.ends]
+        ends = [self._end_link(*one) for one in self._fixed()]
         links = (Link(self.world), *map(self._link, self.bodies.values()), *(x for x, _ in ends))
         joints = (*map(self._joint, self.scene.hinges), *(joint for _, joint in ends))
         mimics = tuple(x for one in self.scene.coupling if (x := self._mimic(one)))
         looks = tuple(self._look(shape) for shape in self.scene.shape if self._is_drawn(shape))
         self._tell_rest()
         return Robot(name, name, links, joints, mimics, looks, tuple(self.notes))
+
+    def _link_name(self, body: str) -> str:
+        return self.world if body == GROUND else self.named.get(body, [body])[0]
+
+    def _joint_name(self, hinge: str) -> str:
+        return self.joints.get(hinge, hinge)
+
+    def _fixed(self) -> Iterator[tuple[str, str, str]]:
+        """Body, end and name of the links that are fixed on others."""
+        for body, end in self.ends:
+            names = self.named.get(f"{body}.{end}") or [self._end_name(body, end)]
+            yield from ((body, end, name) for name in names)
+        for body in (GROUND, *self.bodies):
+            yield from ((body, "", name) for name in self.named.get(body, ())[1:])
+
+    def _end_name(self, body: str, end: str) -> str:
+        alone = self._once[end] == 1 and end != self.world
+        return end if alone else f"{self._link_name(body)}_{end}"
 
     def _note(self, element: str, text: str) -> None:
         self.notes.append(Note("scene", element, text))
@@ -112,16 +135,18 @@ class _Reader:
         center = self._in_link(body.name, Pose(body.center_of_mass)).position
         if frame.rotation != IN_PLACE.rotation:
             inertia = product(product(transpose(frame.rotation), inertia), frame.rotation)
-        return Link(body.name, body.mass, center, inertia)
+        return Link(self._link_name(body.name), body.mass, center, inertia)
 
-    def _end_link(self, body: str, end: str) -> tuple[Link, Joint]:
-        name = end if self._once[end] == 1 and end != self.world else f"{body}_{end}"
-        pose = self._in_link(body, _end(self.bodies[body], end))
-        return Link(name), Joint(self._free_name(f"{name}_fixed"), FIXED, body, name, pose)
+    def _end_link(self, body: str, end: str, name: str) -> tuple[Link, Joint]:
+        at = IN_PLACE
+        if body != GROUND:
+            at = self._in_link(body, _end(self.bodies[body], end))
+        joint, holder = self._free_name(f"{name}_fixed"), self._link_name(body)
+        return Link(name), Joint(joint, FIXED, holder, name, at)
 
     def _free_name(self, name: str) -> str:
         """One that no hinge has."""
-        taken = {hinge.name for hinge in self.scene.hinges}
+        taken = {self._joint_name(hinge.name) for hinge in self.scene.hinges}
         while name in taken:
             name += "_"
         return name
@@ -129,12 +154,13 @@ class _Reader:
     def _joint(self, hinge: Hinge) -> Joint:
         turned = Pose(rotation=hinge.rotation)
         if hinge.inboard_body == GROUND:
-            parent, pose = self.world, Pose(hinge.position).then(turned)
+            pose = Pose(hinge.position).then(turned)
         else:
-            parent = hinge.inboard_body
-            pose = self._in_link(parent, _end(self.bodies[parent], hinge.inboard_end)).then(turned)
+            holder = self.bodies[hinge.inboard_body]
+            pose = self._in_link(holder.name, _end(holder, hinge.inboard_end)).then(turned)
         self._tell_hinge(hinge)
-        return Joint(hinge.name, hinge.type, parent, hinge.outboard_body, pose, _keys(hinge))
+        parent, child = map(self._link_name, (hinge.inboard_body, hinge.outboard_body))
+        return Joint(self._joint_name(hinge.name), hinge.type, parent, child, pose, _keys(hinge))
 
     def _tell_hinge(self, hinge: Hinge) -> None:
         facts, element = hinge.facts, f"hinge {hinge.name!r}"
@@ -164,7 +190,9 @@ class _Reader:
         found = _line(coupling)
         if found is None:
             self._note(f"coupling {coupling.name!r}", "left out: no joint that goes with another")
-        return found
+            return None
+        own, other = self._joint_name(found.of), self._joint_name(found.other)
+        return replace(found, of=own, other=other)
 
     def _is_drawn(self, shape: Shape) -> bool:
         if shape.type not in _DRAWN:
@@ -180,7 +208,8 @@ class _Reader:
         body, _, end = shape.on.partition(".")
         if body == GROUND:
             return Look(self.world, pose, keys)
-        return Look(body, self._in_link(body, _end(self.bodies[body], end)).then(pose), keys)
+        at = self._in_link(body, _end(self.bodies[body], end)).then(pose)
+        return Look(self._link_name(body), at, keys)
 
     def _tell_rest(self) -> None:
         for table in _LEFT_OUT:
@@ -190,6 +219,14 @@ class _Reader:
                 )
         if self.scene.gravity != _GRAVITY:
             self._note("gravity", "left out; readers of URDF take 9.81 m/s^2 against z")
+
+
+def _others(names: Mapping[str, str]) -> dict[str, list[str]]:
+    """What others call something, by its name in the scene."""
+    found: dict[str, list[str]] = {}
+    for name, one in names.items():
+        found.setdefault(one, []).append(name)
+    return found
 
 
 def _refuse(scene: Scene) -> None:

@@ -25,6 +25,7 @@ from .loads import Event, Load, Spring, stops_of
 from .members import Bodies, Hinges
 from .outside.controller import Controller
 from .outside.inputs import Input, Output, Signal
+from .outside.names import Names
 from .outside.shape import Shape
 from .rigid import bare
 
@@ -58,6 +59,7 @@ class SceneTables(Table):
     constraint: tuple[Constraint, ...] = ()
     coupling: tuple[Coupling, ...] = ()
     shape: tuple[Shape, ...] = ()
+    names: Names = Names()
 
     @cached_property
     def bodies(self) -> Bodies:

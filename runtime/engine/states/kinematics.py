@@ -15,8 +15,7 @@ import numpy as np
 
 from mstmm.arguments import texts_of
 from mstmm.arrays import Array
-from mstmm.errors import NumericalFailure, SceneError
-from mstmm.scene import split
+from mstmm.errors import NumericalFailure
 
 from ...kernels.fused import FusedLibrary
 from ...kernels.prepared import Call, nothing, prepared
@@ -203,10 +202,8 @@ class Kinematics:
         known = self._known.get(key)
         if known is None:
             names = [key] if isinstance(key, str) else key
-            for name in names:
-                if split(name)[0] != "ground" and name not in self._references:
-                    raise SceneError(self._references.unknown(name))
-            known = self._known[key] = [Probe(*self._engine.packed.end(name)) for name in names]
+            places = map(self._references.place, names)
+            known = self._known[key] = [Probe(*self._engine.packed.end(one)) for one in places]
         return known
 
     def _run(self, function: str, *given: Any) -> None:

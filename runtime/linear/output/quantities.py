@@ -148,6 +148,7 @@ class Sight:
                 long = end != owner and last == about.labels[axis]
                 if (long or (end == owner and last == short)) and end in self._ends:
                     self._refuse_in_motion(name, order)
+                    end = self._ends.canonical(end) or end
                     part = Part(order, push=Channel("", "", end=end, kind=push, axis=axis))
                     full = f"{end}.{kind}.{about.labels[axis]}"
                     return Seen(full, about.unit, (part,), self._number(end, kind, axis))

@@ -36,7 +36,7 @@ class FlexibleBodies:
 
     def body(self, name: str, what: str) -> ModalBody:
         """The numbers of a flexible body; SceneError for another body, or none, of this name."""
-        found = self.known.get(name)
+        found = self.known.get(self.observed.references.canonical(name) or name)
         if found is not None:
             return found
         listed = ", ".join(f'"{x}"' for x in self.known)

@@ -1,0 +1,39 @@
+"""What others call the parts of a scene: is there such a part, and no other of this name?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from ..rules.messages import Problem, near
+from ..rules.values import GROUND, split
+
+if TYPE_CHECKING:
+    from ..tables.all import SceneTables
+    from ..tables.members import Bodies
+
+
+def problems(scene: SceneTables) -> Iterator[Problem]:
+    """Names for what is not there, and names that something else has in the scene."""
+    bodies, hinges = scene.skeleton.bodies, scene.hinges
+    for name, one in scene.names.body.items():
+        if not _is_there(one, bodies):
+            hint = near(split(one)[0], (GROUND, *bodies.names()))
+            yield ("names", "body", name), f'there is no body or end "{one}"{hint}'
+        elif name != one and _is_there(name, bodies):
+            yield ("names", "body", name), _taken(name, "a body or an end")
+    for name, one in scene.names.hinge.items():
+        if hinges.find(one) is None:
+            yield ("names", "hinge", name), hinges.missing(one)
+        elif name != one and hinges.find(name) is not None:
+            yield ("names", "hinge", name), _taken(name, "a hinge")
+
+
+def _taken(name: str, what: str) -> str:
+    return f'"{name}" is the name of {what} of the scene itself; leave it out'
+
+
+def _is_there(reference: str, bodies: Bodies) -> bool:
+    body, end = split(reference)
+    ends = bodies.ends(body)
+    return reference == GROUND or (ends is not None and (not end or end in ends))

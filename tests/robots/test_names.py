@@ -1,0 +1,77 @@
+"""Names of a robot's file: kept by the scene, found by results, and written back."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import mstmm
+from robots.test_urdf import ARM, joint, written
+
+
+@pytest.mark.parametrize("choices", [{}, {"merge": False}, {"base": "free"}])
+def test_every_link_and_joint_is_found_by_its_own_name(
+    tmp_path: Path, choices: dict[str, Any]
+) -> None:
+    found = mstmm.import_robot(written(tmp_path, ARM), **choices)
+    scene = mstmm.load_scene(written(tmp_path, found.to_toml(), "arm.toml"))
+    assert scene == found.scene
+    run = mstmm.compile(scene).simulate(0.05)
+    for name, own in found.links.items():
+        if own != "ground":
+            assert np.array_equal(run.position(name), run.position(own))
+    for name, own in found.joints.items():
+        assert np.array_equal(run.coordinate(name), run.coordinate(own))
+    assert run.quantity("shoulder-1.angle").name == "shoulder-1.angle"
+
+
+def test_a_robot_that_is_loaded_as_a_scene_keeps_them(tmp_path: Path) -> None:
+    scene = mstmm.load_scene(written(tmp_path, ARM))
+    assert scene.names.body["tool"] == "link_1st_arm.tool"
+    assert scene.names.hinge == {"shoulder-1": "shoulder_1", "other jaw": "other_jaw"}
+
+
+def names_of(text: str, tag: str) -> set[str]:
+    return {one.attrib["name"] for one in ElementTree.fromstring(text).iter(tag)}
+
+
+def test_they_are_written_back(tmp_path: Path) -> None:
+    text = mstmm.export_robot(mstmm.load_scene(written(tmp_path, ARM))).text
+    assert names_of(text, "link") == names_of(ARM, "link") - {"base"}  # turned, part of the ground
+    assert names_of(text, "joint") >= {"shoulder-1", "jaw", "other jaw"}
+    assert '<mimic joint="jaw"' in text
+    again = mstmm.load_scene(written(tmp_path, text, "again.urdf"))
+    assert again.names == mstmm.load_scene(tmp_path / "arm.urdf").names
+
+
+def test_links_in_one_place_are_written_back_each(tmp_path: Path) -> None:
+    text = ARM.replace("<transmission", joint("fixed", "1st arm", "skin", name="glue") + "<transm")
+    text = text.replace('<transm name="t"/>', '<link name="skin"/>').replace('"1st arm"', '"arm"')
+    scene = mstmm.load_scene(written(tmp_path, text))
+    assert scene.names.body["arm"] == scene.names.body["skin"] == "arm"
+    back = mstmm.export_robot(scene).text
+    assert names_of(back, "link") == names_of(text, "link") - {"base"}
+    again = mstmm.load_scene(written(tmp_path, back, "again.urdf"))
+    assert again.names.body == scene.names.body
+
+
+def test_names_that_look_like_places_of_the_scene_do_no_harm(tmp_path: Path) -> None:
+    text = ARM.replace('"tool"', '"ground"').replace('"finger"', '"link_1st_arm.jaw"')
+    found = mstmm.import_robot(written(tmp_path, text))
+    data = tomllib.loads(found.to_toml())
+    assert mstmm.Scene.from_data(data) == found.scene
+    assert "ground" not in found.scene.names.body
+
+
+def test_advice_leaves_out_names_of_what_it_takes_away(tmp_path: Path) -> None:
+    scene = mstmm.import_robot(written(tmp_path, ARM), merge=False).scene
+    from mstmm.runtime.chart.models import with_tables
+
+    less = with_tables(scene, hinge=scene.hinge[:3], body=scene.body[:3])
+    assert less.names.hinge == {"shoulder-1": "shoulder_1"}
+    assert less.names.body == {"1st arm": "link_1st_arm"}
