@@ -232,8 +232,27 @@ def test_equalities_of_joints_become_couplings_and_the_rest_is_told(tmp_path: Pa
     (coupling,) = one.scene.coupling
     assert [name.text for name in coupling.names] == ["swing.q", "lean.q"]
     told = [f"{note.element}: {note.text}" for note in one.notes]
-    assert "equality: left out, 1 of them" in told
+    assert "equality 'equality1' (weld): left out" in told
     assert "actuators: left out, 1 of them" in told
+
+
+def test_what_of_mjcf_is_left_out_is_told_by_name_and_line(tmp_path: Path) -> None:
+    extra = """
+      <equality><connect name="hold" body1="bird" body2="cart" anchor="0 0 0"/>
+        <joint name="bent" joint1="lean" polycoef="0 1 2 0 0"/></equality>
+      <tendon><fixed name="cord"><joint joint="flap" coef="1"/></fixed></tendon>
+      <contact><exclude name="apart" body1="bird" body2="cart"/></contact></mujoco>"""
+    text = MACHINE.replace('name="flap"', 'name="flap" actuatorfrcrange="-2 3"')
+    path, _ = machine(tmp_path, text.replace("</mujoco>", extra))
+    told = [str(note).removeprefix(f"{path}: ") for note in mstmm.import_robot(path).notes]
+    assert "line 25: equality 'hold' (connect): left out" in told
+    assert "line 26: equality 'bent' (joint): left out" in told
+    assert "line 27: tendon 'cord': left out" in told
+    assert "line 28: exclude 'apart': left out" in told
+    assert "line 20: joint 'flap': actuatorfrcrange from -2 to 3 left out" in told
+    rows = "3 joints of it are hinges in a row, with bodies without mass between"
+    assert f"line 5: body 'cart': {rows}" in told
+    assert "line 12: body 'ball': its origin is where its joint is; its own frame is an end" in told
 
 
 def test_what_mujoco_refuses_is_refused_in_one_message(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from ...errors import SceneError
 from ..files.read import content_of
 from .convert import BASES, COUPLED, MIMICS, Choices, Imported, converted
 from .mjcf import read_mjcf
+from .mjcf_files import looked_through
 from .units import Units, scaled
 from .urdf import read_urdf
 
@@ -54,7 +55,7 @@ def import_robot(
     elif base == "free":
         raise SceneError(f'{where}: base = "free" is for URDF; in MJCF a <freejoint> says so')
     else:
-        robot = read_mjcf(str(full), where)
+        robot = read_mjcf(str(full), where, looked_through(content, full, where))
     robot = scaled(robot, factors, gravity=full.suffix.lower() != ".urdf")
     return converted(robot, Choices(base, merge, stops, mimics), full.parent)
 

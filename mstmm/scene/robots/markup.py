@@ -57,8 +57,9 @@ class Element:
         return found
 
 
-def parsed(content: bytes, where: str) -> Element:
-    """The outermost element of a file whose name is `where`.  Raises SceneError."""
+def parsed(content: bytes, where: str, deepest: int = _DEEPEST) -> Element:
+    """The outermost element of a file whose name is `where`, with at most `deepest` inside each
+    other.  Raises SceneError."""
     text = content.lstrip()
     above = content[: len(content) - len(text)].count(b"\n")
     parser = expat.ParserCreate()
@@ -71,8 +72,8 @@ def parsed(content: bytes, where: str) -> Element:
         return f"{where}: line {above + parser.CurrentLineNumber}"
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        if len(open_) > _DEEPEST:
-            raise SceneError(f"{where}: elements are nested more than {_DEEPEST} deep")
+        if len(open_) > deepest:
+            raise SceneError(f"{where}: elements are nested more than {deepest} deep")
         one = Element(tag, attributes, line())
         open_[-1].children.append(one)
         open_.append(one)

@@ -21,6 +21,7 @@ from ...numbers.rotations import (
     product,
     transpose,
 )
+from .mjcf_files import Places
 from .robot import (
     FIXED,
     NOTHING,
@@ -37,16 +38,20 @@ _FREE, _BALL, _SLIDE = 0, 1, 2
 _HINGES = ("free", "ball", "prismatic", "pin")
 #: What of a model moves something and is left out, by the name of its count.
 _LEFT = {
-    "nu": "actuators", "ntendon": "tendons", "nsensor": "sensors", "nplugin": "plugins",
-    "nflex": "flexible parts", "npair": "pairs that touch",
+    "nu": "actuators", "nsensor": "sensors", "nplugin": "plugins", "nflex": "flexible parts",
+}  # fmt: skip
+#: Likewise, each by its name: its count, its section of the file.
+_NAMED = {
+    "tendon": ("ntendon", "tendon"), "pair": ("npair", "contact"),
+    "exclude": ("nexclude", "contact"),
 }  # fmt: skip
 _JOINT_EQUALITY = 2
 #: Groups of shapes that are there to be seen.
 _SEEN = 3
 
 
-def read_mjcf(path: str, where: str) -> Robot:
-    """The robot of a file, `where` as messages show its name.
+def read_mjcf(path: str, where: str, places: Places | None = None) -> Robot:
+    """The robot of a file, `where` as messages show its name; `places` are those of what has one.
 
     Raises SceneError for what MuJoCo does not compile, EnvironmentFailure without MuJoCo.
     """
@@ -59,14 +64,14 @@ def read_mjcf(path: str, where: str) -> Robot:
     except (ValueError, OSError) as error:
         why = " ".join(str(error).split())
         raise SceneError(f"{where}: MuJoCo does not read it: {why}") from None
-    return _Reader(mujoco, model, where).robot()
+    return _Reader(mujoco, model, where, places or {}).robot()
 
 
 class _Reader:
     """Reads a compiled model."""
 
-    def __init__(self, mujoco: Any, model: Any, where: str) -> None:
-        self._mujoco, self._m, self._where = mujoco, model, where
+    def __init__(self, mujoco: Any, model: Any, where: str, places: Places) -> None:
+        self._mujoco, self._m, self._where, self._places = mujoco, model, where, places
         self._notes = list[Note]()
         #: Body -> where its frame is in its link.
         self._frame = {0: IN_PLACE}
@@ -91,8 +96,13 @@ class _Reader:
         bit = getattr(self._mujoco.mjtDisableBit, f"mjDSBL_{what.upper()}")
         return bool(self._m.opt.disableflags & int(bit))
 
-    def _tell(self, element: str, text: str) -> None:
-        self._notes.append(Note(self._where, element, text))
+    def _tell(self, element: str, text: str, where: str = "") -> None:
+        self._notes.append(Note(where or self._where, element, text))
+
+    def _at(self, tag: str, name: str, other: str = "") -> str:
+        """Where an element of the file is, of this or another tag; the file where it has no name
+        of its own."""
+        return self._places.get((tag, name)) or self._places.get((other, name), self._where)
 
     def _name(self, kind: str, number: int) -> str:
         found = self._mujoco.mj_id2name(
@@ -113,8 +123,12 @@ class _Reader:
         pose, anchor = self._frame[parent].then(at), ZERO
         if count == 0:
             self._frame[body] = IN_PLACE
-            yield self._mass(body, name), Joint(f"{name}/weld", FIXED, holder, name, pose)
+            weld = Joint(f"{name}/weld", FIXED, holder, name, pose, where=self._at("body", name))
+            yield self._mass(body, name), weld
             return
+        if count > 1:
+            what = f"{count} joints of it are hinges in a row, with bodies without mass between"
+            self._tell(f"body {name!r}", what, self._at("body", name))
         for number in range(first, first + count):
             kind, last = int(m.jnt_type[number]), number == first + count - 1
             place = ZERO if kind == _FREE else _vector(m.jnt_pos[number])
@@ -124,27 +138,31 @@ class _Reader:
             moved = moved.then(self._back(number, kind))
             if last:
                 self._frame[body] = Pose(_minus(ZERO, place))
-            link = self._mass(body, held) if last else Link(held, where=self._where)
-            keys = self._keys(number, kind, joint)
-            yield link, Joint(joint, _HINGES[kind], holder, held, moved, keys, self._where)
+            where = self._at("joint", joint, "freejoint")
+            link = self._mass(body, held) if last else Link(held, where=where)
+            keys = self._keys(number, kind, joint, where)
+            yield link, Joint(joint, _HINGES[kind], holder, held, moved, keys, where)
             holder, pose, anchor = held, IN_PLACE, place
         if any(anchor):
-            frame = f"{name}/frame"
-            weld = Joint(frame, FIXED, name, frame, self._frame[body])
-            yield Link(frame, where=self._where), weld
+            frame, at_body = f"{name}/frame", self._at("body", name)
+            what = "its origin is where its joint is; its own frame is an end"
+            self._tell(f"body {name!r}", what, at_body)
+            weld = Joint(frame, FIXED, name, frame, self._frame[body], where=at_body)
+            yield Link(frame, where=at_body), weld
 
     def _mass(self, body: int, name: str) -> Link:
         """The link with the body's mass, seen from the link's frame."""
         m, frame = self._m, self._frame[body]
         mass = float(m.body_mass[body])
+        where = self._at("body", name)
         if mass == 0 and not m.body_inertia[body].any():
-            return Link(name, where=self._where)
+            return Link(name, where=where)
         turn = _turn(m.body_iquat[body])
         a, b, c = map(float, m.body_inertia[body])
         principal: Matrix = ((a, 0.0, 0.0), (0.0, b, 0.0), (0.0, 0.0, c))
         inertia = product(product(turn, principal), transpose(turn))
         center = frame.then(Pose(_vector(m.body_ipos[body]))).position
-        return Link(name, mass, center, inertia if any((a, b, c)) else NOTHING, self._where)
+        return Link(name, mass, center, inertia if any((a, b, c)) else NOTHING, where)
 
     def _back(self, number: int, kind: int) -> Pose:
         """From where a joint is at its reference to where it is at 0."""
@@ -159,7 +177,7 @@ class _Reader:
             return Pose((-reference * x, -reference * y, -reference * z))
         return Pose(rotation=about(axis, -reference))
 
-    def _keys(self, number: int, kind: int, joint: str) -> dict[str, Any]:
+    def _keys(self, number: int, kind: int, joint: str, where: str) -> dict[str, Any]:
         m, dof, at = self._m, int(self._m.jnt_dofadr[number]), int(self._m.jnt_qposadr[number])
         stop, values = dof + (6, 3, 1, 1)[kind], at + (7, 4, 1, 1)[kind]
         law: dict[str, Any] = {}
@@ -173,35 +191,43 @@ class _Reader:
             law["friction"] = [{"coulomb": x} for x in losses]
         stiffness = 0.0 if self._off("spring") else float(m.jnt_stiffness[number].flat[0])
         if stiffness and kind in (_FREE, _BALL):
-            self._tell(f"joint {joint!r}", "its spring is left out; give its hinge a law")
+            text = "its spring is left out; give its hinge a law"
+            self._tell(f"joint {joint!r}", text, where)
         elif stiffness:
             law |= {"stiffness": stiffness, "rest": float(m.qpos_spring[at])}
         if m.jnt_limited[number] and not self._off("limit"):
             if kind == _BALL:
-                self._tell(f"joint {joint!r}", "its limit is left out")
+                self._tell(f"joint {joint!r}", "its limit is left out", where)
             else:
                 lower, upper = map(float, m.jnt_range[number])
                 law["limits"] = {"lower": lower, "upper": upper}
         keys: dict[str, Any] = {"law": law} if law else {}
         if kind not in (_FREE, _BALL):
             keys["axis"] = _vector(m.jnt_axis[number])
+        if m.jnt_actfrclimited[number]:
+            least, most = map(float, m.jnt_actfrcrange[number])
+            text = f"actuatorfrcrange from {least:g} to {most:g} left out"
+            self._tell(f"joint {joint!r}", text, where)
         start = [float(x) for x in m.qpos0[at:values]]
         return keys | ({"initial": {"q": start}} if any(start) else {})
 
     def _mimics(self) -> Iterator[Mimic]:
         """Equalities of joints that are straight lines."""
-        m, others = self._m, 0
+        m = self._m
         for number in range(m.neq):
             line = [float(x) for x in m.eq_data[number][:5]]
             one, other = int(m.eq_obj1id[number]), int(m.eq_obj2id[number])
             if m.eq_type[number] != _JOINT_EQUALITY or other < 0 or any(line[2:]):
-                others += 1
+                self._leave_equality(number)
                 continue
             first, second = (float(m.qpos0[m.jnt_qposadr[each]]) for each in (one, other))
             offset = first + line[0] - line[1] * second
             yield Mimic(self._name("joint", one), self._name("joint", other), line[1], offset)
-        if others:
-            self._tell("equality", f"left out, {others} of them")
+
+    def _leave_equality(self, number: int) -> None:
+        name, kinds = self._name("equality", number), self._mujoco.mjtEq
+        kind = kinds(int(self._m.eq_type[number])).name.removeprefix("mjEQ_").lower()
+        self._tell(f"equality {name!r} ({kind})", "left out", self._at("equality", name))
 
     def _looks(self) -> Iterator[Look]:
         m, kinds, unseen = self._m, self._mujoco.mjtGeom, 0
@@ -224,6 +250,10 @@ class _Reader:
         for key, what in _LEFT.items():
             if count := int(getattr(m, key, 0)):
                 self._tell(what, f"left out, {count} of them")
+        for what, (key, section) in _NAMED.items():
+            for number in range(int(getattr(m, key, 0))):
+                name = self._name(what, number)
+                self._tell(f"{what} {name!r}", "left out", self._at(section, name))
         if m.ngeom and (m.geom_contype.any() or m.geom_conaffinity.any()):
             self._tell("contacts", "left out: bodies go through each other and the ground")
         if m.body_gravcomp.any():

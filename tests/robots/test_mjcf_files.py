@@ -1,0 +1,69 @@
+"""The files of MJCF: what is looked at before MuJoCo opens any of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import mstmm
+from mstmm.scene.robots.mjcf_files import looked_through
+
+ENTITY = '<!DOCTYPE mujoco [<!ENTITY a SYSTEM "/etc/hostname">]><mujoco model="&a;"/>'
+
+
+def include(file: str) -> str:
+    return f'<mujoco>\n<include file="{file}"/></mujoco>'
+
+
+def test_document_types_and_entities_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    path.write_text(ENTITY)
+    with pytest.raises(mstmm.SceneError, match=r"robot\.xml: line 1: a document type or an entity"):
+        mstmm.import_robot(path)
+    (tmp_path / "part.xml").write_text(ENTITY)
+    path.write_text(include("part.xml"))
+    with pytest.raises(mstmm.SceneError, match=r"^part\.xml: line 1: a document type or an entity"):
+        mstmm.load_scene(path)
+
+
+@pytest.mark.parametrize("tag", ["include", "model"])
+def test_files_from_elsewhere_are_refused(tmp_path: Path, tag: str) -> None:
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    (tmp_path / "other.xml").write_text("<mujoco/>")
+    (folder / "link.xml").symlink_to(tmp_path / "other.xml")
+    path = folder / "robot.xml"
+    for name in ("../other.xml", str(tmp_path / "other.xml"), "link.xml", "none/../../other.xml"):
+        path.write_text(include(name).replace("include", tag))
+        with pytest.raises(mstmm.SceneError) as raised:
+            mstmm.import_robot(path)
+        assert f"robot.xml: line 2: <{tag}> file '" in str(raised.value)
+        assert "expected a file in the folder of the model or below it" in str(raised.value)
+
+
+def test_files_below_are_looked_through_once_each(tmp_path: Path) -> None:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "a.xml").write_text(
+        '<mujocoinclude>\n<body name="arm"/><include file="b.xml"/></mujocoinclude>'
+    )
+    (tmp_path / "parts" / "b.xml").write_text(include("parts/a.xml").replace("<incl", "\n<incl"))
+    content = (
+        include("parts/a.xml")
+        .replace(
+            "</mujoco>", '<equality><joint name="arm"/></equality><joint name="arm"/></mujoco>'
+        )
+        .encode()
+    )
+    places = looked_through(content, tmp_path / "robot.xml", "robot.xml")
+    assert places == {
+        ("body", "arm"): "parts/a.xml: line 2", ("equality", "arm"): "robot.xml: line 2",
+        ("joint", "arm"): "robot.xml: line 2",
+    }  # fmt: skip
+
+
+def test_an_include_of_what_is_no_xml_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "part.xml").write_text("<mujoco>")
+    (tmp_path / "robot.xml").write_text(include("part.xml"))
+    with pytest.raises(mstmm.SceneError, match=r"^part\.xml: line 1: not valid XML"):
+        mstmm.import_robot(tmp_path / "robot.xml")
