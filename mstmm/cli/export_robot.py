@@ -31,6 +31,6 @@ def export_robot(
         notes = [{"element": n.element, "text": n.text} for n in found.notes]
         emit_json({"robot": str(target), "notes": notes})
         return
-    for line in together(found.notes):
+    for line in together(found.notes, "scene"):
         say(line)
     say(f"{target}: {found.summary}")

@@ -70,16 +70,17 @@ def import_robot(
         notes = [{"where": n.where, "element": n.element, "text": n.text} for n in found.notes]
         emit_json({"scene": str(target), "names": dict(found.names), "notes": notes})
         return
-    for line in together(found.notes):
+    for line in together(found.notes, robot):
         say(line)
     say(f"{target}: {found.scene.summary}")
 
 
-def together(notes: Iterable[Note]) -> list[str]:
-    """A line for each text, with what it is about."""
+def together(notes: Iterable[Note], file: str) -> list[str]:
+    """A line for each text, with what it is about, and where in `file` that is."""
     about = defaultdict[str, list[str]](list)
     for note in notes:
-        about[note.text].append(note.element)
+        place = note.where.removeprefix(file).removeprefix(": ")
+        about[note.text].append(f"{note.element} ({place})" if place else note.element)
     return [f"{_some(elements)}: {text}" for text, elements in about.items()]
 
 

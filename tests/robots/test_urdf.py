@@ -274,3 +274,17 @@ def test_what_says_too_little_is_told(tmp_path: Path) -> None:
     notes = [note.text for note in mstmm.import_robot(path, stops=1e4).notes]
     assert "limits from 1 to -1 leave no way, and are left out" in notes
     assert not any("from 0 to 0.5" in text for text in notes)
+
+
+def test_links_that_are_no_bodies_and_those_without_mass_are_told_by_line(tmp_path: Path) -> None:
+    text = ARM.replace('<link name="1st arm">', '<link name="swivel"/><link name="1st arm">')
+    text = text.replace('<child link="1st arm"/>', '<child link="swivel"/>', 1)
+    text = text.replace("<transmission", joint("continuous", "swivel", "1st arm") + "<transmission")
+    path = written(tmp_path, text)
+    told = [str(note).split(": ", 1)[1] for note in mstmm.import_robot(path).notes]
+    assert "line 5: link 'base': part of the ground" in told
+    found = "part of the body that holds it, in which its name finds its frame"
+    assert f"line 22: link 'tool': {found}" in told
+    assert "line 15: link 'swivel': moves without mass of its own" in told
+    kept = [note.text for note in mstmm.import_robot(path, merge=False).notes]
+    assert found not in kept and "part of the ground" not in kept

@@ -116,6 +116,7 @@ class _Writer:
         moving = [one.name for one in robot.joints if self.place[one.child][0] == one.child]
         self.joints = hinges.take_all(moving, "joint")
         self._tell_names()
+        self._tell_links()
         #: What the joints that move go with.
         self.mimics = {mimic.of: mimic for mimic in mimics if self._moves(mimic.of)}
         self._roots = {name: hinges.take(f"{name}_base", "link")
@@ -131,6 +132,20 @@ class _Writer:
             some = ", ".join(others[:_NAMED]) + (", ..." if others[_NAMED:] else "")
             text = f"{len(others)} that a scene does not take: {some}"
             self.notes.append(Note(self.robot.where, "names", text))
+
+    def _tell_links(self) -> None:
+        """Links that are no bodies of their own, and those that move without mass."""
+        for link in self.robot.links:
+            joint, (owner, _) = self.tree.holder.get(link.name), self.place[link.name]
+            if joint is None:
+                continue
+            if owner == GROUND:
+                self._tell(joint, f"link {link.name!r}", "part of the ground")
+            elif owner != link.name:
+                what = "part of the body that holds it, in which its name finds its frame"
+                self._tell(joint, f"link {link.name!r}", what)
+            elif joint.type != FIXED and not link.mass and link.inertia == NOTHING:
+                self._tell(link, f"link {link.name!r}", "moves without mass of its own")
 
     def bodies(self) -> list[str]:
         """Links that are bodies, in the order of the file."""
