@@ -16,7 +16,7 @@ from .tables.elastic import Elastic
 from .tables.elastic_keys import Arrays, Box, ElasticEnd
 from .tables.flexible import Damping, Start
 from .tables.hinge import Hinge
-from .tables.hinge_keys import Initial
+from .tables.hinge_keys import Initial, Rated
 from .tables.law import Friction, Law, LawEntry, Limits, SpringLaw
 from .tables.loads import Event, Load, Spring
 from .tables.outside.inputs import Input, Output, Signal
@@ -26,6 +26,6 @@ from .tables.outside.shape import Shape
 __all__ = [
     "Arrays", "Beam", "Body", "Box", "Bushing", "Chain", "Constraint", "Coupling", "Damping",
     "Elastic", "ElasticEnd", "End", "Event", "Friction", "Hinge", "Initial", "Input", "Law",
-    "LawEntry", "Limits", "Load", "Modes", "Names", "Output", "Scene", "Section", "Shape", "Shapes",
-    "Signal", "Spring", "SpringLaw", "Start", "load_scene", "read", "split",
+    "LawEntry", "Limits", "Load", "Modes", "Names", "Output", "Rated", "Scene",
+    "Section", "Shape", "Shapes", "Signal", "Spring", "SpringLaw", "Start", "load_scene", "read", "split",
 ]  # fmt: skip

@@ -10,6 +10,7 @@ import pytest
 
 import mstmm
 from mstmm.numbers.rotations import from_rpy, to_rpy
+from mstmm.scene import Rated
 from robots.test_urdf import ARM, written
 
 HINGES: tuple[dict[str, Any], ...] = (
@@ -152,3 +153,38 @@ def test_three_angles_give_the_rotation_again(rng: np.random.Generator) -> None:
     for whole in np.ndindex(4, 4, 4):
         matrix = from_rpy([quarter * k for k in whole])
         assert from_rpy(to_rpy(matrix)) == matrix
+
+
+@pytest.mark.parametrize("stops", [None, 1e4])
+def test_what_joints_are_rated_for_comes_back(tmp_path: Path, stops: float | None) -> None:
+    first = mstmm.import_robot(written(tmp_path, ARM), stops=stops)
+    shoulder, jaw, other = first.scene.hinge
+    assert shoulder.rated == Rated(lower=-1.0, upper=2.0, effort=30.0, velocity=5.0)
+    assert jaw.rated == Rated(lower=0.0, upper=0.04) and other.rated is None
+    text = mstmm.export_robot(first.scene).text
+    assert '<limit lower="-1.0" upper="2.0" effort="30.0" velocity="5.0" />' in text
+    again = mstmm.load_scene(written(tmp_path, text, "again.urdf"))
+    assert [hinge.rated for hinge in again.hinge[:2]] == [shoulder.rated, jaw.rated]
+    assert mstmm.load_scene(written(tmp_path, first.to_toml(), "arm.toml")) == first.scene
+
+
+def test_a_wheel_is_rated_without_a_range(tmp_path: Path) -> None:
+    wheel = ARM.replace('"revolute"', '"continuous"').replace('"30"', '"-1"')
+    found = mstmm.import_robot(written(tmp_path, wheel))
+    assert found.scene.hinge[0].rated == Rated(velocity=5.0)
+    assert "limits of effort or velocity below 0 left out" in [note.text for note in found.notes]
+    text = mstmm.export_robot(found.scene).text
+    assert 'type="continuous"' in text and '<limit effort="1000000000.0" velocity="5.0" />' in text
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"rated": {"lower": 1.0, "upper": 0.0}}, "rated.lower: lower \\(1\\) must be below upper"),
+        ({"rated": {"effort": -1.0}}, "rated.effort: expected a number in N or N m, 0 or more"),
+        ({"type": "ball", "rated": {"effort": 1.0}}, "rated: only hinges of one coordinate are"),
+    ],
+)
+def test_ratings_that_are_none_are_refused(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(mstmm.SceneError, match=message):
+        mstmm.Scene(gravity=[0, 0, -9.81], body=[BAR], hinge=[PIN | changes])

@@ -15,12 +15,14 @@ from robots.test_urdf import ARM, joint, robot, written
 
 IN_M = """<robot><link name="base"/>
   <joint name="rail" type="prismatic"><parent link="base"/><child link="cart"/>
-    <origin xyz="0.1 0 {l3}"/><axis xyz="1 0 0.5"/><limit lower="-0.5" upper="0.5"/>
+    <origin xyz="0.1 0 {l3}"/><axis xyz="1 0 0.5"/>
+    <limit lower="-0.5" upper="0.5" effort="7" velocity="2"/>
     <dynamics damping="0.3" friction="0.2"/></joint>
   <link name="cart"><inertial><mass value="2"/><inertia ixx="0.02" iyy="0.02" izz="0.02"/>
     </inertial><visual><geometry><box size="0.3 0.2 0.1"/></geometry></visual></link>
   <joint name="swing" type="continuous"><parent link="cart"/><child link="bob"/>
-    <origin xyz="0 0.2 0"/><axis xyz="0 1 0"/><dynamics damping="0.05" friction="0.01"/></joint>
+    <origin xyz="0 0.2 0"/><axis xyz="0 1 0"/><dynamics damping="0.05" friction="0.01"/>
+    <limit effort="3" velocity="4"/></joint>
   <link name="bob"><inertial><origin xyz="0 0 -0.4"/><mass value="0.7"/>
     <inertia ixx="0.01" iyy="0.01" izz="0.001"/></inertial></link>
   <joint name="jaw" type="prismatic"><parent link="bob"/><child link="tip"/>
@@ -33,12 +35,14 @@ IN_M = """<robot><link name="base"/>
 #: The same in mm and g, by hand: forces in g mm/s^2, moments in g mm^2/s^2.
 IN_MM = """<robot><link name="base"/>
   <joint name="rail" type="prismatic"><parent link="base"/><child link="cart"/>
-    <origin xyz="100 0 300"/><axis xyz="1 0 0.5"/><limit lower="-500" upper="500"/>
+    <origin xyz="100 0 300"/><axis xyz="1 0 0.5"/>
+    <limit lower="-500" upper="500" effort="7e6" velocity="2000"/>
     <dynamics damping="300" friction="200000"/></joint>
   <link name="cart"><inertial><mass value="2000"/><inertia ixx="2e7" iyy="2e7" izz="2e7"/>
     </inertial><visual><geometry><box size="300 200 100"/></geometry></visual></link>
   <joint name="swing" type="continuous"><parent link="cart"/><child link="bob"/>
-    <origin xyz="0 200 0"/><axis xyz="0 1 0"/><dynamics damping="5e7" friction="1e7"/></joint>
+    <origin xyz="0 200 0"/><axis xyz="0 1 0"/><dynamics damping="5e7" friction="1e7"/>
+    <limit effort="3e9" velocity="4"/></joint>
   <link name="bob"><inertial><origin xyz="0 0 -400"/><mass value="700"/>
     <inertia ixx="1e7" iyy="1e7" izz="1e6"/></inertial></link>
   <joint name="jaw" type="prismatic"><parent link="bob"/><child link="tip"/>
@@ -64,6 +68,10 @@ def test_mm_and_g_move_as_m_and_kg_do(tmp_path: Path) -> None:
     assert rails[1].upper == pytest.approx(rails[0].upper) and rails[1].stiffness == 1e4
     sizes = [each.scene.shape[0].size for each in (plain, found)]
     assert sizes[1] == pytest.approx(sizes[0])
+    for mine, other in zip(found.scene.hinge[:2], plain.scene.hinge[:2], strict=True):
+        assert mine.rated is not None and other.rated is not None
+        ratings = other.rated.model_dump(exclude_none=True)
+        assert mine.rated.model_dump(exclude_none=True) == pytest.approx(ratings, rel=1e-12)
 
 
 def test_units_that_are_none(tmp_path: Path) -> None:

@@ -121,7 +121,13 @@ def test_what_joints_say_becomes_laws_couplings_and_notes(tmp_path: Path) -> Non
 def test_limits_are_no_stops_unless_they_get_a_stiffness(tmp_path: Path) -> None:
     found = mstmm.import_robot(written(tmp_path, ARM))
     assert not any(entry.limits[0].acts for entry in (h.law for h in found.scene.hinge))
-    assert sum(note.text == "its limits are no stops here" for note in found.notes) == 2
+    assert (
+        sum(
+            note.text == "its limits are no stops here; they are kept as rated"
+            for note in found.notes
+        )
+        == 2
+    )
 
 
 def test_a_free_base_falls(tmp_path: Path) -> None:

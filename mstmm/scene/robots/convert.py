@@ -255,7 +255,11 @@ class _Writer:
         law = dict(keys.pop("law", {}))
         if limits := law.pop("limits", None):
             if self.choices.stops is None:
-                self._tell(joint, f"joint {joint.name!r}", "its limits are no stops here")
+                self._tell(
+                    joint,
+                    f"joint {joint.name!r}",
+                    "its limits are no stops here; they are kept as rated",
+                )
             else:
                 law["limits"] = {**limits, "stiffness": self.choices.stops}
         if law:

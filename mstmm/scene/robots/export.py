@@ -267,13 +267,18 @@ def _keys(hinge: Hinge) -> dict[str, Any]:
     if facts is None or len(facts.speeds) != 1:
         return keys
     entry = hinge.law.entry(0)
-    limits = (entry.limits.lower, entry.limits.upper)
     law: dict[str, Any] = {"damping": entry.damping} if entry.damping else {}
     if entry.friction.acts:
         law["friction"] = {"coulomb": entry.friction.coulomb}
     if entry.limits.acts:
-        law["limits"] = dict(zip(("lower", "upper"), limits, strict=True))
-    return keys | {"law": law}
+        law["limits"] = _said(entry.limits, "lower", "upper")
+    return keys | {"law": law, "rated": _said(hinge.rated, "lower", "upper", "effort", "velocity")}
+
+
+def _said(table: Any, *keys: str) -> dict[str, float]:
+    """What a table says of these keys."""
+    values = {key: getattr(table, key, None) for key in keys}
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def _line(coupling: Coupling) -> Mimic | None:

@@ -202,6 +202,8 @@ class _Reader:
                 lower, upper = map(float, m.jnt_range[number])
                 law["limits"] = {"lower": lower, "upper": upper}
         keys: dict[str, Any] = {"law": law} if law else {}
+        if "limits" in law:
+            keys["rated"] = dict(law["limits"])
         if kind not in (_FREE, _BALL):
             keys["axis"] = _vector(m.jnt_axis[number])
         if m.jnt_actfrclimited[number]:

@@ -84,6 +84,12 @@ def _joint(joint: Joint, units: Units) -> Joint:
     if law := keys.get("law"):
         powers = tuple(int(speed.unit == "m/s") for speed in facts.speeds)
         keys["law"] = {key: _term(key, given, powers, units) for key, given in law.items()}
+    if "rated" in keys:
+        own = units.length ** int(facts.speeds[0].unit == "m/s")
+        effort = units.mass * units.length**2 / own
+        keys["rated"] = {
+            key: x * (effort if key == "effort" else own) for key, x in keys["rated"].items()
+        }
     if "initial" in keys:
         values = zip(keys["initial"]["q"], facts.coordinates, strict=True)
         q = [x * (units.length if place.unit == "m" else 1.0) for x, place in values]

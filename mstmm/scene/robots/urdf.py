@@ -37,6 +37,8 @@ _KINDS = {
     )
 }  # fmt: skip
 _UNLIMITED = "continuous"
+#: Readers of URDF want limits of effort and velocity: that which stands for none.
+NO_LIMIT = 1e9
 #: Joints without limits -> those with; and a hinge's joint, without limits where there is one.
 LIMITED = {_UNLIMITED: "revolute"}
 BY_HINGE = {kind.hinge: kind for kind in _KINDS.values()}
@@ -159,9 +161,21 @@ class _Reader:
             elif {"lower", "upper"} & set(limit.attributes):
                 what = f"limits from {lower:g} to {upper:g} leave no way, and are left out"
                 self.note(one, f"joint {name!r}", what)
-        if limit is not None and {"effort", "velocity"} & set(limit.attributes):
-            self.note(one, f"joint {name!r}", "limits of effort and velocity left out")
-        return {"law": law} if law else {}
+        rated = {**law.get("limits", {}), **({} if limit is None else self._rated(limit, name))}
+        return ({"law": law} if law else {}) | ({"rated": rated} if rated else {})
+
+    def _rated(self, limit: Element, name: str) -> dict[str, float]:
+        """Largest effort and speed, which are told: nothing stops there."""
+        units = {"effort": "N m or N", "velocity": "rad/s or m/s"}
+        given = {key: limit.number(key, 0.0, its) for key, its in units.items()
+                 if key in limit.attributes}  # fmt: skip
+        kept = {key: number for key, number in given.items() if number >= 0 and number != NO_LIMIT}
+        if kept:
+            what = "limits of effort and velocity stop nothing here; they are kept as rated"
+            self.note(limit, f"joint {name!r}", what)
+        if any(number < 0 for number in given.values()):
+            self.note(limit, f"joint {name!r}", "limits of effort or velocity below 0 left out")
+        return kept
 
     def _looks_of(self, one: Element, link: str) -> None:
         """Its visuals; where none of them can be drawn, its collision shapes."""

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from ...numbers.pose import IN_PLACE, Pose
 from ...numbers.rotations import to_rpy
 from .robot import NOTHING, Joint, Link, Look, Mimic, Robot
-from .urdf import BY_HINGE, LIMITED
-
-#: Readers of URDF want limits of effort and velocity: none that anybody reaches (SI units).
-_NO_LIMIT = 1e9
+from .urdf import BY_HINGE, LIMITED, NO_LIMIT
 
 
 def as_urdf(robot: Robot) -> str:
@@ -74,8 +70,9 @@ def _visual(one: Element, look: Look) -> None:
 
 def _joint(root: Element, joint: Joint, mimic: Mimic | None) -> None:
     kind, law = BY_HINGE[joint.type], joint.keys.get("law", {})
-    limits = law.get("limits")
-    type_ = LIMITED.get(kind.joint, kind.joint) if limits else kind.joint
+    limits = {**joint.keys.get("rated", {}), **law.get("limits", {})}
+    ends = {"lower", "upper"} & limits.keys()
+    type_ = LIMITED.get(kind.joint, kind.joint) if ends else kind.joint
     one = SubElement(root, "joint", name=joint.name, type=type_)
     _origin(one, joint.pose)
     SubElement(one, "parent", link=joint.parent)
@@ -83,7 +80,7 @@ def _joint(root: Element, joint: Joint, mimic: Mimic | None) -> None:
     if kind.axis:
         SubElement(one, "axis", xyz=_numbers(joint.keys[kind.axis]))
     if kind.unit and (limits or type_ not in LIMITED):
-        _limit(one, limits or {})
+        _limit(one, limits, type_ not in LIMITED)
     if law.get("damping") or law.get("friction"):
         friction = law.get("friction", {}).get("coulomb", 0.0)
         given = {"damping": law.get("damping", 0.0), "friction": friction}
@@ -93,11 +90,10 @@ def _joint(root: Element, joint: Joint, mimic: Mimic | None) -> None:
         SubElement(one, "mimic", {"joint": mimic.other, **numbers})
 
 
-def _limit(one: Element, limits: Mapping[str, Any]) -> None:
-    lower, upper = limits.get("lower"), limits.get("upper")
-    ends = {
-        "lower": -_NO_LIMIT if lower is None else lower,
-        "upper": _NO_LIMIT if upper is None else upper,
-        "effort": _NO_LIMIT, "velocity": _NO_LIMIT,
-    }  # fmt: skip
-    SubElement(one, "limit", {key: repr(float(x)) for key, x in ends.items()})
+def _limit(one: Element, limits: Mapping[str, float], has_ends: bool) -> None:
+    """A range where there is one, and what readers want in any case."""
+    wanted = {"effort": NO_LIMIT, "velocity": NO_LIMIT}
+    if has_ends:
+        wanted = {"lower": -NO_LIMIT, "upper": NO_LIMIT, **wanted}
+    numbers = {key: repr(float(limits.get(key, number))) for key, number in wanted.items()}
+    SubElement(one, "limit", numbers)

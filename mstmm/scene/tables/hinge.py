@@ -11,7 +11,7 @@ from ...numbers.rotations import Vector
 from ..rules import text as texts
 from ..rules import values as rules
 from ..rules.values import GROUND, Location, split
-from .hinge_keys import HingeKeys
+from .hinge_keys import HingeKeys, Rated
 from .hinge_rules import settled
 
 
@@ -37,7 +37,7 @@ class Hinge(HingeTable):
     Where other hinges hold the outboard body too, loops close: one of them is part of the tree and
     the others are cut, which costs it nothing but work.  `cut` True: cut this one; False: not this
     one; None: whichever costs less.  In loops start values are wishes; `hold` keeps those of q
-    exactly.
+    exactly.  Nothing acts by what it is `rated` for.
     """
 
     name: Annotated[str, texts.name("the hinge's name")]
@@ -50,6 +50,14 @@ class Hinge(HingeTable):
     ] = None
     cut: Annotated[bool | None, texts.flag()] = None
     hold: Annotated[bool, texts.flag()] = False
+    rated: Rated | None = None
+
+    @model_validator(mode="after")
+    def _rates(self) -> Hinge:
+        kind = self.builtin
+        if self.rated is not None and kind is not None and len(kind.speeds) != 1:
+            raise rules.refuse("only hinges of one coordinate are rated; leave it out", "rated")
+        return self
 
     @property
     def inboard_body(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from ...expression.expression import Expression
 from ...ir.facts import HingeFacts, builtin_hinges
@@ -22,6 +22,23 @@ class Initial(Table):
 
     q: Annotated[Numbers | None, rules.numbers("one number per coordinate")] = None
     u: Annotated[Numbers | None, rules.numbers("one number per speed")] = None
+
+
+class Rated(Table):
+    """What a joint is built for: its range, its largest effort and speed.  Nothing acts by it."""
+
+    lower: Annotated[float | None, rules.number("m or rad")] = None
+    upper: Annotated[float | None, rules.number("m or rad")] = None
+    effort: Annotated[float | None, rules.number("N or N m", minimum=0)] = None
+    velocity: Annotated[float | None, rules.number("m/s or rad/s", minimum=0)] = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Rated:
+        if self.lower is not None and self.upper is not None and self.lower >= self.upper:
+            raise rules.refuse(
+                f"lower ({self.lower:g}) must be below upper ({self.upper:g}); swap them", "lower"
+            )
+        return self
 
 
 class HingeKeys(Table):
