@@ -26,6 +26,6 @@ from .tables.outside.shape import Shape
 __all__ = [
     "Arrays", "Beam", "Body", "Box", "Bushing", "Chain", "Constraint", "Coupling", "Damping",
     "Elastic", "ElasticEnd", "End", "Event", "Friction", "Hinge", "Initial", "Input", "Law",
-    "LawEntry", "Limits", "Load", "Modes", "Names", "Output", "Rated", "Scene",
-    "Section", "Shape", "Shapes", "Signal", "Spring", "SpringLaw", "Start", "load_scene", "read", "split",
+    "LawEntry", "Limits", "Load", "Modes", "Names", "Output", "Rated", "Scene", "Section",
+    "Shape", "Shapes", "Signal", "Spring", "SpringLaw", "Start", "load_scene", "read", "split",
 ]  # fmt: skip

@@ -114,6 +114,45 @@ def test_steps_of_rk4_are_mujocos(name: str, rng: np.random.Generator) -> None:
         assert apart(found[-1][ours], wanted[theirs]) < 1e-11
 
 
+#: Weights of a central difference of fourth order, at steps of these sizes.
+STENCIL = {-2: 1 / 12, -1: -2 / 3, 1: 2 / 3, 2: -1 / 12}
+
+
+def slopes(peer: Any, data: Any, places: list[int], by: str, step: float) -> Any:
+    """Differences of MuJoCo's accelerations by coordinates or speeds, of these places each."""
+    at, speeds, columns = data.qpos.copy(), data.qvel.copy(), list[Any]()
+    for place in places:
+        column = np.zeros(peer.nv)
+        for steps, weight in STENCIL.items():
+            moved, way = at.copy(), np.zeros(peer.nv)
+            way[place] = 1.0
+            if by == "q":
+                mujoco.mj_integratePos(peer, moved, way, steps * step)
+            data.qpos[:], data.qvel[:] = moved, speeds + (steps * step * way if by == "u" else 0)
+            mujoco.mj_forward(peer, data)
+            column += weight / step * data.qacc
+        columns.append(column[places])
+    data.qpos[:], data.qvel[:] = at, speeds
+    return np.array(columns).T
+
+
+@pytest.mark.parametrize("name", ["cheetah.xml", "walker.xml", "pusher.xml", "humanoid.xml"])
+def test_exact_derivatives_are_the_slopes_of_mujocos_accelerations(
+    name: str, rng: np.random.Generator
+) -> None:
+    """As near as its differences by two steps are to each other."""
+    path = next(path for path in published() if path.name == name)
+    peer, one = bare(path), of_links(path)
+    model = mstmm.compile(one.scene)
+    q, u, data, ours, theirs = states(one, model, peer, rng)
+    found, both = model.derivatives(q, u), np.ix_(ours, ours)
+    for by, exact in (("q", found.q[both]), ("u", found.u[both])):
+        rough, fine = (slopes(peer, data, theirs, by, step) for step in (2e-3, 1e-3))
+        between = apart(rough, fine)
+        assert between < 1e-8
+        assert apart(exact, fine) < max(1e-10, between)
+
+
 FLAGS = """<mujoco><option><flag {}/></option><worldbody><body>
   <joint name="swing" axis="0 1 0" damping="0.3" stiffness="2" springref="0.4"/>
   <geom type="box" size="0.1 0.2 0.3" mass="2" pos="0.2 0 0.1"/></body></worldbody></mujoco>"""
