@@ -130,7 +130,7 @@ class _Writer:
         others = [f"{old!r} is {new}" for old, new in named if old != new]
         if others:
             some = ", ".join(others[:_NAMED]) + (", ..." if others[_NAMED:] else "")
-            text = f"{len(others)} that a scene does not take: {some}"
+            text = f"{len(others)} that a scene does not take, kept in its [names]: {some}"
             self.notes.append(Note(self.robot.where, "names", text))
 
     def _tell_links(self) -> None:
