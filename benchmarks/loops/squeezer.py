@@ -152,13 +152,23 @@ def exudyn_runs(data: Data) -> dict[str, Run]:
     return {f"{n} steps": lambda n=n: run(n) for n in (1200 * 2**k for k in range(6))}
 
 
-def cheapest(runs: dict[str, Run], asked: float) -> tuple[str, Run, float]:
-    """The first setting, from coarse to fine, whose error of beta (rad) is as asked, and the error.
+def around(runs: dict[str, Run], asked: float) -> dict[str, tuple[Run, float]]:
+    """The first setting, from coarse to fine, whose error of beta (rad) is as asked, with that
+    before it: how each runs, and its error.
 
     RuntimeError where none is.
     """
+    before: dict[str, tuple[Run, float]] = {}
     for name, run in runs.items():
-        error = abs(run() - BETA)
-        if error <= asked:
-            return name, run, error
+        found = {name: (run, abs(run() - BETA))}
+        if found[name][1] <= asked:
+            return before | found
+        before = found
     raise RuntimeError(f"no setting keeps {asked} rad")
+
+
+def at_error(asked: float, errors: list[float], times: list[float]) -> float:
+    """The time at an error between those of two settings, along a line in logarithms."""
+    if len(times) == 1:
+        return times[0]
+    return float(np.exp(np.interp(-np.log(asked), -np.log(errors), np.log(times))))
