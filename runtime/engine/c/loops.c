@@ -30,17 +30,19 @@ static int let_go(const mstmm_state *state, const mstmm_loop_row *row)
 int mstmm_hook_rows_begun(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
-    real *sums = row_numbers(state, model->n_rows);
-    memset(sums, 0, (size_t)(state->workspace + model->loops + model->loops_summed - sums)
-                        * sizeof(real));
-    for (int r = 0; r < model->n_rows; r++) {
-        const mstmm_loop_row *row = &model->rows[r];
-        real *numbers = row_numbers(state, r);
-        const int keeps = state->refined && !(state->closing > 0);
-        const real told = keeps ? numbers[MSTMM_ROW_X] : 0;
+    const int keeps = state->refined && !(state->closing > 0);
+    real *first = row_numbers(state, 0), *sums = row_numbers(state, model->n_rows);
+    real *end = state->workspace + model->loops + model->loops_summed;
+    for (int r = 0; keeps && r < model->n_rows; r++) {
+        real *numbers = row_numbers(state, r), told = numbers[MSTMM_ROW_X];
         memset(numbers, 0, MSTMM_ROW * sizeof(real));
         numbers[MSTMM_ROW_TOLD] = told;
-        numbers[MSTMM_ROW_PIVOT] =
+    }
+    if (keeps) first = sums; /* else all in one go: each costs its start */
+    memset(first, 0, (size_t)(end - first) * sizeof(real));
+    for (int r = 0; r < model->n_rows; r++) {
+        const mstmm_loop_row *row = &model->rows[r];
+        row_numbers(state, r)[MSTMM_ROW_PIVOT] =
             let_go(state, row) ? (real)INFINITY : row->softness + state->give * row->mobility;
     }
     return model->n_couplings ? mstmm_hook_couplings_valued(state) : 0;
