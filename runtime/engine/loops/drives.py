@@ -62,10 +62,10 @@ def _words(names: list[str], drives: int, surplus: int) -> str:
     told = ", ".join(f'"{name}"' for name in names[:_NAMED]) + " ..." * bool(names[_NAMED:])
     if len(names) == 2:
         told = told.replace(", ", " and ")
-    freedoms = drives - surplus
-    moved = "the same freedom" if freedoms == 1 else f"the same {freedoms} freedoms"
-    less = "one of these drives" if surplus == 1 else f"{surplus} of these drives"
+    alone = drives - surplus == 1
+    moved = "the same freedom" if alone else "the same freedoms"
+    less = "one" if surplus == 1 else "all but one" if alone else "some"
     return (
-        f"the drives of hinges {told} move {moved} of the mechanism; leave out {less}, "
-        "or take a [[bushing]], which yields, in place of a hinge of the loop"
+        f"the drives of hinges {told} move {moved} of the mechanism; leave out {less} of these "
+        "drives, or take a [[bushing]], which yields, in place of a hinge of the loop"
     )

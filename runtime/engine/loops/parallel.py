@@ -26,7 +26,9 @@ from ...pack.packed import Packed
 _SMALL, COUNTING = 0.1, 1e-4
 #: Gaps (m, rad) that an angle leaves, in parts of it, for lengths of 1 m; and angles that are
 #: rounding, rad.
-_LEAVES, _ROUNDING = 10.0, 1e-9
+_LEAVES, _ROUNDING = 4.0, 1e-9
+#: So many hinges move a loop in a plane.
+_MOVING = 4
 #: Angles at both neighbours of a hinge that is off, in parts of the larger, and all others.
 _BOTH, _OTHERS = 0.5, 0.1
 
@@ -65,8 +67,9 @@ def _largest(skews: list[_Skew]) -> float:
 
 def _skews(scene: SceneTables, loop: list[Hinge]) -> list[_Skew]:
     """Of pins that follow each other around a loop, and of what slides where all pins are parallel;
-    empty where other hinges are in it or less than two pins."""
-    if not all(_is_axial(hinge) for hinge in loop):
+    empty where other hinges are in it, less than two pins, or too few to move it in a plane."""
+    moving = sum(not hinge.is_weld for hinge in loop)
+    if moving < _MOVING or not all(_is_axial(hinge) for hinge in loop):
         return []
     between = list(_between_pins(scene, loop))
     if len(between) < 2:

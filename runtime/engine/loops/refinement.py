@@ -13,12 +13,15 @@ from mstmm.errors import NumericalFailure, SceneError
 
 from ...pack.start import start_values
 from ..engine import Engine
+from .parallel import COUNTING, skewed
 
 #: Change of the accelerations, in parts of the largest, that is rounding, and from which on
 #: they are not to be believed.
 _ROUNDING, _WRONG = 1e-12, 1e-6
 #: Part of what weight, speeds or efforts make of them, below which they are balanced.
 _BALANCED = 1e-3
+#: The ratio of masses from which on it may be what loses digits.
+_UNLIKE = 100.0
 #: Refinements at most.
 _MOST = 4
 
@@ -79,11 +82,17 @@ def of_tree(engine: Engine) -> int:
 
 
 def unlike_masses(engine: Engine) -> str:
-    """The heaviest body and the lightest that has a mass, and what to do."""
+    """The heaviest body and the lightest that has a mass, and what to do; where they are alike,
+    what else loses the digits of closed loops."""
     masses = {body.name: body.mass for body in engine.packed.described.body if body.mass > 0}
     if not masses:
         return "bring the masses of bodies nearer together"
     heavy, light = (choose(masses, key=masses.__getitem__) for choose in (max, min))
+    if masses[heavy] < _UNLIKE * masses[light] and engine.packed.system.closes:
+        return skewed(engine.packed, COUNTING) or (
+            "what closes them nearly repeats what others do; make axes parallel and points meet, "
+            "or use a ball or cylindrical hinge"
+        )
     return (
         f'body "{heavy}" ({masses[heavy]:.3g} kg) hangs behind light ones such as "{light}" '
         f"({masses[light]:.3g} kg); bring their masses nearer together"

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import mstmm
+from mstmm.runtime.engine.loops.refinement import unlike_masses
 
 from ..linkages import COUPLER, CRANK, OBLIQUE, four_bar, rod
 
@@ -139,3 +140,41 @@ def test_a_loop_in_which_nothing_is_off_is_told_by_its_lengths() -> None:
     scene = four_bar(tilt=OBLIQUE)
     scene["hinge"][3]["position"] = [float(x) for x in 3 * np.array(scene["hinge"][3]["position"])]
     assert "from parallel" not in refused(scene)
+
+
+def test_a_bar_that_is_too_long_is_not_put_down_to_an_axis() -> None:
+    """What the angle leaves open is far less than what the length does."""
+    scene = four_bar(end={"axis": [math.sin(0.02), 0, math.cos(0.02)]})
+    for body in scene["body"]:
+        body["ends"]["tip"] = [4.0 if body["name"] == "coupler" else body["ends"]["tip"][0], 0, 0]
+    told = refused(scene)
+    assert "correct lengths" in told and "parallel" not in told
+
+
+def test_three_pins_are_a_structure_however_parallel() -> None:
+    bars = [rod("crank", CRANK), rod("coupler", COUPLER)]
+    axes = [[0, 0, 1], [0, 0.05, 1], [0, 0, 1]]
+    ends = [("ground", "crank"), ("crank.tip", "coupler"), ("ground", "coupler.tip")]
+    reach = math.hypot(CRANK, COUPLER)
+    hinges = [
+        {"name": f"pin{k}", "type": "pin", "inboard": inboard, "outboard": outboard, "axis": axis,
+         "position": [reach * (k == 2), 0, 0]}
+        for k, ((inboard, outboard), axis) in enumerate(zip(ends, axes, strict=True))
+    ]  # fmt: skip
+    for hinge in hinges[1:2]:
+        del hinge["position"]
+    assert "parallel" not in refused({"gravity": [0, -9.81, 0], "body": bars, "hinge": hinges})
+
+
+@pytest.mark.parametrize(
+    ("mass", "found"),
+    [(1.3, 'the axis of hinge "knee" is'), (1e6, '"coupler" (1e+06 kg) hangs behind light')],
+)
+def test_lost_digits_are_put_down_to_masses_only_where_these_are_unlike(
+    mass: float, found: str
+) -> None:
+    scene = four_bar(knee={"axis": [math.sin(1e-3), 0, math.cos(1e-3)]})
+    engine = mstmm.compile(mstmm.Scene(**scene), engine="looped").looped
+    scene["body"][1] = rod("coupler", COUPLER, mass)
+    engine.packed.expanded.described = mstmm.Scene(**scene)
+    assert found in unlike_masses(engine)
