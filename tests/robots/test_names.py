@@ -75,3 +75,41 @@ def test_advice_leaves_out_names_of_what_it_takes_away(tmp_path: Path) -> None:
     less = with_tables(scene, hinge=scene.hinge[:3], body=scene.body[:3])
     assert less.names.hinge == {"shoulder-1": "shoulder_1"}
     assert less.names.body == {"1st arm": "link_1st_arm"}
+
+
+def chain_of(first: str) -> str:
+    """Two links on pins about y, 1 m apart: `first`, then "arm"."""
+    mass = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>'
+    return (
+        f'<robot name="r"><link name="base"/><link name="ground_2">{mass}</link>'
+        f'<link name="{first}">{mass}</link><link name="arm">{mass}</link>'
+        + joint("continuous", "base", first, inside='<axis xyz="0 1 0"/>', name="j1")
+        + joint("continuous", first, "arm", inside='<axis xyz="0 1 0"/>', name="j2")
+        + joint("continuous", "arm", "ground_2", name="j3")
+        + "</robot>"
+    )
+
+
+@pytest.mark.parametrize("merge", [True, False])
+def test_a_moving_link_may_be_called_as_the_ground_is(tmp_path: Path, merge: bool) -> None:
+    found = mstmm.import_robot(written(tmp_path, chain_of("ground")), merge=merge)
+    own = found.links["ground"]
+    inboard = {hinge.name: hinge.inboard_body for hinge in found.scene.hinge}
+    assert own == "ground_3" and found.links["ground_2"] == "ground_2"
+    assert inboard["j2"] == own and inboard["j3"] == "arm"
+    assert any("'ground' is ground_3" in note.text for note in found.notes)
+    other = mstmm.import_robot(written(tmp_path, chain_of("upper")), merge=merge)
+    mine, theirs = (mstmm.compile(one.scene).simulate(0.1) for one in (found, other))
+    assert np.array_equal(mine.q, theirs.q)
+    note = next(note.text for note in found.notes if note.element == "names")
+    assert note == "1 that neither a scene nor its [names] take: 'ground' is ground_3"
+
+
+def test_names_that_are_not_kept_are_told_apart(tmp_path: Path) -> None:
+    text = ARM.replace('"jaw"', f'"{"x" * 201}"')
+    notes = [one.text for one in mstmm.import_robot(written(tmp_path, text)).notes
+             if one.element == "names"]  # fmt: skip
+    assert len(notes) == 2
+    assert notes[0].startswith("4 that a scene does not take, kept in its [names]: '1st arm' is")
+    assert notes[1].startswith("1 that neither a scene nor its [names] take: 'xxxx")
+    assert len(notes[1]) < 200

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from ...arguments import short
 from ...errors import SceneError
 from ...numbers.pose import IN_PLACE, Pose
 from ...numbers.rotations import IDENTITY, to_quaternion
@@ -29,6 +30,8 @@ COUPLED, HELD = MIMICS = ("coupled", "held")
 _OF_ONE = ("pin", "prismatic")
 #: So many names are told.
 _NAMED = 6
+#: The owner of what stands on the ground: no link is called so, though one may be called "ground".
+_STILL = ""
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,7 @@ class _Writer:
         for name in sorted(self.held, key=list(tree.joints).index):
             what = "nothing that it carries has mass, so it is held fixed"
             self._tell(tree.joints[name], f"joint {name!r}", what)
-        #: Link -> the link whose body it is part of, or the ground, and its frame there.
+        #: Link -> the link whose body it is part of, or _STILL, and its frame there.
         self.place = dict[str, tuple[str, Pose]]()
         for link in tree.outward:
             self.place[link.name] = self._placed(link)
@@ -115,7 +118,8 @@ class _Writer:
         hinges = Names()
         moving = [one.name for one in robot.joints if self.place[one.child][0] == one.child]
         self.joints = hinges.take_all(moving, "joint")
-        self._tell_names()
+        #: Place of the notes on names, which are known when all ends are.
+        self._told = len(self.notes)
         self._tell_links()
         #: What the joints that move go with.
         self.mimics = {mimic.of: mimic for mimic in mimics if self._moves(mimic.of)}
@@ -124,14 +128,24 @@ class _Writer:
         self._ends: defaultdict[str, dict[str, Any]] = defaultdict(dict)
         self.links = {link.name: self._frame(link) for link in robot.links}
 
-    def _tell_names(self) -> None:
-        """Links and joints that have other names in the scene, the first by name."""
-        named = (*self._bodies.items(), *self.joints.items())
-        others = [f"{old!r} is {new}" for old, new in named if old != new]
-        if others:
-            some = ", ".join(others[:_NAMED]) + (", ..." if others[_NAMED:] else "")
-            text = f"{len(others)} that a scene does not take, kept in its [names]: {some}"
-            self.notes.append(Note(self.robot.where, "names", text))
+    def _tell_names(self, names: Mapping[str, Mapping[str, str]]) -> None:
+        """Links and joints that have other names in the scene, the first by name; `names` are
+        those that it keeps."""
+        kept_, rest = list[str](), list[str]()
+        for table, named in (("body", self._bodies), ("hinge", self.joints)):
+            for old, new in named.items():
+                if old != new:
+                    known = names.get(table, {}).get(old) == new
+                    (kept_ if known else rest).append(f"{short(old)} is {new}")
+        told = (
+            (kept_, "that a scene does not take, kept in its [names]"),
+            (rest, "that neither a scene nor its [names] take"),
+        )
+        for others, what in reversed(told):
+            if others:
+                some = ", ".join(others[:_NAMED]) + (", ..." if others[_NAMED:] else "")
+                text = f"{len(others)} {what}: {some}"
+                self.notes.insert(self._told, Note(self.robot.where, "names", text))
 
     def _tell_links(self) -> None:
         """Links that are no bodies of their own, and those that move without mass."""
@@ -139,7 +153,7 @@ class _Writer:
             joint, (owner, _) = self.tree.holder.get(link.name), self.place[link.name]
             if joint is None:
                 continue
-            if owner == GROUND:
+            if owner == _STILL:
                 self._tell(joint, f"link {link.name!r}", "part of the ground")
             elif owner != link.name:
                 what = "part of the body that holds it, in which its name finds its frame"
@@ -166,7 +180,9 @@ class _Writer:
             found["shape"] = shapes
         ends = {f"{self._bodies[name]}.{end}" for name in self._ends for end in self._ends[name]}
         own = {GROUND, *self._bodies.values(), *ends}
-        if names := kept(self._named_links(), self.joints, own):
+        names = kept(self._named_links(), self.joints, own)
+        self._tell_names(names)
+        if names:
             found["names"] = names
         return found
 
@@ -176,7 +192,7 @@ class _Writer:
         bodies = dict.fromkeys((*self._bodies, *self.links))
         return {
             name: self.links[name] for name in bodies
-            if self.place[name] == (GROUND, IN_PLACE) or self.links[name] != GROUND
+            if self.place[name] == (_STILL, IN_PLACE) or self.links[name] != GROUND
         }  # fmt: skip
 
     def _tell(self, one: Link | Joint, element: str, text: str) -> None:
@@ -187,7 +203,7 @@ class _Writer:
         if joint is None:
             empty = link.mass == 0 and link.inertia == NOTHING
             grounded = self.choices.base == FIXED and (empty or self.choices.merge)
-            return (GROUND if grounded else link.name), IN_PLACE
+            return (_STILL if grounded else link.name), IN_PLACE
         if self.choices.merge and (joint.type == FIXED or joint.name in self.held):
             owner, pose = self.place[joint.parent]
             return owner, pose.then(joint.pose)
@@ -196,7 +212,7 @@ class _Writer:
     def _frame(self, link: Link) -> str:
         """The body or the end that a link is."""
         owner, pose = self.place[link.name]
-        if owner == GROUND:
+        if owner == _STILL:
             return GROUND
         return self._end(owner, pose, link.name)
 
@@ -240,7 +256,7 @@ class _Writer:
             joint = self.tree.joints[name]
             still = joint.name in self.held
             owner, frame = self.place[joint.parent]
-            pose, grounded = frame.then(joint.pose), owner == GROUND
+            pose, grounded = frame.then(joint.pose), owner == _STILL
             yield {
                 "name": hinge,
                 "type": FIXED if still else joint.type,
@@ -336,7 +352,7 @@ class _Writer:
                     self._tell(link, f"link {look.link!r}", f"no mesh {file!r} to draw it with")
                     continue
                 keys["file"] = found
-            on = GROUND if owner == GROUND else self._bodies[owner]
+            on = GROUND if owner == _STILL else self._bodies[owner]
             yield {"on": on, **_keys(pose), **keys}
 
 

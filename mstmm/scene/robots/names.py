@@ -26,7 +26,7 @@ class Names:
         becomes one of `others`."""
         waiting, found = list(names), dict[str, str]()
         for stays in (True, False):
-            some = [name for name in waiting if bool(_TAKEN.fullmatch(name)) == stays]
+            some = [name for name in waiting if _stays(name) == stays]
             found |= {name: self.take(name, instead) for name in some}
             self._taken.update(others)
         return {name: found[name] for name in waiting}
@@ -43,6 +43,10 @@ class Names:
             found = f"{plain}_{count}"
         self._taken.add(found)
         return found
+
+
+def _stays(name: str) -> bool:
+    return bool(_TAKEN.fullmatch(name)) and name != GROUND
 
 
 def kept(
