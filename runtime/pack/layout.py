@@ -300,12 +300,12 @@ class _ByName(Mapping[str, HingeSlots]):
         self.layout = layout
 
     def __getitem__(self, name: str) -> HingeSlots:
-        number = self.layout._numbers.find(name)
-        if number is None:
-            number = self.layout._numbers.find(self.layout._names.of_hinge(name))
-        if number is not None and number not in self.layout.internal:
-            return self.layout.slots(number)
-        return self.layout.modal[name]
+        layout = self.layout
+        for one in dict.fromkeys((name, layout._names.of_hinge(name))):
+            number = layout._numbers.find(one)
+            if number is not None and number not in layout.internal:
+                return layout.slots(number)
+        return layout.modal[name]
 
     def __iter__(self) -> Iterator[str]:
         internal = self.layout.internal

@@ -78,11 +78,17 @@ def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
     """
     data = data_of(scene)
     there: dict[str, float] | None = None
+    given_as = dict[str, str]()
     for path, given in by_name("parameters", changes).items():
         value = real(f'parameter "{path}"', given)
-        if not any(_set(data, own, value) for own in scene.names.meant(path)):
+        own = next((one for one in scene.names.meant(path) if _set(data, one, value)), None)
+        if own is None:
             there = there or read(scene)
             raise _unknown(path, there)
+        if own in given_as:
+            other = given_as[own]
+            raise SceneError(f'parameters "{other}" and "{path}" are one number; give one of them')
+        given_as[own] = path
     for beam in data.get("beam", []):  # an end "tip" with axes of its own stays at the tip
         if "tip" in beam["ends"]:
             beam["ends"]["tip"]["position"] = [beam["length"], 0.0, 0.0]

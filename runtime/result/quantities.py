@@ -187,8 +187,8 @@ class Quantities:
         """Names of one owner."""
         if owner not in self._tables:
             table = Table({}, [])
-            hinges, others = self.layout.hinges, (self.layout.modal, self._named.hinge)
-            if owner in hinges and not any(owner in known for known in others):
+            hinges, own = self.layout.hinges, self._named.hinge.get(owner, owner) == owner
+            if own and owner in hinges and owner not in self.layout.modal:
                 add_hinge(table, self.acting, hinges[owner])
             elif owner in self.observed.references:
                 self._body(table, owner)

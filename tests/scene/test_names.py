@@ -79,6 +79,39 @@ def test_numbers_and_channels_are_found_by_them() -> None:
         assert np.array_equal(mine, other)
 
 
+def test_one_number_by_two_names_is_refused() -> None:
+    model = mstmm.compile(mstmm.Scene(**data()))
+    with pytest.raises(mstmm.SceneError, match='"arm-1.mass" and "arm_1.mass" are one number'):
+        model.with_parameters({"arm-1.mass": 2.0, "arm_1.mass": 3.0})
+
+
+def test_a_hinge_that_others_call_as_the_scene_does_stays() -> None:
+    plain = mstmm.compile(mstmm.Scene(**data(names={}))).simulate(0.1)
+    run = mstmm.compile(mstmm.Scene(**data(names={"hinge": {"joint_1": "joint_1"}}))).simulate(0.1)
+    assert run.names() == plain.names()
+    assert np.array_equal(run.quantity("joint_1.angle").values, run.q[:, 0])
+
+
+def test_a_hinge_is_not_called_as_a_flexible_body_is() -> None:
+    beam = {"name": "rod", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 50.0,
+            "polar_inertia_per_length": 1e-3, "torsional_stiffness": 10.0,
+            "modes": {"y": 2, "z": 2, "twist": 1}}  # fmt: skip
+    root = {"name": "root", "type": "fixed", "inboard": "arm_1.tool", "outboard": "rod"}
+    more = {"beam": [beam], "hinge": [*data()["hinge"], root]}
+    with pytest.raises(mstmm.SceneError, match='"rod" is the name of a flexible body of the scene'):
+        mstmm.Scene(**data(names={"hinge": {"rod": "joint_1"}}, **more))
+
+
+def test_names_of_members_of_chains_stay_their_own() -> None:
+    pattern = {"body": {"mass": 1.0, "inertia": [0.1] * 3, "ends": {"tip": [1, 0, 0]}},
+               "hinge": {"type": "pin", "axis": [0, 1, 0]}}  # fmt: skip
+    chain = {"name": "rope", "count": 2, "inboard": "ground", **pattern}
+    more = {"chain": [chain], "names": {"hinge": {"rope[0]": "joint_1"}}}
+    run = mstmm.compile(mstmm.Scene(**data(**more))).simulate(0.1)
+    assert "rope[0].hinge.angle" in run.names()
+    assert run.quantity("rope[0].hinge.angle").values.any()
+
+
 def test_a_name_of_the_scene_itself_goes_first() -> None:
     names = {"hinge": {"arm_1": "joint_1"}}
     run = mstmm.compile(mstmm.Scene(**data(names=names))).simulate(0.1)
@@ -109,6 +142,8 @@ def test_a_wrong_name_is_told_with_the_nearest_one(ask: Any, message: str) -> No
         ({"body": ["a"]}, "names.body: expected a table of bodies and ends by the names"),
         ({"body": {"a-b": 3}}, "names.body.'a-b': expected a name of the scene, found 3"),
         ({"body": {"": "arm_1"}}, "expected printable names of 1 to 200 characters"),
+        ({"body": {"  ": "arm_1"}}, "characters, not blanks alone"),
+        ({"body": {"a-b": "arm_1."}}, 'there is no body or end "arm_1."'),
         ({"body": {"a\n": "arm_1"}}, "expected printable names of 1 to 200 characters"),
         ({"body": {"a" * 201: "arm_1"}}, "expected printable names of 1 to 200 characters"),
         ({"body": {"a-b": "arm"}}, 'no body or end "arm"; did you mean "arm_1"?'),

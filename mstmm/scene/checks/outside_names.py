@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..rules.messages import Problem, near
 from ..rules.values import GROUND, split
+from .names import flexible
 
 if TYPE_CHECKING:
     from ..tables.all import SceneTables
@@ -15,9 +16,9 @@ if TYPE_CHECKING:
 
 def problems(scene: SceneTables) -> Iterator[Problem]:
     """Names for what is not there, and names that something else has in the scene."""
-    bodies, hinges = scene.skeleton.bodies, scene.hinges
+    bodies, hinges, modal = scene.skeleton.bodies, scene.hinges, flexible(scene)
     for name, one in scene.names.body.items():
-        if not _is_there(one, bodies):
+        if one.endswith(".") or not _is_there(one, bodies):
             hint = near(split(one)[0], (GROUND, *bodies.names()))
             yield ("names", "body", name), f'there is no body or end "{one}"{hint}'
         elif name != one and _is_there(name, bodies):
@@ -27,6 +28,8 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
             yield ("names", "hinge", name), hinges.missing(one)
         elif name != one and hinges.find(name) is not None:
             yield ("names", "hinge", name), _taken(name, "a hinge")
+        elif name in modal:
+            yield ("names", "hinge", name), _taken(name, "a flexible body")
 
 
 def _taken(name: str, what: str) -> str:

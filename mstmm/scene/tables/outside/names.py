@@ -14,8 +14,10 @@ LONGEST = 200
 
 
 def is_name(name: object) -> bool:
-    """Whether others may call something so: printable text of `LONGEST` characters at most."""
-    return isinstance(name, str) and 0 < len(name) <= LONGEST and name.isprintable()
+    """Whether others may call something so: printable text of `LONGEST` characters at most, not of
+    blanks alone."""
+    known = isinstance(name, str) and len(name) <= LONGEST and name.isprintable()
+    return known and bool(name.strip())
 
 
 def _names(of: str, example: str) -> Rule:
@@ -27,7 +29,7 @@ def _names(of: str, example: str) -> Rule:
         problems = list[tuple[Location, str]]()
         for name, one in value.items():
             if not is_name(name):
-                what = f"expected printable names of 1 to {LONGEST} characters"
+                what = f"expected printable names of 1 to {LONGEST} characters, not blanks alone"
                 problems.append(((str(name),), what))
             elif not isinstance(one, str):
                 problems.append(((name,), f"expected a name of the scene, found {found(one)}"))
