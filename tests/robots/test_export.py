@@ -188,3 +188,40 @@ def test_a_wheel_is_rated_without_a_range(tmp_path: Path) -> None:
 def test_ratings_that_are_none_are_refused(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(mstmm.SceneError, match=message):
         mstmm.Scene(gravity=[0, 0, -9.81], body=[BAR], hinge=[PIN | changes])
+
+
+@pytest.mark.parametrize(
+    ("stops", "rated", "written_"),
+    [
+        ({"lower": 2.0}, {"upper": 1.0}, None),
+        ({"lower": 2.0}, {"lower": -1.0, "upper": 1.0}, ("-1.0", "1.0")),
+        ({"lower": 2.0, "upper": 3.0}, {"lower": -1.0, "upper": 1.0}, ("2.0", "3.0")),
+        ({"lower": -0.5}, {"lower": -1.0, "upper": 1.0}, ("-0.5", "1.0")),
+    ],
+)
+def test_a_range_is_never_upside_down(
+    stops: dict[str, float], rated: dict[str, float], written_: tuple[str, str] | None
+) -> None:
+    pin = {**HINGES[0], "outboard": "rod", "law": {"limits": stops | {"stiffness": 10.0}}}
+    rod = {"name": "rod", "mass": 1, "inertia": [1, 1, 1]}
+    found = mstmm.export_robot(
+        mstmm.Scene(gravity=[0, 0, -9.81], body=[rod], hinge=[pin | {"rated": rated}])
+    )
+    range_ = None if written_ is None else '<limit lower="{}" upper="{}"'.format(*written_)
+    assert ("<limit" in found.text) == (range_ is not None) and (range_ or "") in found.text
+    told = any("stops that its rated range contradicts" in note.text for note in found.notes)
+    assert told == (stops == {"lower": 2.0})
+
+
+def test_links_of_ends_have_names_of_their_own() -> None:
+    bodies = [{"name": name, "mass": 1, "inertia": [1, 1, 1], "ends": {"tip": [0, 0, 1]}}
+              for name in ("a", "b", "a_tip")]  # fmt: skip
+    hinges = [{"name": f"to_{one['name']}", "type": "pin", "inboard": "ground",
+               "outboard": one["name"]} for one in bodies]  # fmt: skip
+    names = {"body": {"b_tip": "a_tip"}}
+    for more in ({}, {"names": names}):
+        text = mstmm.export_robot(
+            mstmm.Scene(gravity=[0, 0, -9.81], body=bodies, hinge=hinges, **more)
+        ).text
+        links = [line for line in text.splitlines() if "<link" in line]
+        assert len(links) == len(set(links)) == 7

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 _LEFT_OUT = (
     "load", "spring", "bushing", "event", "input", "signal", "output", "controller",
 )  # fmt: skip
+#: What a range has.
+_ENDS = ("lower", "upper")
 #: Types of shapes that URDF draws.
 _DRAWN = ("box", "sphere", "cylinder", "mesh")
 #: What importers of URDF take for granted, m/s^2.
@@ -90,6 +93,7 @@ class _Reader:
             or (end != held.get(body.name) and not self._is_of_joint(body.name, end))
         ]  # fmt: skip
         self._once = Counter([*dict.fromkeys(links), *(end for _, end in self.ends)])
+        self._taken = {self.world, *self._once}
 
     def robot(self, name: str) -> Robot:
         ends = [self._end_link(*one) for one in self._fixed()]
@@ -115,8 +119,13 @@ class _Reader:
             yield from ((body, "", name) for name in self.named.get(body, ())[1:])
 
     def _end_name(self, body: str, end: str) -> str:
-        alone = self._once[end] == 1 and end != self.world
-        return end if alone else f"{self._link_name(body)}_{end}"
+        if self._once[end] == 1 and end != self.world:
+            return end
+        name = f"{self._link_name(body)}_{end}"
+        while name in self._taken:
+            name += "_"
+        self._taken.add(name)
+        return name
 
     def _note(self, element: str, text: str) -> None:
         self.notes.append(Note("scene", element, text))
@@ -176,6 +185,8 @@ class _Reader:
             "damping": not one and any(law.damping for law in laws),
             "friction": not one and any(law.friction.acts for law in laws),
             "stiffness of its stops": any(law.limits.acts for law in laws),
+            "stops that its rated range contradicts": one and not _said(
+                laws[0].limits, *_ENDS).items() <= _range(hinge).items(),
             "start": hinge.initial is not None and (
                 hinge.initial.q != facts.start or any(hinge.initial.u or ())
             ),
@@ -270,9 +281,17 @@ def _keys(hinge: Hinge) -> dict[str, Any]:
     law: dict[str, Any] = {"damping": entry.damping} if entry.damping else {}
     if entry.friction.acts:
         law["friction"] = {"coulomb": entry.friction.coulomb}
-    if entry.limits.acts:
-        law["limits"] = _said(entry.limits, "lower", "upper")
-    return keys | {"law": law, "rated": _said(hinge.rated, "lower", "upper", "effort", "velocity")}
+    return keys | {"law": law, "rated": _range(hinge) | _said(hinge.rated, "effort", "velocity")}
+
+
+def _range(hinge: Hinge) -> dict[str, float]:
+    """Where a hinge of one coordinate ends (m or rad): at its stops, where there is none as rated.
+    Where these contradict each other, what has both ends; nothing where none has."""
+    stops, rated = (_said(one, *_ENDS) for one in (hinge.law.entry(0).limits, hinge.rated))
+    both = {**rated, **stops}
+    if both.get("lower", -math.inf) < both.get("upper", math.inf):
+        return both
+    return rated if len(rated) == len(_ENDS) else {}
 
 
 def _said(table: Any, *keys: str) -> dict[str, float]:

@@ -70,7 +70,7 @@ def _visual(one: Element, look: Look) -> None:
 
 def _joint(root: Element, joint: Joint, mimic: Mimic | None) -> None:
     kind, law = BY_HINGE[joint.type], joint.keys.get("law", {})
-    limits = {**joint.keys.get("rated", {}), **law.get("limits", {})}
+    limits = joint.keys.get("rated", {})
     ends = {"lower", "upper"} & limits.keys()
     type_ = LIMITED.get(kind.joint, kind.joint) if ends else kind.joint
     one = SubElement(root, "joint", name=joint.name, type=type_)
