@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -66,4 +67,38 @@ def test_an_include_of_what_is_no_xml_is_refused(tmp_path: Path) -> None:
     (tmp_path / "part.xml").write_text("<mujoco>")
     (tmp_path / "robot.xml").write_text(include("part.xml"))
     with pytest.raises(mstmm.SceneError, match=r"^part\.xml: line 1: not valid XML"):
+        mstmm.import_robot(tmp_path / "robot.xml")
+
+
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [
+        ("..\\other.xml", "expected a file in the folder of the model or below it"),
+        ("parts", "this is not a regular file"),
+        ("pipe.xml", "this is not a regular file"),
+        ("ring.xml", "cannot be read"),
+        ("empty.xml", "the file is empty"),
+        ("", "expected the name of a file"),
+        ("x" * 5000, "cannot be read: File name too long"),
+    ],
+)
+def test_includes_of_what_is_no_file_are_refused(tmp_path: Path, file: str, message: str) -> None:
+    folder = tmp_path / "robot"
+    (folder / "parts").mkdir(parents=True)
+    (tmp_path / "other.xml").write_text("<mujoco/>")
+    (folder / "empty.xml").write_text(" ")
+    (folder / "ring.xml").symlink_to(folder / "ring.xml")
+    os.mkfifo(folder / "pipe.xml")
+    (folder / "robot.xml").write_text(include(file))
+    with pytest.raises(mstmm.SceneError, match=message) as raised:
+        mstmm.import_robot(folder / "robot.xml")
+    assert "robot.xml: line 2: <include> file '" in str(raised.value)
+    assert len(str(raised.value)) < 200 + len(str(folder))
+
+
+def test_a_backslash_is_looked_through_as_a_slash(tmp_path: Path) -> None:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "a.xml").write_text(ENTITY)
+    (tmp_path / "robot.xml").write_text(include("parts\\a.xml"))
+    with pytest.raises(mstmm.SceneError, match=r"a\.xml: line 1: a document type or an entity"):
         mstmm.import_robot(tmp_path / "robot.xml")

@@ -46,6 +46,8 @@ _NAMED = {
     "exclude": ("nexclude", "contact"),
 }  # fmt: skip
 _JOINT_EQUALITY = 2
+#: So much of what MuJoCo says is told, in characters.
+_LONGEST = 400
 #: Groups of shapes that are there to be seen.
 _SEEN = 3
 
@@ -63,6 +65,7 @@ def read_mjcf(path: str, where: str, places: Places | None = None) -> Robot:
         model = mujoco.MjModel.from_xml_path(path)
     except (ValueError, OSError) as error:
         why = " ".join(str(error).split())
+        why = why if len(why) <= _LONGEST else f"{why[:_LONGEST]}..."
         raise SceneError(f"{where}: MuJoCo does not read it: {why}") from None
     return _Reader(mujoco, model, where, places or {}).robot()
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 
+from ...arguments import short
 from ...errors import SceneError
 from ..files.read import content_of
 from .markup import Element, parsed
@@ -43,7 +45,10 @@ def looked_through(content: bytes, path: Path, where: str) -> Places:
                     seen.add(other)
                     shown = str(other.relative_to(folder))
                     ending = {other.suffix.lower(): _LARGEST}
-                    waiting.append((content_of(other, ending, "MJCF")[1], other, shown))
+                    inside = content_of(other, ending, "MJCF")[1]
+                    if not inside.strip():
+                        raise _refused(one, "the file is empty")
+                    waiting.append((inside, other, shown))
         if len(seen) > _MOST:
             raise SceneError(f"{where}: the model has more than {_MOST} files")
     return found
@@ -51,17 +56,32 @@ def looked_through(content: bytes, path: Path, where: str) -> Places:
 
 def _others(one: Element, folder: Path, beside: Path) -> Iterator[Path]:
     """The files that an element may mean: from the folder of the model, and from that of its own
-    file; those that are there."""
+    file; those that are there.  MuJoCo takes a backslash for a slash."""
     name = one.attributes["file"]
+    if not name.strip():
+        raise _refused(one, "expected the name of a file")
+    names = dict.fromkeys((name, name.replace("\\", "/")))
     for start in dict.fromkeys((folder, beside)):
-        other = (start / name).resolve()
-        if not other.is_relative_to(folder):
-            raise SceneError(
-                f"{one.where}: <{one.tag}> file {name[:60]!r}: expected a file in the folder of "
-                "the model or below it; copy it there"
-            )
-        if other.is_file():
+        for each in names:
+            try:
+                other = (start / each).resolve()
+                mode = other.stat().st_mode if other.is_relative_to(folder) else None
+            except (FileNotFoundError, NotADirectoryError):
+                continue
+            except (OSError, RuntimeError, ValueError) as error:  # names too long, rings of links
+                why = getattr(error, "strerror", None) or "links to itself"
+                raise _refused(one, f"cannot be read: {why}") from None
+            if mode is None:
+                raise _refused(
+                    one, "expected a file in the folder of the model or below it; copy it there"
+                )
+            if not stat.S_ISREG(mode):
+                raise _refused(one, "this is not a regular file; name one")
             yield other
+
+
+def _refused(one: Element, why: str) -> SceneError:
+    return SceneError(f"{one.where}: <{one.tag}> file {short(one.attributes['file'])}: {why}")
 
 
 def _all(one: Element) -> Iterator[tuple[str, Element]]:
