@@ -177,9 +177,18 @@ def test_a_wheel_is_rated_without_a_range(tmp_path: Path) -> None:
     assert 'type="continuous"' in text and '<limit effort="1000000000.0" velocity="5.0" />' in text
 
 
+@pytest.mark.parametrize("value", ["inf", "nan", "", "many"])
+def test_ratings_that_are_no_numbers_are_left_out(tmp_path: Path, value: str) -> None:
+    found = mstmm.import_robot(written(tmp_path, ARM.replace('"30"', f'"{value}"')))
+    assert found.scene.hinge[0].rated == Rated(lower=-1.0, upper=2.0, velocity=5.0)
+    told = f"limits that are no finite numbers left out: effort '{value}'"
+    assert told in [note.text for note in found.notes]
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        ({"rated": {"lower": 1.0, "upper": 1.0}}, "must be below upper \\(1\\)$"),
         ({"rated": {"lower": 1.0, "upper": 0.0}}, "rated.lower: lower \\(1\\) must be below upper"),
         ({"rated": {"effort": -1.0}}, "rated.effort: expected a number in N or N m, 0 or more"),
         ({"type": "ball", "rated": {"effort": 1.0}}, "rated: only hinges of one coordinate are"),

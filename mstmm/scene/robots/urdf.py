@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any, NamedTuple
 
+from ...arguments import short
 from ...errors import SceneError
 from ...numbers.pose import IN_PLACE, Pose
 from ...numbers.rotations import Matrix, Vector, from_rpy, perpendicular, product, transpose
@@ -166,12 +167,19 @@ class _Reader:
 
     def _rated(self, limit: Element, name: str) -> dict[str, float]:
         """Largest effort and speed, which are told: nothing stops there."""
-        units = {"effort": "N m or N", "velocity": "rad/s or m/s"}
-        given = {key: limit.number(key, 0.0, its) for key, its in units.items()
-                 if key in limit.attributes}  # fmt: skip
+        given, unread = dict[str, float](), list[str]()
+        for key, unit in (("effort", "N m or N"), ("velocity", "rad/s or m/s")):
+            if key in limit.attributes:
+                try:
+                    given[key] = limit.number(key, 0.0, unit)
+                except SceneError:
+                    unread.append(f"{key} {short(limit.attributes[key])}")
         kept = {key: number for key, number in given.items() if number >= 0 and number != NO_LIMIT}
         if kept:
             what = "limits of effort and velocity stop nothing here; they are kept as rated"
+            self.note(limit, f"joint {name!r}", what)
+        if unread:
+            what = f"limits that are no finite numbers left out: {', '.join(unread)}"
             self.note(limit, f"joint {name!r}", what)
         if any(number < 0 for number in given.values()):
             self.note(limit, f"joint {name!r}", "limits of effort or velocity below 0 left out")

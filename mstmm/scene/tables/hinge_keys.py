@@ -35,9 +35,9 @@ class Rated(Table):
     @model_validator(mode="after")
     def _check(self) -> Rated:
         if self.lower is not None and self.upper is not None and self.lower >= self.upper:
-            raise rules.refuse(
-                f"lower ({self.lower:g}) must be below upper ({self.upper:g}); swap them", "lower"
-            )
+            hint = "; swap them" if self.lower > self.upper else ""
+            what = f"lower ({self.lower:g}) must be below upper ({self.upper:g}){hint}"
+            raise rules.refuse(what, "lower")
         return self
 
 

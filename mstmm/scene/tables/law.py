@@ -65,9 +65,9 @@ class Limits(Table):
     @model_validator(mode="after")
     def _check(self) -> Limits:
         if self.lower is not None and self.upper is not None and self.lower >= self.upper:
-            raise rules.refuse(
-                f"lower ({self.lower:g}) must be below upper ({self.upper:g}); swap them", "lower"
-            )
+            hint = "; swap them" if self.lower > self.upper else ""
+            what = f"lower ({self.lower:g}) must be below upper ({self.upper:g}){hint}"
+            raise rules.refuse(what, "lower")
         if not self.acts and (self.stiffness > 0 or self.damping > 0 or self.restitution):
             raise rules.refuse("limits need lower, upper or both", "lower")
         return self if self.restitution is None else self._hard(self.restitution)
