@@ -159,6 +159,16 @@ def test_words_that_are_none_are_refused() -> None:
             mstmm.compile(arm(), simplify=wrong)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("word", ["welds", "links"])
+def test_what_is_done_or_not_is_said_by_true_or_false(word: str) -> None:
+    for wrong in ("no", 1e-3, None, 2):
+        with pytest.raises(mstmm.SceneError, match=f"simplify: {word}: expected True or False"):
+            mstmm.compile(arm(), simplify={word: wrong})
+    for given in (0, 1, False, True):
+        merged = len(otherwise(mstmm.compile(arm(), simplify={word: given})))
+        assert merged == (0 if word == "welds" and not given else 2)
+
+
 def test_where_loops_are_closed_nothing_is_merged_but_couplings_couple_parts() -> None:
     row = {"name": "follows", "expression": "shoulder.q^2 + elbow.q", "equals": 0.9}
     few, all_ = both(arm(coupling=[row]))

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from mstmm.arguments import texts_of
+import numpy as np
+
+from mstmm.arguments import short, texts_of
 from mstmm.arrays import real
 from mstmm.errors import SceneError
 
@@ -64,6 +66,8 @@ def asked_for(simplify: bool | Collection[str] | Words) -> Words:
             )
     if not isinstance(simplify, Mapping):
         return {word: USUAL[word] for word in words}
+    for word in (WELDS, LINKS):
+        _check_switch(word, simplify.get(word, True))
     found = {word: USUAL[word] if given is True else given for word, given in simplify.items()}
     found = {**USUAL, **found}
     turns = real("simplify: turns", found.get(TURNS) or 0.0)
@@ -73,3 +77,8 @@ def asked_for(simplify: bool | Collection[str] | Words) -> Words:
             f"{USUAL[TURNS]:g}"
         )
     return {word: given for word, given in found.items() if given}
+
+
+def _check_switch(word: str, given: object) -> None:
+    if not (isinstance(given, bool | int | np.bool_) and given in (0, 1)):
+        raise SceneError(f"simplify: {word}: expected True or False, found {short(given)}")

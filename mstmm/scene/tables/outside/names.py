@@ -16,8 +16,9 @@ LONGEST = 200
 def is_name(name: object) -> bool:
     """Whether others may call something so: printable text of `LONGEST` characters at most, not of
     blanks alone."""
-    known = isinstance(name, str) and len(name) <= LONGEST and name.isprintable()
-    return known and bool(name.strip())
+    if not isinstance(name, str) or len(name) > LONGEST:
+        return False
+    return name.isprintable() and bool(name.strip())
 
 
 def _names(of: str, example: str) -> Rule:
