@@ -26,10 +26,8 @@ FOLDERS = (
     Path("runtime/engine/states/c"),
 )  # fmt: skip
 PASTED = Path("templates")
-
-#: Generated files that are compiled as one: small kernels of a sweep then become part of the passes
-#: that call them, which takes a seventh off those of closed loops in a plane.
-TOGETHER = ("sweep_planar_pin.c", "sweep_loops.c", "sweep_frames.c", "sweep_steps.c")
+#: The unit that others are part of, which are not compiled by themselves.
+PASSES = Path("runtime/engine/c/passes.c")
 
 MODULE = "mstmm.generated._kernels"
 
@@ -111,20 +109,18 @@ def ffibuilder() -> FFI:
 
     if not any(GENERATED.glob("*.c")):
         raise FileNotFoundError(f"{GENERATED}/ holds no C source; run `python -m mstmm generate`")
-    alone = [
-        source for folder in FOLDERS for source in sorted(folder.glob("*.c"))
-        if source.name not in TOGETHER
-    ]  # fmt: skip
-    found, together = headers(FOLDERS), [GENERATED / name for name in TOGETHER]
+    sources = [source for folder in FOLDERS for source in sorted(folder.glob("*.c"))]
+    part = _INCLUDE.findall(PASSES.read_text()) if PASSES.is_file() else ()
+    found, parts = headers(FOLDERS), [source for source in sources if source.name in part]
     builder = FFI()
     builder.cdef("\n".join(cdef(header) for header in found))
     builder.cdef(f"static char *const {BUILT_FROM};")
     identity = f'static char *const {BUILT_FROM} = "{built_from(Path())}";'
     builder.set_source(
         MODULE,
-        "\n".join([*(f'#include "{text.name}"' for text in (*found, *together)), identity]),
-        sources=[source.as_posix() for source in alone],
-        depends=[path.as_posix() for path in (*found, *together, *sorted(PASTED.glob("*.c")))],
+        "\n".join([*(f'#include "{header.name}"' for header in found), identity]),
+        sources=[source.as_posix() for source in sources if source not in parts],
+        depends=[path.as_posix() for path in (*found, *parts, *sorted(PASTED.glob("*.c")))],
         include_dirs=[*(folder.as_posix() for folder in (*FOLDERS, PASTED)), np.get_include()],
         extra_compile_args=[*COMPILE_ARGS, *WARNING_ARGS],
         libraries=["m"],
