@@ -199,7 +199,7 @@ class Run:
         run.max_step, run.max_steps = settings.max_step, settings.max_steps
         run.tangents = TANGENTS.index(settings.tangent)
         self.call_back(0)
-        given = np.full(system.n_error, settings.atol if atol is None else atol)
+        given = np.full(system.n_error, settings.atol if atol is None else atol, np.float64)
         run.atol = self._atol = self._ffi.from_buffer("double[]", given)
         run.workspace = self._space = self._room(run.tableau)
         self._samples: list[Samples] = []
