@@ -103,7 +103,7 @@ class Runs:
             if isinstance(result, OneWayResult) and result.success:
                 _ = result.cost  # makes the elastic response, which is part of what it is for
             spent = time.process_time() - begin
-        if interrupted[0] or result.status is None:
+        if interrupted or result.status is None:
             raise KeyboardInterrupt
         return result, spent
 

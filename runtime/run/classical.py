@@ -150,7 +150,7 @@ class _Run:
                 self.tell(self.t)
                 if failed:
                     return failed
-                if interrupted[0]:
+                if interrupted:
                     return None, f"interrupted at t = {self.t:.9g} s"
                 if self.kept.bytes > LARGEST:
                     return None, f"{self._at('the samples fill the memory')}; ask for output times"

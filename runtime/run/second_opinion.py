@@ -20,7 +20,7 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
 from ..engine.jacobian import Jacobian
-from ..host.interruptible import interruptible
+from ..host.interruptible import Interrupt, interruptible
 from ..integrate.loop import Failure, Samples, Statistics, Status, failure_text
 from ..integrate.settings import Settings
 from . import sundials
@@ -170,7 +170,7 @@ class _Loop:
         self.met, self.apart = settings.t_start, 0.0
         self.sizes: list[float] = []
         self.t, self.last = settings.t_start, np.zeros(0)
-        self.flag = [False]
+        self.interrupted = Interrupt()
         calls = self.system.calls
         self.n_events = int(calls.n_events)
         self.closes = self.system.engine.packed.system.closes
@@ -186,16 +186,16 @@ class _Loop:
         stops = np.union1d(self.known.breaks, self.known.starts).tolist()
         inner = [b for b in stops if settings.t_start < b < settings.t_end]
         status: Status | None
-        try:
-            with interruptible() as self.flag:
+        with interruptible() as self.interrupted:
+            try:
                 self.sample(self.t, y)
                 for stop in [*inner, settings.t_end]:
                     y = self.piece(y, stop)
-            status, message = Status.FINISHED, f"finished at t = {self.t:.9g} s"
-        except _Ended as ended:
-            status, message = ended.status, ended.message
-        except KeyboardInterrupt:
-            status, message = None, f"interrupted at t = {self.t:.9g} s"
+                status, message = Status.FINISHED, f"finished at t = {self.t:.9g} s"
+            except _Ended as ended:
+                status, message = ended.status, ended.message
+            except KeyboardInterrupt:
+                status, message = None, f"interrupted at t = {self.t:.9g} s"
         found = split(
             scene, self.samples(), settings, status, message, self.statistics(),
             (self.t, self.last),
@@ -270,7 +270,7 @@ class _Loop:
 
     def look(self) -> None:
         """Between evaluations: has somebody asked for the end?"""
-        if self.flag[0]:
+        if self.interrupted:
             raise KeyboardInterrupt
 
     def step(self, solver: Any) -> str | None:

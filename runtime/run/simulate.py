@@ -136,7 +136,7 @@ def advance(
                 return status
             if observe is not None:
                 observe(run)
-            if interrupted[0] or run.kept_bytes > LARGEST:
+            if interrupted or run.kept_bytes > LARGEST:
                 return None
 
 

@@ -8,18 +8,23 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from chart.scenes import pendulum
 from cli.commands import Command
 
+import mstmm as library
 from mstmm import errors
 from mstmm.runtime.host import interruptible
 from mstmm.runtime.host.files import replacing
+from mstmm.runtime.integrate.loop import Status
 from mstmm.runtime.model import results
 from mstmm.runtime.result.output import tabled
-from mstmm.runtime.run import execution
+from mstmm.runtime.run import execution, simulate
 
 RUN = ("simulate", "pendulum.toml", "--t-end", "1", "-o", "a.csv", "--no-certify")
 KEPT = "the run is kept in a.csv.checkpoint; continue with the same command and --resume"
@@ -86,6 +91,7 @@ WRITER = """
 import sys, time
 from pathlib import Path
 from mstmm.runtime.host.files import replacing
+from mstmm.runtime.integrate.loop import Status
 with replacing(Path(sys.argv[1])) as file:
     file.write_text("half")
     print("half", flush=True)
@@ -146,8 +152,37 @@ def test_a_run_that_does_not_look_is_left_by_the_second_interrupt(
     with interruptible.interruptible() as flag:
         for _ in range(3):
             signal.raise_signal(which)
-        assert flag == [True]
+        assert flag
         monkeypatch.setattr(interruptible, "PATIENCE", -1.0)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(which)
     assert signal.getsignal(which) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("inner", [False, True])
+@pytest.mark.parametrize("outer", [False, True])
+def test_an_interrupt_that_nobody_hears_comes_again(heard: None, inner: bool, outer: bool) -> None:
+    reached = False
+    comes = nullcontext() if inner or outer else pytest.raises(KeyboardInterrupt)
+    with comes, interruptible.interruptible() as first:
+        with interruptible.interruptible() as second:
+            signal.raise_signal(signal.SIGINT)
+            assert not inner or second
+        reached = not outer or bool(first)
+    assert reached
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_run_that_ends_by_itself_hands_an_interrupt_on(
+    heard: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program of many short runs ends by Ctrl-C, which none of them has the time to hear."""
+    model, advance = library.compile(pendulum(), engine="looped"), simulate.advance
+
+    def signalled(*arguments: Any) -> Status | None:
+        signal.raise_signal(signal.SIGINT)
+        return advance(*arguments)
+
+    monkeypatch.setattr(execution, "advance", signalled)
+    with pytest.raises(KeyboardInterrupt):
+        model.simulate(1e-3)

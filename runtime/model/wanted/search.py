@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 
-from ...host.interruptible import interruptible
+from ...host.interruptible import Interrupt, interruptible
 from ...integrate.reached import Attempt, ReachedError
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO
@@ -91,11 +91,11 @@ class Search:
         with interruptible() as interrupted:
             found = self._found_by(interrupted)
         put_back(self._model, self._settings, self._beginnings)
-        if interrupted[0] and found.trajectory.status is not None:
+        if interrupted and found.trajectory.status is not None:
             raise KeyboardInterrupt
         return found
 
-    def _found_by(self, interrupted: Sequence[bool]) -> Result:
+    def _found_by(self, interrupted: Interrupt) -> Result:
         """Run after run, until one is good enough, nothing helps, or `interrupted` is set."""
         method, rtol = self._first()
         while True:
@@ -105,7 +105,7 @@ class Search:
                 continue
             if lost is not None and (not self._made or lost.status is None):
                 return self._lost(lost)
-            why = "a signal came" if interrupted[0] else self._settled(lost)
+            why = "a signal came" if interrupted else self._settled(lost)
             if why is not None:
                 return self._kept(why)
             method, rtol = self._next()

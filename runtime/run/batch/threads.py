@@ -24,7 +24,7 @@ def on_threads(
     with interruptible() as interrupted, ThreadPoolExecutor(threads) as pool:
         futures = [pool.submit(work, item) for item in items]
         waiting, failed = set(futures), False
-        while waiting and not (failed or interrupted[0]):
+        while waiting and not (failed or interrupted):
             done, waiting = wait(waiting, timeout=SLICE, return_when=FIRST_EXCEPTION)
             failed = any(future.exception() is not None for future in done)
         if waiting:
