@@ -28,6 +28,7 @@ TABLES = (
     "constraint",
 )  # fmt: skip
 _INDEX = re.compile(r"(.*)\[(\d+)\]")
+_EVERY = re.compile(r"\[\d+\]")
 
 
 def data_of(scene: Scene, evaluated: bool = False) -> dict[str, Any]:
@@ -85,14 +86,22 @@ def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
         if own is None:
             there = there or read(scene)
             raise _unknown(path, there)
-        if own in given_as:
-            other = given_as[own]
+        same = next((one for one in given_as if _overlap(own, one)), None)
+        if same is not None:
+            other = given_as[same]
             raise SceneError(f'parameters "{other}" and "{path}" are one number; give one of them')
         given_as[own] = path
     for beam in data.get("beam", []):  # an end "tip" with axes of its own stays at the tip
         if "tip" in beam["ends"]:
             beam["ends"]["tip"]["position"] = [beam["length"], 0.0, 0.0]
     return made_of(data, scene)
+
+
+def _overlap(name: str, other: str) -> bool:
+    """Whether two names stand for the same number, or one without an index for several with it."""
+    if name == other or name.count("[") == other.count("["):
+        return name == other
+    return _EVERY.sub("", name) == _EVERY.sub("", other)
 
 
 def made_of(data: dict[str, Any], scene: Scene, where: str = "scene") -> Scene:

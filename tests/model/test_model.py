@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -115,6 +116,18 @@ def test_unknown_and_impossible_parameters_are_refused() -> None:
         model.with_parameters({"rod1.mass": -2.0})
     with pytest.raises(mstmm.SceneError, match="gravity"):
         model.with_parameters({"gravity[7]": 1.0})
+
+
+def test_a_number_that_is_given_twice_is_refused() -> None:
+    scene = chain(["pin"])
+    scene["hinge"][0] |= {"name": "knee", "law": {"damping": 0.3}}
+    model = compiled(scene)
+    for given in (names := ["knee.law.damping[0]", "knee.law.damping"]), names[::-1]:
+        said = re.escape('"{}" and "{}" are one number'.format(*given))
+        with pytest.raises(mstmm.SceneError, match=said):
+            model.with_parameters(dict.fromkeys(given, 0.5))
+    entries = dict.fromkeys(["rod0.inertia[0]", "rod0.inertia[1]"], 0.5)
+    assert model.with_parameters(entries).parameters["rod0.inertia[1]"] == 0.5
 
 
 def test_parameters_keep_the_sweep_and_its_accuracy() -> None:
