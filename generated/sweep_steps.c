@@ -541,34 +541,6 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion)
     return 0;
 }
 
-/* Hinge motion, bias motion, own inertia and own load of a body. */
-static int mstmm_at_forward_in_plane(mstmm_state *state, int index, const real *parent_motion)
-{
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    int code;
-    if (mstmm_idle(state->observed, body)) return 0;
-    code = mstmm_planar_forward(
-        .Rt = body->connection, .ro = body->connection + 9, .p = body->hinge_p,
-        .q = state->q + body->q, .u = state->u + body->u,
-        .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .motion_I = parent_motion,
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .motion = block + MSTMM_BLOCK_MOTION, .qdot = state->qdot + body->q);
-    if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
-    if (!state->required) {
-        mstmm_planar_inertia(
-            .p = body->body_p, .S = block + MSTMM_BLOCK_S);
-    }
-    mstmm_planar_bias_load(
-        .p = body->body_p, .motion = block + MSTMM_BLOCK_MOTION, .e = block + MSTMM_BLOCK_E);
-    if (!state->required) {
-        mstmm_frames_pivot_floor(
-            .S = block + MSTMM_BLOCK_S, .floor_ = block + MSTMM_BLOCK_FLOOR);
-    }
-    return 0;
-}
-
 /* Rows of a body alone, and in them its load at the bias motion. */
 static int mstmm_at_qr_own(mstmm_state *state, int index)
 {
@@ -749,24 +721,6 @@ static int mstmm_at_poses(mstmm_state *state, int index)
         .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
         .v_I = parent + MSTMM_BLOCK_V, .w_I = parent + MSTMM_BLOCK_MOTION,
         .v_rel = block + MSTMM_BLOCK_HINGE_V, .v = block + MSTMM_BLOCK_V);
-    return 0;
-}
-
-/* Axes, position and velocity of P of a body, inertial axes. */
-static int mstmm_at_poses_in_plane(mstmm_state *state, int index)
-{
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    real *parent = mstmm_block(state->model, state->workspace, body->parent);
-    if (mstmm_idle(state->observed, body)) return 0;
-    mstmm_planar_pose(
-        .A_I = parent + MSTMM_BLOCK_A, .x_I = parent + MSTMM_BLOCK_X,
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .A = block + MSTMM_BLOCK_A,
-        .x = block + MSTMM_BLOCK_X);
-    mstmm_planar_velocity(
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .v_I = parent + MSTMM_BLOCK_V, .w_I = parent + MSTMM_BLOCK_MOTION,
-        .v = block + MSTMM_BLOCK_V);
     return 0;
 }
 
@@ -1339,69 +1293,6 @@ static int mstmm_at_closures(mstmm_state *state, int index)
     return 0;
 }
 
-/* Rows of what closes a loop, and the load of a hinge's laws. */
-static int mstmm_at_closures_in_plane(mstmm_state *state, int index)
-{
-    real drift[6];
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    real *parent = mstmm_block(state->model, state->workspace, body->parent);
-    const int nu = body->nu;
-    const mstmm_looped *looped = &state->model->looped[index];
-    const mstmm_closure *closure = looped->closure;
-    real *outboard = closure ? mstmm_block(state->model, state->workspace, closure->outboard) : NULL;
-    real *loops = state->workspace + state->model->loops;
-    real *closed = closure ? loops + closure->numbers : NULL;
-    int code;
-    if (!looped->closure) return 0;
-    code = mstmm_planar_complement(
-        .W = closed + MSTMM_CLOSURE_W);
-    if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
-    mstmm_planar_meet(
-        .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
-        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .r_e = closure->end,
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .R_C = closed + MSTMM_CLOSURE_R_C, .r_A = closed + MSTMM_CLOSURE_LEVER,
-        .d = closed + MSTMM_CLOSURE_D);
-    mstmm_planar_slip(
-        .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
-        .v_C = block + MSTMM_BLOCK_V, .w_C = block + MSTMM_BLOCK_MOTION,
-        .v_B = outboard + MSTMM_BLOCK_V, .w_B = outboard + MSTMM_BLOCK_MOTION,
-        .slip = closed + MSTMM_CLOSURE_SLIP);
-    mstmm_planar_drift(
-        .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
-        .slip = closed + MSTMM_CLOSURE_SLIP, .motion_C = block + MSTMM_BLOCK_MOTION,
-        .motion_B = outboard + MSTMM_BLOCK_MOTION, .drift = drift);
-    mstmm_planar_known(
-        .W = closed + MSTMM_CLOSURE_W, .relative = drift, .l = closed + MSTMM_CLOSURE_L);
-    for (int k = 0; k < body->nu; k++) {
-        mstmm_planar_row(
-            .w = closed + MSTMM_CLOSURE_W + 6 * k, .R_C = closed + MSTMM_CLOSURE_R_C,
-            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
-            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k,
-            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k);
-        mstmm_planar_act(
-            .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
-            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = parent + MSTMM_BLOCK_E);
-        mstmm_planar_act(
-            .J = closed + MSTMM_CLOSURE_J_B + 6 * k,
-            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
-            .e = outboard + MSTMM_BLOCK_E);
-    }
-    for (int c = 0; c < 6; c++) {
-        if (closure->rows[c] < 0) continue;
-        mstmm_planar_row(
-            .w = closed + MSTMM_CLOSURE_W + 6 * c, .R_C = closed + MSTMM_CLOSURE_R_C,
-            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
-            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * c,
-            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * c);
-        memcpy(loops + closure->inner[c], closed + MSTMM_CLOSURE_J_A + 6 * c, (size_t)(6) * sizeof(real));
-        memcpy(loops + closure->outer[c], closed + MSTMM_CLOSURE_J_B + 6 * c, (size_t)(6) * sizeof(real));
-        memcpy(loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN, closed + MSTMM_CLOSURE_L + c, (size_t)(1) * sizeof(real));
-    }
-    return 0;
-}
-
 /* A row closed on the body where its ends meet. */
 static int mstmm_at_row_closed(mstmm_state *state, int index)
 {
@@ -1592,99 +1483,6 @@ static int mstmm_at_carried(mstmm_state *state, int index)
     return 0;
 }
 
-/* A row closed on the body where its ends meet. */
-static int mstmm_at_row_closed_in_plane(mstmm_state *state, int index)
-{
-    real *loops = state->workspace + state->model->loops;
-    const mstmm_loop_row *row = &state->model->rows[index];
-    real *line = loops + MSTMM_ROW * (int64_t)index;
-    mstmm_loops_settle(
-        .L = line + MSTMM_ROW_PIVOT, .floor_ = &row->floor, .inverse = line + MSTMM_ROW_INVERSE);
-    if ((row->body >= 0)) {
-        real *meeting = mstmm_block(state->model, state->workspace, row->body);
-        mstmm_planar_close(
-            .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
-            .l = line + MSTMM_ROW_KNOWN, .S = meeting + MSTMM_BLOCK_S,
-            .e = meeting + MSTMM_BLOCK_E);
-    }
-    for (int c = 0; c < row->n_others; c++) {
-        const mstmm_other *other = &row->others[c];
-        if ((row->body >= 0)) {
-            mstmm_planar_shed(
-                .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
-                .L_p = loops + other->pair, .K_p = loops + other->column);
-        }
-        mstmm_loops_shed_known(
-            .inverse = line + MSTMM_ROW_INVERSE, .l = line + MSTMM_ROW_KNOWN,
-            .L_p = loops + other->pair,
-            .l_p = loops + MSTMM_ROW * (int64_t)other->row + MSTMM_ROW_KNOWN);
-        for (int b = 0; b <= c; b++) {
-            mstmm_loops_shed_pair(
-                .inverse = line + MSTMM_ROW_INVERSE, .L_p = loops + other->pair,
-                .L_q = loops + row->others[b].pair, .L_pq = loops + other->pairs[b]);
-        }
-    }
-    return 0;
-}
-
-/* S, e and the columns of open rows carried across the hinge to the parent. */
-static int mstmm_at_carried_in_plane(mstmm_state *state, int index)
-{
-    real z[1];
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    real *parent = mstmm_block(state->model, state->workspace, body->parent);
-    const int nu = body->nu;
-    const mstmm_looped *looped = &state->model->looped[index];
-    real *loops = state->workspace + state->model->loops;
-    int code;
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
-    for (int r = looped->first_row; r < looped->first_row + looped->n_rows; r++) {
-        code = mstmm_at_row_closed_in_plane(state, r);
-        if (code) return code;
-    }
-    code = mstmm_planar_factor(
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .J = body->rotor,
-        .floor_ = block + MSTMM_BLOCK_FLOOR, .S = block + MSTMM_BLOCK_S,
-        .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
-        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .S_I = parent + MSTMM_BLOCK_S);
-    if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
-    if ((body->parent >= 0)) {
-        mstmm_planar_push(
-            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-            .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = block + MSTMM_BLOCK_E,
-            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU),
-            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .e_I = parent + MSTMM_BLOCK_E);
-    } else {
-        mstmm_planar_push_on_ground(
-            .e = block + MSTMM_BLOCK_E, .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU),
-            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET));
-    }
-    for (int c = 0; c < looped->n_pending; c++) {
-        const mstmm_pending *pending = &looped->pending[c];
-        if ((body->parent >= 0)) {
-            mstmm_planar_push(
-                .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-                .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = loops + pending->column,
-                .tau = mstmm_zeros, .y = loops + pending->y, .e_I = loops + pending->onward);
-        }
-        if (!(body->parent >= 0)) {
-            mstmm_planar_push_on_ground(
-                .e = loops + pending->column, .tau = mstmm_zeros, .y = loops + pending->y);
-        }
-        mstmm_planar_divide(
-            .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .y = loops + pending->y, .z = z);
-        mstmm_planar_answered(
-            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .z = z,
-            .l = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_KNOWN);
-        for (int b = 0; b <= c; b++) {
-            mstmm_planar_couple(
-                .y = loops + looped->pending[b].y, .z = z, .L_ij = loops + pending->pairs[b]);
-        }
-    }
-    return 0;
-}
-
 /* The multiplier of a row, from the motion of the body where it closes. */
 static int mstmm_at_row_found(mstmm_state *state, int index)
 {
@@ -1697,31 +1495,6 @@ static int mstmm_at_row_found(mstmm_state *state, int index)
     if ((row->body >= 0)) {
         real *meeting = mstmm_block(state->model, state->workspace, row->body);
         mstmm_loops_multiplier_more(
-            .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
-            .delta = meeting + MSTMM_BLOCK_DELTA, .x = line + MSTMM_ROW_X);
-    }
-    for (int c = 0; c < row->n_others; c++) {
-        const mstmm_other *other = &row->others[c];
-        mstmm_loops_multiplier_less(
-            .inverse = line + MSTMM_ROW_INVERSE, .L_p = loops + other->pair,
-            .x_p = loops + MSTMM_ROW * (int64_t)other->row + MSTMM_ROW_X,
-            .x = line + MSTMM_ROW_X);
-    }
-    return 0;
-}
-
-/* The multiplier of a row, from the motion of the body where it closes. */
-static int mstmm_at_row_found_in_plane(mstmm_state *state, int index)
-{
-    real *loops = state->workspace + state->model->loops;
-    const mstmm_loop_row *row = &state->model->rows[index];
-    real *line = loops + MSTMM_ROW * (int64_t)index;
-    mstmm_loops_multiplier(
-        .inverse = line + MSTMM_ROW_INVERSE, .l = line + MSTMM_ROW_KNOWN,
-        .x = line + MSTMM_ROW_X);
-    if ((row->body >= 0)) {
-        real *meeting = mstmm_block(state->model, state->workspace, row->body);
-        mstmm_planar_multiplier_more(
             .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
             .delta = meeting + MSTMM_BLOCK_DELTA, .x = line + MSTMM_ROW_X);
     }
@@ -1840,38 +1613,6 @@ static int mstmm_at_answered(mstmm_state *state, int index)
     return 0;
 }
 
-/* Accelerations of a hinge under the multipliers of its open rows. */
-static int mstmm_at_answered_in_plane(mstmm_state *state, int index)
-{
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    real *parent = mstmm_block(state->model, state->workspace, body->parent);
-    const int nu = body->nu;
-    const mstmm_looped *looped = &state->model->looped[index];
-    real *loops = state->workspace + state->model->loops;
-    int code;
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
-    for (int c = 0; c < looped->n_pending; c++) {
-        const mstmm_pending *pending = &looped->pending[c];
-        mstmm_planar_pull(
-            .y = loops + pending->y,
-            .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
-            .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET));
-    }
-    mstmm_planar_answer(
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
-        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN),
-        .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET),
-        .delta_I = parent + MSTMM_BLOCK_DELTA, .udot = state->udot + body->u,
-        .delta = block + MSTMM_BLOCK_DELTA);
-    for (int r = looped->first_row + looped->n_rows - 1; r >= looped->first_row; r--) {
-        code = mstmm_at_row_found_in_plane(state, r);
-        if (code) return code;
-    }
-    return 0;
-}
-
 /* Accelerations and load of a hinge that closes a loop. */
 static int mstmm_at_closures_answered(mstmm_state *state, int index)
 {
@@ -1924,31 +1665,6 @@ static int mstmm_at_closures_answered(mstmm_state *state, int index)
     return 0;
 }
 
-/* Accelerations and load of a hinge that closes a loop. */
-static int mstmm_at_closures_answered_in_plane(mstmm_state *state, int index)
-{
-    real along[1];
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    real *parent = mstmm_block(state->model, state->workspace, body->parent);
-    const int nu = body->nu;
-    const mstmm_looped *looped = &state->model->looped[index];
-    const mstmm_closure *closure = looped->closure;
-    real *outboard = closure ? mstmm_block(state->model, state->workspace, closure->outboard) : NULL;
-    real *loops = state->workspace + state->model->loops;
-    real *closed = closure ? loops + closure->numbers : NULL;
-    if (!looped->closure) return 0;
-    mstmm_set(state->udot + body->u, mstmm_of_speeds(block, nu, MSTMM_SPEED_S), nu);
-    for (int k = 0; k < body->nu; k++) {
-        mstmm_planar_told(
-            .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k, .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k,
-            .l = closed + MSTMM_CLOSURE_L + k, .delta_A = parent + MSTMM_BLOCK_DELTA,
-            .delta_B = outboard + MSTMM_BLOCK_DELTA, .c = along);
-        (state->udot + body->u + k)[0] += along[0];
-    }
-    return 0;
-}
-
 /* Power that drives and holds feed in. */
 static int mstmm_at_drive_power(mstmm_state *state, int index)
 {
@@ -1996,6 +1712,430 @@ static int mstmm_at_couplings_answered(mstmm_state *state, int index)
             .tau = loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_X,
             .u = loops + coupling->numbers + MSTMM_COUPLING_STILL, .P = P);
         state->balance->power += P[0];
+    }
+    return 0;
+}
+
+/* Accelerations that are given: all, or none so far. */
+static int mstmm_at_prescribed_in_plane(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_set_zero(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), nu);
+    return 0;
+}
+
+/* Hinge motion, bias motion, own inertia and own load of a body. */
+static int mstmm_at_forward_in_plane(mstmm_state *state, int index, const real *parent_motion)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    int code;
+    if (mstmm_idle(state->observed, body)) return 0;
+    code = mstmm_planar_forward(
+        .Rt = body->connection, .ro = body->connection + 9, .p = body->hinge_p,
+        .q = state->q + body->q, .u = state->u + body->u,
+        .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .motion_I = parent_motion,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .motion = block + MSTMM_BLOCK_MOTION, .qdot = state->qdot + body->q);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
+    if (!mstmm_aside(state->model, state->observed, index)) {
+        mstmm_planar_inertia(
+            .p = body->body_p, .S = block + MSTMM_BLOCK_S);
+        mstmm_planar_bias_load(
+            .p = body->body_p, .motion = block + MSTMM_BLOCK_MOTION, .e = block + MSTMM_BLOCK_E);
+        mstmm_frames_pivot_floor(
+            .S = block + MSTMM_BLOCK_S, .floor_ = block + MSTMM_BLOCK_FLOOR);
+    }
+    return 0;
+}
+
+/* Efforts of the caller where the sweep reads them. */
+static int mstmm_at_efforts_in_plane(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    if (state->efforts) {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        mstmm_set(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), state->efforts + body->u, nu);
+    } else {
+        real *block = state->workspace + body->block;
+        const int nu = body->nu;
+        mstmm_set_zero(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), nu);
+    }
+    return 0;
+}
+
+/* Laws on hinge coordinates, added to the efforts. */
+static int mstmm_at_laws_in_plane(mstmm_state *state, int index)
+{
+    real effort[6];
+    real tau[6];
+    real V[1];
+    real P[1];
+    real unused_twist[1];
+    const mstmm_law *law = &state->model->laws[index];
+    const mstmm_body *body = &state->model->bodies[law->body];
+    real *block = state->workspace + body->block;
+    for (int j = 0; j < law->n; j++)
+        effort[j] = mstmm_value_at(state, law->effort[j]);
+    if (law->kind == 0) {
+        mstmm_law_coordinate(law->evaluate,
+            .p = law->p, .q = state->q + body->q + law->coordinate,
+            .u = state->u + body->u + law->speed, .effort = effort, .tau = tau, .V = V, .P = P);
+    } else {
+        mstmm_law_quaternion(law->evaluate,
+            .p = law->p, .q = state->q + body->q + law->coordinate,
+            .u = state->u + body->u + law->speed, .B = law->axes, .effort = effort,
+            .twist_ref = state->memory + law->twist, .tau = tau, .V = V, .P = P,
+            .twist = unused_twist);
+    }
+    for (int j = 0; j < law->n; j++)
+        (block + MSTMM_BLOCK_FIXED + MSTMM_SPEED_TAU * body->nu + law->speed)[j] += tau[j];
+    return 0;
+}
+
+/* Axes, position and velocity of P of a body, inertial axes. */
+static int mstmm_at_poses_in_plane(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    if (mstmm_idle(state->observed, body)) return 0;
+    mstmm_planar_pose(
+        .A_I = parent + MSTMM_BLOCK_A, .x_I = parent + MSTMM_BLOCK_X,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .A = block + MSTMM_BLOCK_A,
+        .x = block + MSTMM_BLOCK_X);
+    mstmm_planar_velocity(
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .v_I = parent + MSTMM_BLOCK_V, .w_I = parent + MSTMM_BLOCK_MOTION,
+        .v = block + MSTMM_BLOCK_V);
+    return 0;
+}
+
+/* Force and moment at a point of a body, added to e. */
+static int mstmm_at_loads_in_plane(mstmm_state *state, int index)
+{
+    real A_F[9];
+    real F[3];
+    real M[3];
+    const mstmm_load *load = &state->model->loads[index];
+    real *on = mstmm_block(state->model, state->workspace, load->body);
+    real *axes = mstmm_block(state->model, state->workspace, load->axes);
+    mstmm_frames_end_frame(
+        .A = axes + MSTMM_BLOCK_A, .R_end = load->axes_own, .A_end = A_F);
+    for (int j = 0; j < 3; j++)
+        F[j] = mstmm_value_at(state, load->force[j]);
+    for (int j = 0; j < 3; j++)
+        M[j] = mstmm_value_at(state, load->moment[j]);
+    mstmm_frames_applied_load(
+        .A = on + MSTMM_BLOCK_A, .A_F = A_F, .offset = load->offset, .F = F, .M = M,
+        .e = on + MSTMM_BLOCK_E);
+    return 0;
+}
+
+/* Massless elements between two ends, added to e of both. */
+static int mstmm_at_forces_in_plane(mstmm_state *state, int index)
+{
+    real x_F[3];
+    real v_F[3];
+    real unused_a_K[3];
+    real w_F[3];
+    real unused_alpha_K[3];
+    real A_F[9];
+    real x_T[3];
+    real v_T[3];
+    real w_T[3];
+    real A_T[9];
+    real length[2];
+    real effort[1];
+    real F[3];
+    real M[3];
+    real V[1];
+    real P[1];
+    real F_back[3];
+    real M_back[3];
+    const mstmm_force *force = &state->model->forces[index];
+    real *from = mstmm_block(state->model, state->workspace, force->body_f);
+    real *to = mstmm_block(state->model, state->workspace, force->body_t);
+    int code;
+    mstmm_frames_point(
+        .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
+        .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_f,
+        .gravity = mstmm_zeros, .x_K = x_F, .v_K = v_F, .a_K = unused_a_K);
+    mstmm_frames_turning(
+        .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+        .w_K = w_F, .alpha_K = unused_alpha_K);
+    mstmm_frames_end_frame(
+        .A = from + MSTMM_BLOCK_A, .R_end = force->axes_f, .A_end = A_F);
+    mstmm_frames_point(
+        .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
+        .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_t,
+        .gravity = mstmm_zeros, .x_K = x_T, .v_K = v_T, .a_K = unused_a_K);
+    mstmm_frames_turning(
+        .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
+        .w_K = w_T, .alpha_K = unused_alpha_K);
+    mstmm_frames_end_frame(
+        .A = to + MSTMM_BLOCK_A, .R_end = force->axes_t, .A_end = A_T);
+    effort[0] = 0;
+    if (force->effort) {
+        mstmm_frames_length(
+            .x_F = x_F, .v_F = v_F, .x_T = x_T, .v_T = v_T, .l = length);
+        code = mstmm_given_effort(state, force->effort, length, effort);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, index, code);
+    }
+    code = mstmm_force_wrench(force->wrench,
+        .p = force->p, .t = &state->t, .effort = effort, .A_F = A_F, .x_F = x_F, .v_F = v_F,
+        .w_F = w_F, .A_T = A_T, .x_T = x_T, .v_T = v_T, .w_T = w_T, .F = F, .M = M, .V = V,
+        .P = P);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_FORCE, index, code);
+    mstmm_frames_opposite(
+        .x_F = x_F, .x_T = x_T, .F = F, .M = M, .F_back = F_back, .M_back = M_back);
+    mstmm_frames_applied_load(
+        .A = to + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_t, .F = F,
+        .M = M, .e = to + MSTMM_BLOCK_E);
+    mstmm_frames_applied_load(
+        .A = from + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_f, .F = F_back,
+        .M = M_back, .e = from + MSTMM_BLOCK_E);
+    return 0;
+}
+
+/* Rows of what closes a loop, and the load of a hinge's laws. */
+static int mstmm_at_closures_in_plane(mstmm_state *state, int index)
+{
+    real drift[6];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    const mstmm_closure *closure = looped->closure;
+    real *outboard = closure ? mstmm_block(state->model, state->workspace, closure->outboard) : NULL;
+    real *loops = state->workspace + state->model->loops;
+    real *closed = closure ? loops + closure->numbers : NULL;
+    int code;
+    if (!looped->closure) return 0;
+    code = mstmm_planar_complement(
+        .W = closed + MSTMM_CLOSURE_W);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
+    mstmm_planar_meet(
+        .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
+        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .r_e = closure->end,
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .R_C = closed + MSTMM_CLOSURE_R_C, .r_A = closed + MSTMM_CLOSURE_LEVER,
+        .d = closed + MSTMM_CLOSURE_D);
+    mstmm_planar_slip(
+        .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
+        .v_C = block + MSTMM_BLOCK_V, .w_C = block + MSTMM_BLOCK_MOTION,
+        .v_B = outboard + MSTMM_BLOCK_V, .w_B = outboard + MSTMM_BLOCK_MOTION,
+        .slip = closed + MSTMM_CLOSURE_SLIP);
+    mstmm_planar_drift(
+        .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
+        .slip = closed + MSTMM_CLOSURE_SLIP, .motion_C = block + MSTMM_BLOCK_MOTION,
+        .motion_B = outboard + MSTMM_BLOCK_MOTION, .drift = drift);
+    mstmm_planar_known(
+        .W = closed + MSTMM_CLOSURE_W, .relative = drift, .l = closed + MSTMM_CLOSURE_L);
+    for (int k = 0; k < body->nu; k++) {
+        mstmm_planar_row(
+            .w = closed + MSTMM_CLOSURE_W + 6 * k, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k,
+            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k);
+        mstmm_planar_act(
+            .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = parent + MSTMM_BLOCK_E);
+        mstmm_planar_act(
+            .J = closed + MSTMM_CLOSURE_J_B + 6 * k,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
+            .e = outboard + MSTMM_BLOCK_E);
+    }
+    for (int c = 0; c < 6; c++) {
+        if (closure->rows[c] < 0) continue;
+        mstmm_planar_row(
+            .w = closed + MSTMM_CLOSURE_W + 6 * c, .R_C = closed + MSTMM_CLOSURE_R_C,
+            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
+            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * c,
+            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * c);
+        memcpy(loops + closure->inner[c], closed + MSTMM_CLOSURE_J_A + 6 * c, (size_t)(6) * sizeof(real));
+        memcpy(loops + closure->outer[c], closed + MSTMM_CLOSURE_J_B + 6 * c, (size_t)(6) * sizeof(real));
+        memcpy(loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN, closed + MSTMM_CLOSURE_L + c, (size_t)(1) * sizeof(real));
+    }
+    return 0;
+}
+
+/* A row closed on the body where its ends meet. */
+static int mstmm_at_row_closed_in_plane(mstmm_state *state, int index)
+{
+    real *loops = state->workspace + state->model->loops;
+    const mstmm_loop_row *row = &state->model->rows[index];
+    real *line = loops + MSTMM_ROW * (int64_t)index;
+    mstmm_loops_settle(
+        .L = line + MSTMM_ROW_PIVOT, .floor_ = &row->floor, .inverse = line + MSTMM_ROW_INVERSE);
+    if ((row->body >= 0)) {
+        real *meeting = mstmm_block(state->model, state->workspace, row->body);
+        mstmm_planar_close(
+            .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
+            .l = line + MSTMM_ROW_KNOWN, .S = meeting + MSTMM_BLOCK_S,
+            .e = meeting + MSTMM_BLOCK_E);
+    }
+    for (int c = 0; c < row->n_others; c++) {
+        const mstmm_other *other = &row->others[c];
+        if ((row->body >= 0)) {
+            mstmm_planar_shed(
+                .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
+                .L_p = loops + other->pair, .K_p = loops + other->column);
+        }
+        mstmm_loops_shed_known(
+            .inverse = line + MSTMM_ROW_INVERSE, .l = line + MSTMM_ROW_KNOWN,
+            .L_p = loops + other->pair,
+            .l_p = loops + MSTMM_ROW * (int64_t)other->row + MSTMM_ROW_KNOWN);
+        for (int b = 0; b <= c; b++) {
+            mstmm_loops_shed_pair(
+                .inverse = line + MSTMM_ROW_INVERSE, .L_p = loops + other->pair,
+                .L_q = loops + row->others[b].pair, .L_pq = loops + other->pairs[b]);
+        }
+    }
+    return 0;
+}
+
+/* S, e and the columns of open rows carried across the hinge to the parent. */
+static int mstmm_at_carried_in_plane(mstmm_state *state, int index)
+{
+    real z[1];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    real *loops = state->workspace + state->model->loops;
+    int code;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    for (int r = looped->first_row; r < looped->first_row + looped->n_rows; r++) {
+        code = mstmm_at_row_closed_in_plane(state, r);
+        if (code) return code;
+    }
+    code = mstmm_planar_factor(
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .J = body->rotor,
+        .floor_ = block + MSTMM_BLOCK_FLOOR, .S = block + MSTMM_BLOCK_S,
+        .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .S_I = parent + MSTMM_BLOCK_S);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
+    if ((body->parent >= 0)) {
+        mstmm_planar_push(
+            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = block + MSTMM_BLOCK_E,
+            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU),
+            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .e_I = parent + MSTMM_BLOCK_E);
+    } else {
+        mstmm_planar_push_on_ground(
+            .e = block + MSTMM_BLOCK_E, .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU),
+            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET));
+    }
+    for (int c = 0; c < looped->n_pending; c++) {
+        const mstmm_pending *pending = &looped->pending[c];
+        if ((body->parent >= 0)) {
+            mstmm_planar_push(
+                .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+                .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = loops + pending->column,
+                .tau = mstmm_zeros, .y = loops + pending->y, .e_I = loops + pending->onward);
+        }
+        if (!(body->parent >= 0)) {
+            mstmm_planar_push_on_ground(
+                .e = loops + pending->column, .tau = mstmm_zeros, .y = loops + pending->y);
+        }
+        mstmm_planar_divide(
+            .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .y = loops + pending->y, .z = z);
+        mstmm_planar_answered(
+            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .z = z,
+            .l = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_KNOWN);
+        for (int b = 0; b <= c; b++) {
+            mstmm_planar_couple(
+                .y = loops + looped->pending[b].y, .z = z, .L_ij = loops + pending->pairs[b]);
+        }
+    }
+    return 0;
+}
+
+/* The multiplier of a row, from the motion of the body where it closes. */
+static int mstmm_at_row_found_in_plane(mstmm_state *state, int index)
+{
+    real *loops = state->workspace + state->model->loops;
+    const mstmm_loop_row *row = &state->model->rows[index];
+    real *line = loops + MSTMM_ROW * (int64_t)index;
+    mstmm_loops_multiplier(
+        .inverse = line + MSTMM_ROW_INVERSE, .l = line + MSTMM_ROW_KNOWN,
+        .x = line + MSTMM_ROW_X);
+    if ((row->body >= 0)) {
+        real *meeting = mstmm_block(state->model, state->workspace, row->body);
+        mstmm_planar_multiplier_more(
+            .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
+            .delta = meeting + MSTMM_BLOCK_DELTA, .x = line + MSTMM_ROW_X);
+    }
+    for (int c = 0; c < row->n_others; c++) {
+        const mstmm_other *other = &row->others[c];
+        mstmm_loops_multiplier_less(
+            .inverse = line + MSTMM_ROW_INVERSE, .L_p = loops + other->pair,
+            .x_p = loops + MSTMM_ROW * (int64_t)other->row + MSTMM_ROW_X,
+            .x = line + MSTMM_ROW_X);
+    }
+    return 0;
+}
+
+/* Accelerations of a hinge under the multipliers of its open rows. */
+static int mstmm_at_answered_in_plane(mstmm_state *state, int index)
+{
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    real *loops = state->workspace + state->model->loops;
+    int code;
+    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    for (int c = 0; c < looped->n_pending; c++) {
+        const mstmm_pending *pending = &looped->pending[c];
+        mstmm_planar_pull(
+            .y = loops + pending->y,
+            .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
+            .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET));
+    }
+    mstmm_planar_answer(
+        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+        .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
+        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN),
+        .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET),
+        .delta_I = parent + MSTMM_BLOCK_DELTA, .udot = state->udot + body->u,
+        .delta = block + MSTMM_BLOCK_DELTA);
+    for (int r = looped->first_row + looped->n_rows - 1; r >= looped->first_row; r--) {
+        code = mstmm_at_row_found_in_plane(state, r);
+        if (code) return code;
+    }
+    return 0;
+}
+
+/* Accelerations and load of a hinge that closes a loop. */
+static int mstmm_at_closures_answered_in_plane(mstmm_state *state, int index)
+{
+    real along[1];
+    const mstmm_body *body = &state->model->bodies[index];
+    real *block = state->workspace + body->block;
+    real *parent = mstmm_block(state->model, state->workspace, body->parent);
+    const int nu = body->nu;
+    const mstmm_looped *looped = &state->model->looped[index];
+    const mstmm_closure *closure = looped->closure;
+    real *outboard = closure ? mstmm_block(state->model, state->workspace, closure->outboard) : NULL;
+    real *loops = state->workspace + state->model->loops;
+    real *closed = closure ? loops + closure->numbers : NULL;
+    if (!looped->closure) return 0;
+    mstmm_set(state->udot + body->u, mstmm_of_speeds(block, nu, MSTMM_SPEED_S), nu);
+    for (int k = 0; k < body->nu; k++) {
+        mstmm_planar_told(
+            .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k, .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k,
+            .l = closed + MSTMM_CLOSURE_L + k, .delta_A = parent + MSTMM_BLOCK_DELTA,
+            .delta_B = outboard + MSTMM_BLOCK_DELTA, .c = along);
+        (state->udot + body->u + k)[0] += along[0];
     }
     return 0;
 }
@@ -5529,28 +5669,6 @@ static int mstmm_pass_forward(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_forward_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_S, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
-    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
-}
-static int mstmm_pass_forward_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_forward_in_plane(state, i, MSTMM_TILE);
-        const int code = mstmm_at_forward_in_plane(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
-        if (code) return code;
-    }
-    return 0;
-}
-
 MSTMM_AT_ONCE void mstmm_fetch_qr_own(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -5670,25 +5788,6 @@ static int mstmm_pass_poses(mstmm_state *state)
     for (int i = 0; i < model->n_bodies; i++) {
         if (mstmm_beyond_cache(model)) mstmm_fetch_poses(state, i, MSTMM_TILE);
         const int code = mstmm_at_poses(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-MSTMM_AT_ONCE void mstmm_fetch_poses_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-}
-static int mstmm_pass_poses_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_poses_in_plane(state, i, MSTMM_TILE);
-        const int code = mstmm_at_poses_in_plane(state, i);
         if (code) return code;
     }
     return 0;
@@ -5822,27 +5921,6 @@ static int mstmm_pass_closures(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_closures_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_MOTION, mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
-}
-static int mstmm_pass_closures_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_closures_in_plane(state, i, MSTMM_TILE);
-        const int code = mstmm_at_closures_in_plane(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
 MSTMM_AT_ONCE void mstmm_fetch_carried(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -5866,29 +5944,6 @@ static int mstmm_pass_carried(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_carried_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E + 6);
-    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
-    mstmm_fetch(body->rotor, body->hinge_p);
-}
-static int mstmm_pass_carried_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = model->n_bodies - 1; i >= 0; i--) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_carried_in_plane(state, i, -MSTMM_TILE);
-        const int code = mstmm_at_carried_in_plane(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
 static int mstmm_pass_row_closed(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -5899,31 +5954,11 @@ static int mstmm_pass_row_closed(mstmm_state *state)
     return 0;
 }
 
-static int mstmm_pass_row_closed_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = model->first_ground_row; i < model->n_rows; i++) {
-        const int code = mstmm_at_row_closed_in_plane(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
 static int mstmm_pass_row_found(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_rows - 1; i >= model->first_ground_row; i--) {
         const int code = mstmm_at_row_found(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-static int mstmm_pass_row_found_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = model->n_rows - 1; i >= model->first_ground_row; i--) {
-        const int code = mstmm_at_row_found_in_plane(state, i);
         if (code) return code;
     }
     return 0;
@@ -5950,27 +5985,6 @@ static int mstmm_pass_answered(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_answered_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_DELTA, block + MSTMM_BLOCK_DELTA + 6);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
-}
-static int mstmm_pass_answered_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_answered_in_plane(state, i, MSTMM_TILE);
-        const int code = mstmm_at_answered_in_plane(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
 MSTMM_AT_ONCE void mstmm_fetch_closures_answered(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
@@ -5986,25 +6000,6 @@ static int mstmm_pass_closures_answered(mstmm_state *state)
     for (int i = 0; i < model->n_bodies; i++) {
         if (mstmm_beyond_cache(model)) mstmm_fetch_closures_answered(state, i, MSTMM_TILE);
         const int code = mstmm_at_closures_answered(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-MSTMM_AT_ONCE void mstmm_fetch_closures_answered_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
-}
-static int mstmm_pass_closures_answered_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_closures_answered_in_plane(state, i, MSTMM_TILE);
-        const int code = mstmm_at_closures_answered_in_plane(state, i);
         if (code) return code;
     }
     return 0;
@@ -6036,6 +6031,219 @@ static int mstmm_pass_couplings_answered(mstmm_state *state)
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_couplings; i++) {
         const int code = mstmm_at_couplings_answered(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_prescribed_in_plane(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+}
+static int mstmm_pass_prescribed_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_prescribed_in_plane(state, i, MSTMM_TILE);
+        const int code = mstmm_at_prescribed_in_plane(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_forward_in_plane(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_S, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
+}
+static int mstmm_pass_forward_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_forward_in_plane(state, i, MSTMM_TILE);
+        const int code = mstmm_at_forward_in_plane(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_efforts_in_plane(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
+}
+static int mstmm_pass_efforts_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_efforts_in_plane(state, i, MSTMM_TILE);
+        const int code = mstmm_at_efforts_in_plane(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_laws_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_laws; i++) {
+        const int code = mstmm_at_laws_in_plane(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_poses_in_plane(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+}
+static int mstmm_pass_poses_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_poses_in_plane(state, i, MSTMM_TILE);
+        const int code = mstmm_at_poses_in_plane(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_loads_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_loads; i++) {
+        const int code = mstmm_at_loads_in_plane(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_forces_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_forces; i++) {
+        const int code = mstmm_at_forces_in_plane(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_closures_in_plane(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_MOTION, mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
+}
+static int mstmm_pass_closures_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_closures_in_plane(state, i, MSTMM_TILE);
+        const int code = mstmm_at_closures_in_plane(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_carried_in_plane(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E + 6);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
+    mstmm_fetch(body->rotor, body->hinge_p);
+}
+static int mstmm_pass_carried_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->n_bodies - 1; i >= 0; i--) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_carried_in_plane(state, i, -MSTMM_TILE);
+        const int code = mstmm_at_carried_in_plane(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_row_closed_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->first_ground_row; i < model->n_rows; i++) {
+        const int code = mstmm_at_row_closed_in_plane(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+static int mstmm_pass_row_found_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = model->n_rows - 1; i >= model->first_ground_row; i--) {
+        const int code = mstmm_at_row_found_in_plane(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_answered_in_plane(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_DELTA, block + MSTMM_BLOCK_DELTA + 6);
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
+}
+static int mstmm_pass_answered_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_answered_in_plane(state, i, MSTMM_TILE);
+        const int code = mstmm_at_answered_in_plane(state, i);
+        if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_closures_answered_in_plane(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
+}
+static int mstmm_pass_closures_answered_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        if (mstmm_beyond_cache(model)) mstmm_fetch_closures_answered_in_plane(state, i, MSTMM_TILE);
+        const int code = mstmm_at_closures_answered_in_plane(state, i);
         if (code) return code;
     }
     return 0;
@@ -6637,6 +6845,50 @@ static int mstmm_pass_composed(mstmm_state *state)
         if (mstmm_beyond_cache(model)) mstmm_fetch_composed(state, i, -MSTMM_TILE);
         const int code = mstmm_at_composed(state, i);
         if (code) return code;
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_accelerations_in_plane_chain(const mstmm_state *state, int index, int ahead)
+{
+    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
+    if (!body) return;
+    real *block = state->workspace + body->block;
+    const int nu = body->nu;
+    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_FLOOR + 2);
+    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
+    mstmm_fetch(block + MSTMM_BLOCK_S, mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
+    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
+}
+static int mstmm_chain_accelerations_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code, law = 0;
+    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
+        const int end = mstmm_end_of_tile(model, first);
+        for (int i = first; i < end; i++) {
+            if (mstmm_beyond_cache(model)) mstmm_fetch_accelerations_in_plane_chain(state, i, MSTMM_TILE);
+            code = mstmm_at_prescribed_in_plane(state, i);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_forward_in_plane(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_efforts_in_plane(state, i);
+            if (code) return code;
+        }
+        for (; law < model->n_laws && model->laws[law].body < end; law++) {
+            const int i = law;
+            if (mstmm_beyond_cache(model)) mstmm_fetch_law(model, i, MSTMM_TILE);
+            code = mstmm_at_laws_in_plane(state, i);
+            if (code) return code;
+        }
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_poses_in_plane(state, i);
+            if (code) return code;
+        }
     }
     return 0;
 }
@@ -7259,12 +7511,8 @@ int mstmm_run_accelerations(mstmm_state *state)
         code = mstmm_hook_links_forward(state);
         if (code) return code;
     }
-    if (!state->linked && !state->planar) {
+    if (!state->linked) {
         code = mstmm_pass_forward(state);
-        if (code) return code;
-    }
-    if (!state->linked && state->planar) {
-        code = mstmm_pass_forward_in_plane(state);
         if (code) return code;
     }
     if (model->qr) {
@@ -7291,12 +7539,8 @@ int mstmm_run_accelerations(mstmm_state *state)
         code = mstmm_pass_strain(state);
         if (code) return code;
     }
-    if ((model->needs_pose || model->product) && !state->planar) {
+    if ((model->needs_pose || model->product)) {
         code = mstmm_pass_poses(state);
-        if (code) return code;
-    }
-    if ((model->needs_pose || model->product) && state->planar) {
-        code = mstmm_pass_poses_in_plane(state);
         if (code) return code;
     }
     if (model->product) {
@@ -7343,56 +7587,32 @@ int mstmm_run_accelerations(mstmm_state *state)
         code = mstmm_hook_rows_begun(state);
         if (code) return code;
     }
-    if (model->looped && !state->planar) {
+    if (model->looped) {
         code = mstmm_pass_closures(state);
-        if (code) return code;
-    }
-    if (model->looped && state->planar) {
-        code = mstmm_pass_closures_in_plane(state);
         if (code) return code;
     }
     if (model->looped) {
         code = mstmm_hook_rows_asked(state);
         if (code) return code;
     }
-    if (model->looped && !state->planar) {
+    if (model->looped) {
         code = mstmm_pass_carried(state);
         if (code) return code;
     }
-    if (model->looped && state->planar) {
-        code = mstmm_pass_carried_in_plane(state);
-        if (code) return code;
-    }
-    if (model->looped && !state->planar) {
+    if (model->looped) {
         code = mstmm_pass_row_closed(state);
         if (code) return code;
     }
-    if (model->looped && state->planar) {
-        code = mstmm_pass_row_closed_in_plane(state);
-        if (code) return code;
-    }
-    if (model->looped && !state->planar) {
+    if (model->looped) {
         code = mstmm_pass_row_found(state);
         if (code) return code;
     }
-    if (model->looped && state->planar) {
-        code = mstmm_pass_row_found_in_plane(state);
-        if (code) return code;
-    }
-    if (model->looped && !state->planar) {
+    if (model->looped) {
         code = mstmm_pass_answered(state);
         if (code) return code;
     }
-    if (model->looped && state->planar) {
-        code = mstmm_pass_answered_in_plane(state);
-        if (code) return code;
-    }
-    if (model->looped && !state->planar) {
+    if (model->looped) {
         code = mstmm_pass_closures_answered(state);
-        if (code) return code;
-    }
-    if (model->looped && state->planar) {
-        code = mstmm_pass_closures_answered_in_plane(state);
         if (code) return code;
     }
     if (state->balance) {
@@ -7407,6 +7627,53 @@ int mstmm_run_accelerations(mstmm_state *state)
         code = mstmm_hook_product_compared(state);
         if (code) return code;
     }
+    return 0;
+}
+
+/* Rates of the coordinates and accelerations. */
+int mstmm_run_accelerations_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code;
+    if (model->n_values) {
+        code = mstmm_pass_prescribed_in_plane(state);
+        if (code) return code;
+        if (model->n_values) {
+            code = mstmm_hook_expression_values(state);
+            if (code) return code;
+        }
+        code = mstmm_pass_forward_in_plane(state);
+        if (code) return code;
+        code = mstmm_pass_efforts_in_plane(state);
+        if (code) return code;
+        code = mstmm_pass_laws_in_plane(state);
+        if (code) return code;
+        code = mstmm_pass_poses_in_plane(state);
+        if (code) return code;
+    } else {
+        code = mstmm_chain_accelerations_in_plane(state);
+        if (code) return code;
+    }
+    code = mstmm_pass_loads_in_plane(state);
+    if (code) return code;
+    code = mstmm_pass_forces_in_plane(state);
+    if (code) return code;
+    code = mstmm_hook_rows_begun(state);
+    if (code) return code;
+    code = mstmm_pass_closures_in_plane(state);
+    if (code) return code;
+    code = mstmm_hook_rows_asked(state);
+    if (code) return code;
+    code = mstmm_pass_carried_in_plane(state);
+    if (code) return code;
+    code = mstmm_pass_row_closed_in_plane(state);
+    if (code) return code;
+    code = mstmm_pass_row_found_in_plane(state);
+    if (code) return code;
+    code = mstmm_pass_answered_in_plane(state);
+    if (code) return code;
+    code = mstmm_pass_closures_answered_in_plane(state);
+    if (code) return code;
     return 0;
 }
 

@@ -16,6 +16,7 @@ int mstmm_at_exerted(mstmm_state *state, int index);
 int mstmm_at_felt_by(mstmm_state *state, int index);
 int mstmm_run_given(mstmm_state *state);
 int mstmm_run_accelerations(mstmm_state *state);
+int mstmm_run_accelerations_in_plane(mstmm_state *state);
 int mstmm_run_inverse_dynamics(mstmm_state *state);
 int mstmm_run_correction(mstmm_state *state);
 int mstmm_run_motion(mstmm_state *state);

@@ -166,7 +166,6 @@ class Replay(RowSlots):
             "laws": bool(s.laws), "driven": s.drives is not None,
             "valued": s.values is not None, "posed": bool(self._posed),
             "flexible": any(body.modal for body in s.bodies),
-            "planar": False,  # what is across the plane folds by itself
         }  # fmt: skip
         return known[trait]
 

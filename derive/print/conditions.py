@@ -39,7 +39,7 @@ _TRAITS = {
     "placing": "(state->closing > 0)",
     "gaping": "state->level == MSTMM_GAP", "slipping": "state->level == MSTMM_SLIP",
     "united": "state->tangents->unit",
-    "effort": "force->effort", "qr": "model->qr", "planar": "state->planar",
+    "effort": "force->effort", "qr": "model->qr",
     "rigid": "body->kernels->rigid",
     "hung": "(body->parent >= 0)", "kept": "(state->observed || state->balance)",
 }  # fmt: skip

@@ -1,4 +1,5 @@
-"""Passes in a plane: of scenes where every hinge is a free pin and all pins are parallel.
+"""Passes in a plane: of scenes with closed loops where every hinge is a free pin and all pins are
+parallel.
 
 What such a scene has is known beforehand: steps whose conditions do not hold go, and conditions
 that do.  Kernels are those in a plane, where there are such.
@@ -9,15 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from .steps import Call, Do, Each, EachSpeed, Pass, Pick, Spread, Step
+from .steps import Call, Do, Each, EachSpeed, Pass, Pick, Run, Spread, Step, Sweep
 
 #: What holds of such a scene, and of evaluations of accelerations that nobody observes.
 _HOLDS = {
-    **dict.fromkeys(("own", "free", "moving", "hinged", "known"), True),
+    **dict.fromkeys(("own", "free", "moving", "hinged", "known", "posed", "looped"), True),
     **dict.fromkeys(
         ("parts", "whole", "staged", "section", "outward", "modal", "imposed", "distance", "plane",
          "rolling", "coupled", "soft", "corrected", "gaping", "placing", "slipping", "refined",
-         "inverse", "balance", "kept", "unmoved"), False,
+         "inverse", "weightless", "balance", "kept", "unmoved", "linked", "driven", "flexible",
+         "couplings", "product", "qr"), False,
     ),
 }  # fmt: skip
 #: What could be met one by one, and is not there.
@@ -33,15 +35,25 @@ _KERNELS = {
         "meet", "slip", "drift", "row", "known", "told", "act", "close", "shed", "multiplier_more",
     )),
 }  # fmt: skip
+#: What nobody asks of the frame of a hinge that closes a loop.
+_OF_MASS = {"body.inertia", "body.bias_load", "frames.pivot_floor"}
 #: Slots of the free speeds -> those of all speeds.
 _SLOTS = {"hinge.J_free": "body.rotor", "hinge.tau_free": "body.tau", "hinge.rates": "body.udot"}
 #: Ports of what is the same for all pins.
 _SAME = {("H", "hinge.H_free"), ("H", "hinge.H"), ("v_rel", "hinge.v"), ("W", "zero")}
 
 
-def in_plane(whole: Pass) -> Pass:
-    """The pass for scenes in a plane."""
-    return replace(whole, name=f"{whole.name}_in_plane", steps=tuple(_steps(whole.steps)))
+def sweep_in_plane(whole: Sweep) -> Sweep:
+    """The sweep for scenes in a plane."""
+    runs = (run for run in _steps(whole.runs) if isinstance(run, Run))
+    return replace(whole, name=f"{whole.name}_in_plane", runs=tuple(runs))
+
+
+def _in_plane(whole: Pass) -> Pass:
+    """The pass for scenes in a plane, where it is another one."""
+    spares = "" if "linked" in whole.spares_links.split() else whole.spares_links
+    found = replace(whole, steps=tuple(_steps(whole.steps)), spares_links=spares)
+    return whole if found == whole else replace(found, name=f"{whole.name}_in_plane")
 
 
 def _steps(steps: tuple[Step, ...]) -> Iterator[Step]:
@@ -51,13 +63,14 @@ def _steps(steps: tuple[Step, ...]) -> Iterator[Step]:
         if isinstance(step, (Pick, Spread)) or (isinstance(step, Each) and step.of in _NONE):
             continue
         left = [word for word in step.when.split() if word.lstrip("!") not in _HOLDS]
+        if isinstance(step, Call) and step.kernel in _OF_MASS:
+            left.append("!aside")
         yield _replaced(replace(step, when=" ".join(left)))
 
 
 def _replaced(step: Step) -> Step:
-    if isinstance(step, Do):
-        assert step.whole is not None
-        return replace(step, whole=in_plane(step.whole))
+    if isinstance(step, (Do, Run)) and step.whole is not None:
+        return replace(step, whole=_in_plane(step.whole))
     if isinstance(step, (Each, EachSpeed)):
         return replace(step, steps=tuple(_steps(step.steps)))
     if isinstance(step, Call) and step.kernel in _KERNELS:

@@ -22,7 +22,7 @@ from .loops import (
 )
 from .mass import COMPOSITION, EXERTED, FELT_BY
 from .motion import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
-from .planar import in_plane
+from .planar import sweep_in_plane
 from .qr import QR_CONDENSE, QR_OWN
 from .refine import RESTATED, RESTATED_OF_TREE
 from .riccati import CONDENSE, RECOVER
@@ -64,20 +64,12 @@ _CLOSED = (
 )
 
 
-def _either(run: Run, when: str) -> tuple[Run, ...]:
-    """A pass in space or in a plane."""
-    if run.whole is None or in_plane(run.whole).steps == run.whole.steps:
-        return (replace(run, when=when),)
-    flat = Run(whole=in_plane(run.whole), when=f"{when} planar")
-    return (replace(run, when=f"{when} !planar"), flat)
-
-
 ACCELERATIONS = Sweep(
     "accelerations", "Rates of the coordinates and accelerations.",
     (
         *_GIVEN,
         Run(hook="links_forward", when="linked"),
-        *_either(Run(whole=FORWARD), "!linked"),
+        Run(whole=FORWARD, when="!linked"),
         Run(whole=QR_OWN, when="qr"),
         Run(whole=EFFORTS_POWER, when="balance efforts"),
         Run(whole=EFFORTS),
@@ -85,7 +77,7 @@ ACCELERATIONS = Sweep(
         Run(whole=RESTATED, when="refined looped"),
         Run(whole=RESTATED_OF_TREE, when="refined !looped"),
         Run(whole=STRAIN, when="balance flexible"),
-        *_either(Run(whole=POSES), "posed"),
+        Run(whole=POSES, when="posed"),
         Run(hook="product_before_loads", when="product"),
         *_APPLIED,
         Run(hook="product", when="product"),
@@ -94,12 +86,15 @@ ACCELERATIONS = Sweep(
         Run(whole=CONDENSE, when="!linked !qr !looped"),
         Run(whole=QR_CONDENSE, when="qr"),
         Run(whole=RECOVER, when="!linked !looped"),
-        *(one for run in _CLOSED for one in _either(run, "looped")),
+        *(replace(run, when="looped") for run in _CLOSED),
         Run(whole=DRIVE_POWER, when="balance"),
         Run(whole=COUPLINGS_ANSWERED, when="couplings"),
         Run(hook="product_compared", when="product"),
     ),
 )  # fmt: skip
+
+#: Of scenes with closed loops in a plane, where nobody observes.
+ACCELERATIONS_IN_PLANE = sweep_in_plane(ACCELERATIONS)
 
 INVERSE_DYNAMICS = Sweep(
     "inverse_dynamics", "Efforts that given accelerations need beyond the laws' own.",
@@ -153,9 +148,9 @@ SOLUTION = Sweep(
     (Run(whole=COLUMN), Run(whole=COLUMN_CARRIED), Run(whole=COLUMN_ANSWERED)),
 )
 
-SWEEPS = (GIVEN, ACCELERATIONS, INVERSE_DYNAMICS, CORRECTION, MOTION, POSED, FACTORISATION,
-          SOLUTION, DIRECTIONAL, APPLIED_SLOPE, TANGENT, BROUGHT, TANGENT_SOLUTION,
-          TANGENT_BEYOND, LAWS_ALONE, LAWS_SOLUTION, COMPOSITION)  # fmt: skip
+SWEEPS = (GIVEN, ACCELERATIONS, ACCELERATIONS_IN_PLANE, INVERSE_DYNAMICS, CORRECTION, MOTION,
+          POSED, FACTORISATION, SOLUTION, DIRECTIONAL, APPLIED_SLOPE, TANGENT, BROUGHT,
+          TANGENT_SOLUTION, TANGENT_BEYOND, LAWS_ALONE, LAWS_SOLUTION, COMPOSITION)  # fmt: skip
 
 #: Passes that the looped engine's own C does for one subject at a time: links and what lies between
 #: their runs, observations, ways to the root.

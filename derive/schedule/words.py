@@ -379,7 +379,6 @@ TRAITS: dict[str, str] = {
     "placing": "gaps are to be closed by accelerations within a step",
     "gaping": "a gap",
     "slipping": "a slip",
-    "planar": "every hinge is a free pin, all of them are parallel, and nobody observes",
     "qr": "the sweep is that of least squares",
     "rigid": "the body is the built-in rigid one",
     "kept": "somebody reads S and e behind the sweep",

@@ -230,7 +230,7 @@ typedef struct {
     int n_imposed;  /* bodies with speeds that are driven or held */
     const mstmm_product *product; /* accelerations by the plain product; NULL: by a sweep */
     int qr; /* the sweep is that of least squares */
-    int planar; /* every hinge is a free pin, and all of them are parallel */
+    int planar; /* closed loops of free pins, all of them parallel */
     mstmm_body *bodies;
     int n_runs;
     const mstmm_branch *runs; /* all bodies in order, see mstmm_fill_runs */
@@ -372,7 +372,6 @@ typedef struct mstmm_state {
     mstmm_balance *balance; /* NULL: not wanted */
     mstmm_failure *failure;
     int linked;       /* runs with numbers are swept as links */
-    int planar;       /* nothing across the plane is swept */
     int observed;     /* idle ends are swept too */
     int hinges_known; /* hinges have their motion already */
     int level;        /* MSTMM_GAP, MSTMM_SLIP; 0: accelerations */
