@@ -39,7 +39,7 @@ class Linearising:
         system, layout = model.packed.system, model.layout
         twists = any(law.twist >= 0 for law in system.laws)
         #: Whether states are in order as they are given.
-        self._settled = not (len(layout.quaternions) or system.driven or twists or system.closures)
+        self._settled = not (len(layout.quaternions) or system.driven or twists or system.closes)
         self._straight = all(h.straight for h in layout.hinges.values() if h.nu)
 
     def __call__(

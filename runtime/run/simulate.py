@@ -212,7 +212,7 @@ def _among(t: Array, times: Array) -> NDArray[np.bool_]:
 
 def _moved(engine: Engine) -> bool:
     """Whether drives or closed loops decide on some coordinates."""
-    return bool(engine.packed.system.driven or engine.packed.system.closures)
+    return bool(engine.packed.system.driven or engine.packed.system.closes)
 
 
 def settles(engine: Engine) -> bool:

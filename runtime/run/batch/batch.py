@@ -131,7 +131,7 @@ def simulate_batch(
         np.full((n, len(times), model.packed.system.n_memory), np.nan),
     )  # fmt: skip
     alike = _of_equal_times(model, models, settings)
-    closing = bool(model.packed.system.closures)  # by numbers that all share
+    closing = model.packed.system.closes  # by numbers that all share
     ours = np.array([library is not None and alike[id(m)] and m.fusion.lanes is library
                      and (m is model or not closing) for m in models], bool) & ~failed  # fmt: skip
     if library is not None and ours.any():
@@ -216,7 +216,7 @@ def _side_by_side(
     settings: Settings, q: Array, u: Array, which: NDArray[np.int64], rows: _Rows, threads: int,
 ) -> None:  # fmt: skip
     engine = given.timed(model).looped
-    code = _scalar(model, settings) if model.packed.system.closures else None
+    code = _scalar(model, settings) if model.packed.system.closes else None
     systems = [SceneSystem(engine, code, with_power=False) for _ in range(threads)]
     start = np.ascontiguousarray(np.concatenate([q[which], u[which]], axis=1))
     start, _ = settled(systems[0], np.zeros(len(start)), start, np.zeros((len(start), 1)))

@@ -131,3 +131,36 @@ def test_batches_and_sessions() -> None:
     for _ in range(3):
         session.advance(0.1)
     assert np.abs(session.q - alone.q[-1]).max() < 1e-7
+
+
+@pytest.mark.parametrize("engine", ["looped", "fused"])
+def test_a_batch_by_numbers_and_starts_of_its_own(engine: str) -> None:
+    """Scenes that nothing but a coupling closes: every trajectory is that of a run alone."""
+    bodies = [wheel("a", 0.1) | {"center_of_mass": [0.1, 0, 0]}, wheel("b", 0.2)]
+    scene = coupled(
+        bodies, [pin("A", "a", initial={"q": 0.3}), pin("B", "b", initial={"q": 0.5})],
+        {"expression": "A.q - k*B.q", "equals": "-0.7"}, constants={"k": 2.0},
+    ).scene  # fmt: skip
+    model = mstmm.compile(scene, engine=engine)
+    ratios, starts = [2.0, 2.5, 3.0], np.array([[0.3, 0.5], [1.0, 0.1], [0.3, 0.5]])
+    times = np.linspace(0.0, 0.5, 8)
+    batch = model.simulate_batch(
+        (starts, np.zeros((3, 2))), {"constants.k": ratios}, t_end=0.5, output_times=times
+    )
+    assert batch.success.all(), batch.messages
+    for k, ratio in enumerate(ratios):
+        alone = model.with_parameters({"constants.k": ratio}).simulate(
+            0.5, "dop853", initial=(starts[k], np.zeros(2)), output_times=times
+        )
+        assert np.abs(batch.q[k] - alone.q).max() < 1e-8
+        for q in (batch.q[k], alone.q):
+            assert np.abs(q[:, 0] - ratio * q[:, 1] + 0.7).max() < 1e-13
+
+
+@pytest.mark.parametrize("method", ["dop853", "kvaerno5"])
+def test_samples_between_steps_keep_what_is_coupled(method: str) -> None:
+    model = _arms({"expression": "elbow.q - 2*shoulder.q^2"})
+    times = np.linspace(0.0, 1.0, 101)
+    q = model.simulate(1.0, method, rtol=1e-3, output_times=times).q
+    gap = q[:, 1] - 2 * q[:, 0] ** 2
+    assert len(q) == 101 and np.ptp(gap) < 1e-12
