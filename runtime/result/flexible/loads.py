@@ -145,7 +145,8 @@ class _Sums:
         before = np.concatenate([zero, np.cumsum(self.panels, axis=1)], axis=1)
         behind = np.concatenate([np.cumsum(self.panels[:, ::-1], axis=1)[:, ::-1], zero], axis=1)
         where = np.searchsorted(self.edges, places)
-        outer = places >= held
+        # At the section itself the part beyond is that on the outer side, which a held tip has not.
+        outer = places >= held if held < self.motion.shapes.length else places > held
         total = np.where(outer[:, None], behind[:, where], -before[:, where])
         for x, wrench in self.points:
             beyond = outer & (x >= places) & (x != held)

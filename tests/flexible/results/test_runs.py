@@ -79,6 +79,23 @@ def test_the_free_side_gives_the_load_of_the_hinge_that_holds_the_beam(run: Resu
     assert np.abs(force).max() > 5.0 and np.abs(moment).max() > 0.05
 
 
+@pytest.mark.parametrize("end", ["root", "tip"])
+def test_a_cantilever_held_by_either_end_has_its_weight_there(end: str) -> None:
+    """At a held tip nothing of the beam lies beyond: there it is the hinge that holds."""
+    blade = {"name": "blade", "length": 2.0, "mass_per_length": 1.5, "bending_stiffness": 1e5,
+             "modes": {"y": 3}, "initial": "static", "stiffening": False}  # fmt: skip
+    weld = {"name": "weld", "type": "fixed", "inboard": "ground", "outboard": f"blade.{end}"}
+    scene = mstmm.Scene(gravity=[0, -9.81, 0], beam=[blade], hinge=[weld])
+    run = mstmm.compile(scene).simulate(0.01, output_times=[0.0])
+    weight, at = 9.81 * 3.0, 0.0 if end == "root" else 2.0
+    holds = -weight if end == "root" else weight  # of the part beyond on the part before
+    for x in (at, end):
+        np.testing.assert_allclose(run.section_force("blade", x)[0], [0, holds, 0], atol=1e-2)
+        np.testing.assert_allclose(run.section_moment("blade", x)[0, 2], -weight, rtol=1e-4)
+    named = run.quantity(f"blade.{end}.section_moment.z").values
+    np.testing.assert_allclose(abs(named), abs(run.moment("weld")[:, 2]), rtol=1e-9)
+
+
 @pytest.mark.parametrize(("table", "tolerance"), [({}, 3e-6), ({"quadrature": True}, 1e-4)])
 def test_the_same_with_stiffening_up_to_third_order(
     table: dict[str, Any], tolerance: float
