@@ -12,3 +12,13 @@ def releasable(scene: Scene) -> list[str]:
         if event.do == "release" and event.hinge not in names:
             names.append(str(event.hinge))
     return names
+
+
+def let_go_before(scene: Scene, t: float) -> list[str]:
+    """Those that are free at t (s) whatever has happened: by conditions of time alone."""
+    own = [(h.name, h.release) for h in scene.hinge if h.release is not None]
+    events = [(str(e.hinge), e.when) for e in scene.event if e.do == "release"]
+    return [
+        name for name, condition in own + events
+        if condition.depends_on_time_only and condition.evaluate(lambda _: t)
+    ]  # fmt: skip

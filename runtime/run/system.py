@@ -22,6 +22,7 @@ from ..engine.tangent import Tangent
 from ..kernels.fused import FusedLibrary
 from ..kernels.tape import c_tape
 from ..pack.layout import StateNames
+from ..pack.letting_go import let_go_before
 from ..pack.packed import resize
 from ..pack.qr import refuse_steps
 from ..pack.records.bounces import Bounce, refuse_beyond_stops
@@ -196,12 +197,16 @@ class SceneSystem:
     def start(self, t: float, q: ArrayLike, u: ArrayLike) -> Array:
         """State vector at t with driven coordinates, quaternions, loops and memory in order.
 
-        Raises SceneError where a loop does not close near the state.
+        Hinges that have let go by then go on from what is given, as free ones.  Raises SceneError
+        where a loop does not close near the state.
         """
         y = np.concatenate(
             [np.asarray(q, float), np.asarray(u, float), np.zeros(int(self.with_power))]
         )
         y = np.ascontiguousarray(y)
+        packed = self.engine.packed
+        for name in let_go_before(packed.scene, t) if packed.releases else ():
+            self.memory[packed.releases[name]] = 1.0
         self.run.failure.reason = 0  # of another state that did not close
         self.engine.lib.mstmm_scene_settle(self.run, t, self.engine.pointer(y))
         if self.run.failure.reason in (Failed.LOOP, Failed.COUPLING, Failed.FLAT):

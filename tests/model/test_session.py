@@ -158,6 +158,29 @@ def test_a_release_is_met_inside_a_session(when: str) -> None:
     assert abs(stepped.q[0] - 0.3 * np.sin(0.5)) > 0.05
 
 
+@pytest.mark.parametrize("by_event", [False, True])
+@pytest.mark.parametrize("method", ["dop853", "rodas4p2", "scipy-DOP853"])
+def test_what_let_go_before_a_run_goes_on_from_what_is_given(by_event: bool, method: str) -> None:
+    """A second run over the rest of the first: its drive is over, and does not fill the state."""
+    hinge = {"name": "clamp", "type": "pin", "inboard": "ground", "outboard": "rod1",
+             "drive": "0.2*t"}  # fmt: skip
+    event = {"name": "go", "when": "t >= 1", "do": "release", "hinge": "clamp"}
+    more = {"event": [event]} if by_event else {}
+    hinges = [hinge if by_event else hinge | {"release": 1.0}]
+    model = mstmm.compile(
+        mstmm.Scene(gravity=(0, -9.81, 0), body=[body("rod1")], hinge=hinges, **more)
+    )
+    whole = model.simulate(3.0, method, output_times=[0.5, 2.0, 3.0])
+    rest = model.simulate(3.0, method, t_start=2.0, initial=(whole.q[1], whole.u[1]))
+    np.testing.assert_array_equal(rest.q[0], whole.q[1])
+    np.testing.assert_allclose(rest.q[-1], whole.q[2], rtol=0, atol=1e-6)
+    driven = model.simulate(0.9, method, t_start=0.5, initial=(whole.q[1], whole.u[1]))
+    assert abs(driven.q[0, 0] - 0.1) < 1e-15
+    stepped = model.session(whole.q[1], whole.u[1], 2.0)
+    stepped.advance(1.0)
+    np.testing.assert_allclose(stepped.q, whole.q[2], rtol=0, atol=1e-6)
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_failure_leaves_the_last_good_state_from_which_it_goes_on(engine: str) -> None:
     model = arm(engine, "log(motor)")
