@@ -32,4 +32,6 @@ def assemble(
         hinge.name for hinge in compiled.packed.described.hinge
         if not hinge.is_weld and hinge.drive is None and u[hinges[hinge.name].u_slice].any()
     ]  # fmt: skip
+    if sum(hinges[name].nu for name in moving) > compiled.closed.loops.mobility:
+        moving = []  # a whole state: no more than its freedoms can be kept
     return compiled.closed.assembled(q, u, hold, moving if fast is None else fast)

@@ -83,8 +83,9 @@ class Model(Linearised, Displayed):
         """The nearest (q, u) at which all loops are closed; near the start where nothing is given.
 
         q (nq,) and u (nu,) are wishes, but for the coordinates of the hinges named in `hold`, and
-        for the speeds of hinges that have some, which stay what they are; driven coordinates are
-        those at t = 0.  What changes changes least, by inertia.  Without loops the state itself.
+        for the speeds of hinges that have some, which stay what they are where these are no more
+        than the mechanism has freedoms; driven coordinates are those at t = 0.  What changes
+        changes least, by inertia.  Without loops the state itself.
 
         Raises SceneError for a hinge that there is not, for loops that do not close near the
         state, and for speeds that contradict each other.

@@ -288,14 +288,17 @@ class Closed:
                         f'scene: coupling "{closing}" contradicts what others ask, by '
                         f"{missing[row]:.3g} at the start; leave it out, or correct what it equals"
                     )
-                way = skewed_by_gap(self.engine.packed, float(missing[row]))
-                if not way:
-                    way = "make axes parallel and points meet, or use a ball or cylindrical hinge"
                 raise SceneError(
                     f"scene: direction {direction} of {calls.closing(row)} repeats what others "
-                    f"do, but for a gap of {missing[row]:.3g}: as a rigid mechanism it would lock; "
-                    f"{way}"
+                    f"do, but for a gap of {missing[row]:.3g}: "
+                    f"{self._sharing(q) or self._locking(float(missing[row]))}"
                 )
+
+    def _locking(self, gap: float) -> str:
+        """Why a gap (m, rad) that nothing closes is none of a mechanism, and what to do."""
+        way = skewed_by_gap(self.engine.packed, gap)
+        way = way or "make axes parallel and points meet, or use a ball or cylindrical hinge"
+        return f"as a rigid mechanism it would lock; {way}"
 
     def _shared(self) -> int:
         """Speeds of cut hinges that nobody imposes: the tree has them already."""

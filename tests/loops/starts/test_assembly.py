@@ -80,6 +80,21 @@ def test_speeds_that_are_given_stay_what_they_are() -> None:
     assert np.abs(u - wanted).max() < 1e-8
 
 
+def test_a_whole_state_is_a_wish() -> None:
+    """With more speeds than freedoms none can be kept: what `assemble` gives is where a run begins
+    that is given the same state."""
+    model = mstmm.compile(mstmm.Scene(**linkage("closing_pin", laws=False)))
+    q, _ = model.initial_state()
+    wish, speeds = q + 0.01, np.array([1.5, -0.4, 0.7, 0.2])
+    closed, moving = model.assemble(wish, speeds)
+    begun = model.simulate(0.0, "dop853", initial=(wish, speeds))
+    np.testing.assert_allclose(closed, begun.q[0], rtol=0, atol=1e-3)
+    slips = model.simulate(0.0, "dop853", initial=(closed, moving)).u[0] - moving
+    assert np.abs(slips).max() < 1e-12 and np.abs(moving).min() > 0.01
+    again = model.assemble(closed, moving)
+    np.testing.assert_allclose(again, (closed, moving), rtol=0, atol=1e-9)
+
+
 def test_speeds_that_contradict_each_other() -> None:
     scene = linkage("closing_pin", laws=False)
     scene["hinge"][2]["initial"]["u"] = -3.0
