@@ -22,6 +22,9 @@ _ZERO = 1e-9
 #: Part of the stored energy against which rounding is judged where hardly anything moves.
 _AT_REST = 1e-8
 
+#: Place (m) below which a body lies at one and the same height.
+_HEIGHT = 1e-15
+
 #: Bodies that are looked at to learn how far a scene reaches.
 _SOME = 30
 
@@ -45,7 +48,8 @@ def _change(values: Array) -> float:
 def energy(result: Record) -> Drift:
     """T + V - W against the largest sum of what was exchanged: T, changes of V, W.
 
-    At rest under load nothing is exchanged: then against a part of what is stored.
+    At rest under load nothing is exchanged: then against a part of what is stored, or against what
+    rounding of places is worth to gravity.
     """
     parts, work = result.energies(), result.work
     with np.errstate(all="ignore"):  # what overflows is told by what it leaves
@@ -54,9 +58,18 @@ def energy(result: Record) -> Drift:
         exchanged = parts["kinetic"] + np.abs(work)
         for name in ("gravity", "springs"):
             exchanged = exchanged + np.abs(parts[name] - parts[name][:1])
-    scale = max(_largest(exchanged), _AT_REST * _stored(parts))
+    rounding = _HEIGHT * _mass(result) * float(np.linalg.norm(result.model.scene.gravity))
+    scale = max(_largest(exchanged), _AT_REST * _stored(parts), rounding)
     change = np.nan if overflows else _change(residual)
     return Drift("energy", "J", change if len(residual) else 0.0, scale, "exchanged")
+
+
+def _mass(result: Record) -> float:
+    """All that moves, kg."""
+    scene = result.model.scene
+    mass = sum(body.mass for body in scene.body)
+    mass += sum(chain.body_of(k).mass for chain in scene.chain for k in range(chain.count))
+    return mass + sum(undeformed(body)[0] for body in result.model.flexible.values())
 
 
 def _stored(parts: Mapping[str, Array]) -> float:
@@ -90,9 +103,7 @@ def momentum(result: Record) -> list[Drift]:
     reach = max((_largest(result.position(name) - pivot) for name in names), default=0.0)
     kinetic = _largest(result.energies()["kinetic"])
     force, moment = _support(result, reach, kinetic, pivot)
-    mass = sum(body.mass for body in scene.body)
-    mass += sum(chain.body_of(k).mass for chain in scene.chain for k in range(chain.count))
-    mass += sum(undeformed(body)[0] for body in flexible.values())
+    mass = _mass(result)
     linear, angular = result.momentum(), result.angular_momentum()
     angular = angular - np.cross(pivot, linear)
     speed = np.sqrt(2 * max(kinetic, _AT_REST * _stored(result.energies()))) * np.sqrt(mass)

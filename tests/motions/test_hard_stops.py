@@ -126,14 +126,14 @@ def test_a_start_that_leaves_a_stop_is_taken() -> None:
     assert one.simulate(0.5).q[-1, 0] == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize(
-    ("number", "said"), [(1, "rates of a free hinge are not its speeds"), (5, "has no limits")]
-)
-def test_speeds_that_are_no_rates(number: int, said: str) -> None:
+@pytest.mark.parametrize("number", [1, 5])
+def test_speeds_that_are_no_rates(number: int) -> None:
+    """One message, and none that leads to a stop which would be refused as well."""
     limits: list[Scene] = [{}] * 6
     limits[number] = {"upper": 1.0, "restitution": 0.5}
-    with pytest.raises(mstmm.SceneError, match=said):
+    with pytest.raises(mstmm.SceneError, match="a free hinge has no limits") as caught:
         mstmm.Scene(**slider(limits, "free"))
+    assert "stiffness" not in str(caught.value)
 
 
 def test_a_knee_stops_as_an_event_does() -> None:

@@ -227,13 +227,15 @@ def test_it_runs_as_mujoco_runs_it(tmp_path: Path) -> None:
 def test_equalities_of_joints_become_couplings_and_the_rest_is_told(tmp_path: Path) -> None:
     extra = """<equality><joint joint1="swing" joint2="lean" polycoef="0.1 2 0 0 0"/>
       <weld body1="bird" body2="cart"/></equality>
-      <actuator><motor joint="flap"/></actuator></mujoco>"""
+      <actuator><motor joint="flap"/></actuator>
+      <keyframe><key name="home" qpos="0.1"/></keyframe></mujoco>"""
     _, one = machine(tmp_path, MACHINE.replace("</mujoco>", extra))
     (coupling,) = one.scene.coupling
     assert [name.text for name in coupling.names] == ["swing.q", "lean.q"]
     told = [f"{note.element}: {note.text}" for note in one.notes]
     assert "equality 'equality1' (weld): left out" in told
     assert "actuators: left out, 1 of them" in told
+    assert "keyframes: left out, 1 of them" in told
 
 
 def test_what_of_mjcf_is_left_out_is_told_by_name_and_line(tmp_path: Path) -> None:

@@ -135,6 +135,19 @@ def test_a_load_along_a_beam_is_a_load() -> None:
     assert run.warnings == ()
 
 
+def test_what_rests_but_for_rounding_keeps_its_energy() -> None:
+    """A bead at the bottom of a wire, with no more energy than the last digits of its place."""
+    scene = mstmm.Scene(
+        gravity=[0, 0, -9.81], body=[{"name": "bead", "mass": 1.0, "inertia": [0.1, 0.12, 0.15]}],
+        hinge=[{"name": "loose", "type": "free", "inboard": "ground", "outboard": "bead"}],
+        constraint=[{"type": "point-on-curve", "from": "ground", "to": "bead", "start": 0.5,
+                     "curve": ["s", "0.2*sin(s)", "0.5*s^2"]}],
+    )  # fmt: skip
+    result = mstmm.compile(scene, engine="looped").simulate(1.0, certify=True)
+    assert np.abs(result.energy()).max() < 1e-20
+    assert result.trusted, result.warnings
+
+
 def test_one_sample_has_no_lines_of_momentum() -> None:
     text = str(mstmm.compile(top(0.0)).simulate(2.0, output_times=[2.0]).certificate)
     assert "energy balance       not determined: one sample" in text

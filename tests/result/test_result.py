@@ -282,6 +282,12 @@ def test_table_shows_units_and_both_ends(run: Result) -> None:
     assert float(lines[-1].split()[1]) == pytest.approx(run.position("arm.tip")[-1, 1], rel=1e-5)
 
 
+@pytest.mark.parametrize("rows", [1, 2.5, True, "3"])
+def test_a_table_of_no_number_of_rows_is_refused(run: Result, rows: object) -> None:
+    with pytest.raises(mstmm.SceneError, match=r"rows = .*: expected a whole number of rows, 2"):
+        run.table("energy", rows=rows)  # type: ignore[arg-type]
+
+
 def test_a_pendulum_swings_as_the_elliptic_functions_say() -> None:
     angle, t = 0.8, np.linspace(0, 10, 101)
     run = mstmm.compile(pins(1, [angle])).simulate(10.0, output_times=t, rtol=1e-11)

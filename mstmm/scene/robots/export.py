@@ -184,7 +184,8 @@ class _Reader:
             "release": hinge.release is not None,
             "damping": not one and any(law.damping for law in laws),
             "friction": not one and any(law.friction.acts for law in laws),
-            "stiffness of its stops": any(law.limits.acts for law in laws),
+            "stiffness of its stops": any(law.limits.stiffness for law in laws),
+            "restitution of its stops": any(law.limits.restitution for law in laws),
             "stops that its rated range contradicts": one and not _said(
                 laws[0].limits, *_ENDS).items() <= _range(hinge).items(),
             "start": hinge.initial is not None and (

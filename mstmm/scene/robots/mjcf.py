@@ -39,6 +39,7 @@ _HINGES = ("free", "ball", "prismatic", "pin")
 #: What of a model moves something and is left out, by the name of its count.
 _LEFT = {
     "nu": "actuators", "nsensor": "sensors", "nplugin": "plugins", "nflex": "flexible parts",
+    "nkey": "keyframes",
 }  # fmt: skip
 #: Likewise, each by its name: its count, its section of the file.
 _NAMED = {

@@ -165,7 +165,8 @@ def _law(hinge: HingeKeys, kind: HingeFacts, problems: list[tuple[Location, str]
         changes[key] = values * count if len(values) == 1 else values or (default,) * count
     if kind.quaternion is not None:
         problems += _rotation_law(kind, changes)
-    if not kind.straight and any(stop.restitution for stop in changes["limits"]):
+    turns = kind.quaternion is not None  # which has been said
+    if not (kind.straight or turns) and any(stop.restitution for stop in changes["limits"]):
         problems.append((
             ("law", "limits"),
             f"the rates of {a_hinge(kind.name)} are not its speeds, which a hard stop throws back; "

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mstmm.arrays import whole
+
 from ..plotting.choice import choose
 
 if TYPE_CHECKING:
@@ -41,7 +43,7 @@ def table(
     chose names, some are chosen, and `beside` stands beside them."""
     chosen = list(names) or [*default_names(result), *beside]
     columns = [("t", "s", result.t), *flat([result.quantity(name) for name in chosen])]
-    picked = _spread(result.t, rows)
+    picked = _spread(result.t, whole("rows", rows, 2, "a whole number of rows, 2 or more"))
     texts = [
         [name, f"[{unit}]" if unit else "", *(f"{value:.6g}" for value in values[picked])]
         for name, unit, values in columns
