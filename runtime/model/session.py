@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from copy import copy as shallow
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Never, Self
 
 import numpy as np
 
@@ -253,6 +253,12 @@ class Session:
 
     def __deepcopy__(self, _: object) -> Self:
         return self.copy()
+
+    def __reduce__(self) -> Never:
+        raise SceneError(
+            "a session stays in its process and is not pickled; keep its model, t and state, and "
+            "begin another with model.session(q, u, t)"
+        )
 
     def __repr__(self) -> str:
         return f"<Session: t = {self.t:.9g} s{self.stopped and ', '}{self.stopped}>"
