@@ -329,6 +329,15 @@ mstmm_generic_tangent_answer_known_kernel *const mstmm_generic_tangent_answer_kn
     mstmm_sweep_generic6_tangent_answer_known,
 };
 
+static const real mstmm_plane[36] = {
+    0, 0, 0, 0, 0, 1,
+    0, 1, 0, 0, 0, 0,
+    0, 0, 0, 0, 0, 0,
+    0, 0, 0, 0, 0, 0,
+    0, 0, 0, 0, 0, 0,
+    -1, 0, 0, 0, 0, 0,
+};
+
 int64_t mstmm_modal_numbers(int n) { return (int64_t)40 * n + 2 * (int64_t)n * n; }
 int64_t mstmm_section_numbers(int n) { return (int64_t)18 * n + 54; }
 int64_t mstmm_bend_numbers(int n) { return (int64_t)89 * n + 4 * (int64_t)n * n; }
@@ -1915,11 +1924,7 @@ static int mstmm_at_closures_in_plane(mstmm_state *state, int index)
     real *outboard = closure ? mstmm_block(state->model, state->workspace, closure->outboard) : NULL;
     real *loops = state->workspace + state->model->loops;
     real *closed = closure ? loops + closure->numbers : NULL;
-    int code;
     if (!looped->closure) return 0;
-    code = mstmm_planar_complement(
-        .W = closed + MSTMM_CLOSURE_W);
-    if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
     mstmm_planar_meet(
         .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
         .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .r_e = closure->end,
@@ -1936,13 +1941,12 @@ static int mstmm_at_closures_in_plane(mstmm_state *state, int index)
         .slip = closed + MSTMM_CLOSURE_SLIP, .motion_C = block + MSTMM_BLOCK_MOTION,
         .motion_B = outboard + MSTMM_BLOCK_MOTION, .drift = drift);
     mstmm_planar_known(
-        .W = closed + MSTMM_CLOSURE_W, .relative = drift, .l = closed + MSTMM_CLOSURE_L);
+        .W = mstmm_plane, .relative = drift, .l = closed + MSTMM_CLOSURE_L);
     for (int k = 0; k < body->nu; k++) {
         mstmm_planar_row(
-            .w = closed + MSTMM_CLOSURE_W + 6 * k, .R_C = closed + MSTMM_CLOSURE_R_C,
-            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
-            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k,
-            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k);
+            .w = mstmm_plane + 6 * k, .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
+            .Rc = block + MSTMM_BLOCK_R, .r_A = closed + MSTMM_CLOSURE_LEVER,
+            .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k, .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k);
         mstmm_planar_act(
             .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
             .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = parent + MSTMM_BLOCK_E);
@@ -1954,12 +1958,9 @@ static int mstmm_at_closures_in_plane(mstmm_state *state, int index)
     for (int c = 0; c < 6; c++) {
         if (closure->rows[c] < 0) continue;
         mstmm_planar_row(
-            .w = closed + MSTMM_CLOSURE_W + 6 * c, .R_C = closed + MSTMM_CLOSURE_R_C,
-            .r_e = closure->end, .Rc = block + MSTMM_BLOCK_R,
-            .r_A = closed + MSTMM_CLOSURE_LEVER, .J_A = closed + MSTMM_CLOSURE_J_A + 6 * c,
-            .J_B = closed + MSTMM_CLOSURE_J_B + 6 * c);
-        memcpy(loops + closure->inner[c], closed + MSTMM_CLOSURE_J_A + 6 * c, (size_t)(6) * sizeof(real));
-        memcpy(loops + closure->outer[c], closed + MSTMM_CLOSURE_J_B + 6 * c, (size_t)(6) * sizeof(real));
+            .w = mstmm_plane + 6 * c, .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
+            .Rc = block + MSTMM_BLOCK_R, .r_A = closed + MSTMM_CLOSURE_LEVER,
+            .J_A = loops + closure->inner[c], .J_B = loops + closure->outer[c]);
         memcpy(loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN, closed + MSTMM_CLOSURE_L + c, (size_t)(1) * sizeof(real));
     }
     return 0;

@@ -156,7 +156,7 @@ _PLACES = {
     "second.L": "loops + row->others[b].pair", "both.L": "loops + other->pairs[b]",
     "scene.t": "&state->t", "sums.power": "&state->balance->power",
     "sums.potential": "&state->balance->potential", "identity": "mstmm_identity",
-    "zero": "mstmm_zeros", "none": "mstmm_zeros",
+    "zero": "mstmm_zeros", "none": "mstmm_zeros", "plane": "mstmm_plane",
     "link.b": "at.numbers", "link.p": "at.numbers + 11", "link.numbers": "at.numbers + 12",
     "link.q": "at.q", "link.u": "at.u", "link.qdot": "at.qdot", "link.udot": "at.udot",
     "link.tau": "at.tau", "link.turn": "at.link + MSTMM_LINK_TURN(at.nu)",

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from .steps import Call, Do, Each, EachSpeed, Pass, Pick, Run, Spread, Step, Sweep
+from .steps import Call, Do, Each, EachSpeed, Move, Pass, Pick, Run, Spread, Step, Sweep
 
 #: What holds of such a scene, and of evaluations of accelerations that nobody observes.
 _HOLDS = {
@@ -27,7 +27,6 @@ _NONE = ("own", "bent")
 #: Kernels that there are in a plane.
 _KERNELS = {
     *("hinge.forward", "body.inertia", "body.bias_load", "frames.pose", "frames.velocity"),
-    "generic{nu}.complement",
     *(f"generic{{free}}.{name}" for name in (
         "factor", "push", "push_on_ground", "answer", "divide", "couple", "answered", "pull",
     )),
@@ -37,10 +36,17 @@ _KERNELS = {
 }  # fmt: skip
 #: What nobody asks of the frame of a hinge that closes a loop.
 _OF_MASS = {"body.inertia", "body.bias_load", "frames.pivot_floor"}
-#: Slots of the free speeds -> those of all speeds.
-_SLOTS = {"hinge.J_free": "body.rotor", "hinge.tau_free": "body.tau", "hinge.rates": "body.udot"}
+#: Slots of the free speeds -> those of all speeds; rows of a hinge -> where they are carried from.
+_SLOTS = {
+    "hinge.J_free": "body.rotor", "hinge.tau_free": "body.tau", "hinge.rates": "body.udot",
+    "closure.J_A[6 * c]": "side.inner", "closure.J_B[6 * c]": "side.outer",
+}  # fmt: skip
+#: What is the same in every position, and stands in a table.
+_TABLES = {"closure.W": "plane"}
 #: Ports of what is the same for all pins.
 _SAME = {("H", "hinge.H_free"), ("H", "hinge.H"), ("v_rel", "hinge.v"), ("W", "zero")}
+#: The kernel that would fill the table.
+_TABULATED = "generic{nu}.complement"
 
 
 def sweep_in_plane(whole: Sweep) -> Sweep:
@@ -62,6 +68,10 @@ def _steps(steps: tuple[Step, ...]) -> Iterator[Step]:
             continue
         if isinstance(step, (Pick, Spread)) or (isinstance(step, Each) and step.of in _NONE):
             continue
+        if isinstance(step, Call) and step.kernel == _TABULATED:
+            continue
+        if isinstance(step, Move) and _SLOTS.get(step.source) == step.to:
+            continue
         left = [word for word in step.when.split() if word.lstrip("!") not in _HOLDS]
         if isinstance(step, Call) and step.kernel in _OF_MASS:
             left.append("!aside")
@@ -74,7 +84,11 @@ def _replaced(step: Step) -> Step:
     if isinstance(step, (Each, EachSpeed)):
         return replace(step, steps=tuple(_steps(step.steps)))
     if isinstance(step, Call) and step.kernel in _KERNELS:
-        ports = [(port, _SLOTS.get(slot, slot)) for port, slot in step.ports
-                 if (port, slot) not in _SAME]  # fmt: skip
+        ports = [(port, _slot(slot)) for port, slot in step.ports if (port, slot) not in _SAME]
         return replace(step, kernel=f"planar.{step.kernel.partition('.')[2]}", ports=tuple(ports))
     return step
+
+
+def _slot(slot: str) -> str:
+    name, picked, entry = slot.partition("[")
+    return _SLOTS.get(slot, f"{_TABLES.get(name, name)}{picked}{entry}")

@@ -11,7 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 #: Constants that any port may read; as long as the port.
-CONSTANTS = {"identity": "axes without a turn", "zero": "zeros", "none": "no numbers at all"}
+CONSTANTS = {
+    "identity": "axes without a turn", "zero": "zeros", "none": "no numbers at all",
+    "plane": "the own motion of a pin about z and what it holds, row by row",
+}  # fmt: skip
 
 #: Owners that stand for a body by its role.
 ROLES = ("parent", "on", "axes", "from", "to", "outboard", "meeting")
