@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from numbers import Integral, Real
 from typing import Any, TypeAlias, TypeGuard
@@ -80,9 +81,15 @@ def _ready(value: ArrayLike) -> TypeGuard[Array]:
     return type(value) is np.ndarray and value.dtype is _DOUBLE
 
 
+def _masked(value: ArrayLike) -> bool:
+    """Whether a mask hides some of it; without numpy.ma, which takes its time, there are none."""
+    known = sys.modules.get("numpy.ma")
+    return known is not None and bool(known.is_masked(value))
+
+
 def _converted(value: ArrayLike) -> Array:
     found = np.asarray(value)
-    if found.dtype.kind in "cSU":
+    if found.dtype.kind in "cSU" or _masked(value):
         raise TypeError
     return np.array(found, dtype=np.float64, order="C")
 

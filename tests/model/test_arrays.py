@@ -74,6 +74,10 @@ MISFITS: dict[str, tuple[Call, str]] = {
         lambda m: m.accelerations([[0.1, 0.2], [0.3]], U), "every row as long",
     ),
     "text": (lambda m: m.accelerations("30 deg", U), "q = '30 deg': expected an array of real"),
+    "masked numbers": (
+        lambda m: m.inverse_dynamics(Q, U, np.ma.masked_equal([1.0, 0.0], 0.0)),
+        ": expected an array of real numbers",
+    ),
     "complex numbers": (lambda m: m.inverse_dynamics(Q, U, [1j, 0]), "udot = [1j, 0]"),
     "no number": (lambda m: m.accelerations(Q, [np.nan, 0]), "u[0] = nan: expected a finite"),
     "no time": (lambda m: m.accelerations(Q, U, np.inf), "t = inf: expected a finite number"),
