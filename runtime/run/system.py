@@ -204,12 +204,14 @@ class SceneSystem:
             [np.asarray(q, float), np.asarray(u, float), np.zeros(int(self.with_power))]
         )
         y = np.ascontiguousarray(y)
-        packed = self.engine.packed
+        packed, run = self.engine.packed, self.run
         for name in let_go_before(packed.scene, t) if packed.releases else ():
             self.memory[packed.releases[name]] = 1.0
-        self.run.failure.reason = 0  # of another state that did not close
-        self.engine.lib.mstmm_scene_settle(self.run, t, self.engine.pointer(y))
-        if self.run.failure.reason in (Failed.LOOP, Failed.COUPLING, Failed.FLAT):
+        run.failure.reason = 0  # of another state that did not close
+        run.on_positions = 0  # no start slips, whatever the steps of this system's last run left
+        self.engine.lib.mstmm_scene_settle(run, t, self.engine.pointer(y))
+        run.on_positions = self.on_positions
+        if run.failure.reason in (Failed.LOOP, Failed.COUPLING, Failed.FLAT):
             raise SceneError(f"scene: {self.engine.failure_text(self.run.failure, t)}")
         return y
 
