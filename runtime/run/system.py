@@ -119,7 +119,8 @@ class SceneSystem:
 
     def ask_positions(self) -> None:
         """From now on steps of implicit methods, which have been offered a tangent, ask rows of
-        closed loops for positions where they end, and nothing of speeds."""
+        closed loops for positions where they end, and nothing of speeds; but for steps that are cut
+        short."""
         self.on_positions = True
         self.engine.lib.mstmm_scene_on_positions(self.run)
 

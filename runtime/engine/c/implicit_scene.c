@@ -222,9 +222,16 @@ void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system)
     system->implicit = &run->implicit;
 }
 
+static void ask_positions(void *context, int asked)
+{
+    mstmm_scene_run *run = context;
+    run->on_positions = run->base->on_positions = asked;
+}
+
 void mstmm_scene_on_positions(mstmm_scene_run *run)
 {
     if (!run->model->looped) return; /* without rows there is nothing to ask */
-    run->on_positions = run->base->on_positions = 1;
     run->implicit.placing = beyond_placing;
+    run->implicit.ask_positions = ask_positions;
+    ask_positions(run, 1);
 }

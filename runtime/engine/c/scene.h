@@ -107,7 +107,7 @@ typedef struct {
     mstmm_implicit implicit;
     real strain;      /* of the loops when their slips were stopped last: see mstmm_strain */
     real *speeds;     /* nu: those of a stage near a singular pose; NULL: there are no loops */
-    int on_positions; /* implicit steps close gaps, and leave slips: index 3 */
+    int on_positions; /* the step at hand closes gaps, and leaves slips: index 3 */
     int steady;       /* nothing in the scene goes by time */
     int *coordinates; /* nu: see mstmm_implicit */
     real *known;      /* nq + 3 nu: scratch */
@@ -117,7 +117,7 @@ typedef struct {
 /* Lets implicit methods integrate `run`, whose last fields have been given. */
 void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system);
 
-/* From now on their steps ask rows of positions where they end, and nothing of speeds. */
+/* From now on their steps may ask rows of positions where they end, and nothing of speeds. */
 void mstmm_scene_on_positions(mstmm_scene_run *run);
 
 /* Driven coordinates, unit quaternions and memory put in order at t; as after an accepted step. */

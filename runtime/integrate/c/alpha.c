@@ -62,24 +62,47 @@ static double auxiliary(const mstmm_work *work, int i) {
              : now;
 }
 
-/* Part of the auxiliary acceleration at the end that is known */
-static double known_part(const mstmm_work *work, int i) {
+/* The constants by which a step goes */
+typedef struct constants {
+  double alpha_m, alpha_f, beta, gamma, part; /* part of an acceleration in the auxiliary one */
+} constants;
+
+/* So many steps auxiliary accelerations lie behind those of a smooth motion. */
+static double lag(const mstmm_tableau *t) { return t->alpha_f - t->alpha_m; }
+
+/* A step on rows of accelerations, of whose start nothing but the motion is known, takes the motion
+ * to be smooth: it begins and ends with auxiliary accelerations that lag behind by as much, which
+ * needs none of them and keeps the order. */
+static int starts_smoothly(const mstmm_work *work) {
+  return work->implicit->placing && !mstmm_step_places(work) && work->run->real.h_previous == 0.0;
+}
+
+static constants constants_of(const mstmm_work *work) {
   const mstmm_tableau *t = work->tableau;
+  if (starts_smoothly(work))
+    return (constants){
+        .beta = t->beta_n - 0.5 * lag(t), .gamma = t->gamma_n - lag(t), .part = 1.0};
+  return (constants){.alpha_m = t->alpha_m, .alpha_f = t->alpha_f, .beta = t->beta_n,
+                     .gamma = t->gamma_n, .part = (1.0 - t->alpha_f) / (1.0 - t->alpha_m)};
+}
+
+/* Part of the auxiliary acceleration at the end that is known */
+static double known_part(const mstmm_work *work, const constants *by, int i) {
   const double now = work->k[work->implicit->n_q + i];
-  return (t->alpha_f * now - t->alpha_m * auxiliary(work, i)) / (1.0 - t->alpha_m);
+  return (by->alpha_f * now - by->alpha_m * auxiliary(work, i)) / (1.0 - by->alpha_m);
 }
 
 /* Newmark's map over the time `h` */
 static void map_alpha(const mstmm_work *work, mstmm_newton_equations *stage, double h) {
-  const mstmm_tableau *t = work->tableau;
-  const double part = (1.0 - t->alpha_f) / (1.0 - t->alpha_m), *u = work->y + work->implicit->n_q;
+  const constants by = constants_of(work);
+  const double *u = work->y + work->implicit->n_q;
   for (int i = 0; i < work->implicit->n_u; i++) {
-    const double a = auxiliary(work, i), rest = known_part(work, i);
-    work->map_q[i] = h * u[i] + h * h * ((0.5 - t->beta_n) * a + t->beta_n * rest);
-    work->map_u[i] = u[i] + h * ((1.0 - t->gamma_n) * a + t->gamma_n * rest);
+    const double a = auxiliary(work, i), rest = known_part(work, &by, i);
+    work->map_q[i] = h * u[i] + h * h * ((0.5 - by.beta) * a + by.beta * rest);
+    work->map_u[i] = u[i] + h * ((1.0 - by.gamma) * a + by.gamma * rest);
   }
-  stage->cq = h * h * t->beta_n * part;
-  stage->cu = h * t->gamma_n * part;
+  stage->cq = h * h * by.beta * by.part;
+  stage->cu = h * by.gamma * by.part;
 }
 
 /* Houbolt's differences, in increments of the last two steps */
@@ -118,13 +141,15 @@ static int come_back(const mstmm_work *work, mstmm_newton_equations *stage) {
 /* What the next step must know, behind the state of y_new. */
 static void remember(const mstmm_work *work, const mstmm_newton_equations *stage) {
   const mstmm_tableau *t = work->tableau;
-  const int n_u = work->implicit->n_u;
-  const double part = (1.0 - t->alpha_f) / (1.0 - t->alpha_m);
-  const double *a = mstmm_row_a(work, work->y_new);
+  const int n_u = work->implicit->n_u, smooth = starts_smoothly(work);
+  const constants by = constants_of(work);
+  const double *a = mstmm_row_a(work, work->y_new), *first = work->k + work->implicit->n_q;
   double *behind = mstmm_row_behind(work, work->y_new);
   if (t->backward) memcpy(behind + n_u, mstmm_row_behind(work, work->y), (size_t)n_u * sizeof *a);
   for (int i = 0; i < n_u; i++)
-    behind[i] = t->backward ? work->map_q[i] + stage->cq * a[i] : known_part(work, i) + part * a[i];
+    behind[i] = t->backward ? work->map_q[i] + stage->cq * a[i]
+                : smooth    ? a[i] - lag(t) * (a[i] - first[i])
+                            : known_part(work, &by, i) + by.part * a[i];
 }
 
 /* The step as a whole in k_1, its error in k_2 (O. C. Zienkiewicz, Y. M. Xie, Earthquake
@@ -141,12 +166,34 @@ static int fill_rows(const mstmm_work *work, double t) {
   return mstmm_step_rates(work, t, work->y_new, work->rho_u, error);
 }
 
+/* A step on rows of accelerations begins with such as obey them at its start, which loops have been
+ * closed at since the step before.  One on positions leaves nothing else: what its accelerations
+ * err by, slips over its length, may grow where it is carried to steps of other lengths. */
+static int obey_rows(const mstmm_work *work) {
+  double *a = mstmm_row_a(work, work->y), *behind = mstmm_row_behind(work, work->y);
+  const int status = mstmm_step_residual(work, mstmm_time_in(work->run, 0.0), work->y, NULL);
+  if (status) return status;
+  for (int i = 0; i < work->implicit->n_u; i++) {
+    a[i] -= work->residual[i];
+    behind[i] -= work->residual[i];
+    work->k[work->implicit->n_q + i] = a[i];
+  }
+  if (work->run->count.by_positions) work->run->real.h_previous = 0.0;
+  return 0;
+}
+
+static int wants_rows_obeyed(const mstmm_work *work) {
+  return work->implicit->placing && !mstmm_step_places(work) && work->run->real.h_previous > 0.0;
+}
+
 int mstmm_alpha_stages(const mstmm_work *work) {
   const mstmm_tableau *tableau = work->tableau;
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
   const double h = work->run->real.h, collocation = tableau->collocation;
   mstmm_newton_equations stage = {
       .t = mstmm_time_in(work->run, collocation), .kappa = 0, .move = move};
+  int status = wants_rows_obeyed(work) ? obey_rows(work) : 0;
+  if (status) return status;
   if (has_history(work))
     map_backward(work, &stage, h);
   else
@@ -155,7 +202,7 @@ int mstmm_alpha_stages(const mstmm_work *work) {
   stage.sq = stage.cu / stage.cq;
   memcpy(work->y_stage, work->y, (size_t)work->row * sizeof(double));
   memcpy(mstmm_row_a(work, work->y_stage), work->k + n_q, (size_t)n_u * sizeof(double));
-  int status = place(work, &stage);
+  status = place(work, &stage);
   if (!status) status = mstmm_newton_stage(work, &stage);
   if (!status && collocation != 1.0) status = come_back(work, &stage);
   if (status) return status;

@@ -52,7 +52,7 @@ static void forget_method(mstmm_run *run) {
   count->first_stage_valid = count->rejected_last = 0;
   count->tangent_valid = count->tangent_held = count->history = 0;
   count->evaluated_left = count->evaluated_row = 0;
-  count->by_laws = count->exact_left = count->exact_row = 0;
+  count->by_laws = count->by_positions = count->exact_left = count->exact_row = 0;
   count->sign = count->sign_against = count->asked = 0;
 }
 

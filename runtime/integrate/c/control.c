@@ -23,9 +23,13 @@ static double next_stop(const mstmm_run *run, int *is_break) {
   return *is_break ? run->breaks[i] : run->t_end;
 }
 
+/* Of the time, with a margin */
+static double rounding(const mstmm_run *run) {
+  return 10.0 * (nextafter(run->real.t, INFINITY) - run->real.t);
+}
+
 double mstmm_smallest_step(const mstmm_run *run) {
-  const double rounding = 10.0 * (nextafter(run->real.t, INFINITY) - run->real.t);
-  return fmax(run->min_step, fmax(rounding, HOPELESS * (run->t_end - run->t_start)));
+  return fmax(run->min_step, fmax(rounding(run), HOPELESS * (run->t_end - run->t_start)));
 }
 
 /* Chooses t_new: on the grid t_start + i fixed_step, which breaks and events do not shift */
@@ -36,7 +40,7 @@ static void aim_fixed(mstmm_run *run, double stop, int is_break) {
   run->real.t_new = reaches ? stop : grid;
   run->count.lands_on_break = reaches && is_break;
   run->count.lands_on_grid = !reaches || grid - stop <= SAME * h;
-  run->count.cut_short = run->real.t_new - run->real.t < (1.0 - 4.0 * SAME) * h;
+  run->count.cut_short = run->real.t_new - run->real.t < (1.0 - 4.0 * SAME) * h - rounding(run);
 }
 
 /* h, or the longest step that max_step and the bounds allow: one that ends before a shorter bound

@@ -31,6 +31,10 @@ int mstmm_step_placing(const mstmm_work *work, double t, const double *row, doub
   return code ? mstmm_note(work->run, MSTMM_RHS_FAILED, code, -1, t) : 0;
 }
 
+int mstmm_step_places(const mstmm_work *work) {
+  return work->implicit->placing && !work->run->count.cut_short;
+}
+
 int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const double *u,
                      double *dq) {
   const mstmm_implicit *at = work->implicit;

@@ -22,6 +22,9 @@ typedef struct mstmm_implicit {
    * gaps go, coordinates changing by 1 / closing times theirs.  NULL: rows are of accelerations. */
   int (*placing)(void *context, double t, const double *y, const double *a, double closing,
                  double *r);
+  /* Tangents from now on are those of `placing`, or of `residual`, and so are the speeds at which
+   * states are accepted: left to err, or obeying rows.  NULL where `placing` is. */
+  void (*ask_positions)(void *context, int asked);
   /* dR/dt at fixed (q, u, a), drives and their derivatives included */
   int (*residual_rate)(void *context, double t, const double *y, const double *a, double *r_t);
   /* dq = N(q) u, zero where somebody imposes it; NULL: dq = u, entry by entry, nobody does */

@@ -34,6 +34,9 @@ int mstmm_step_impose(const mstmm_work *work, double t, double *row);
 int mstmm_step_residual(const mstmm_work *work, double t, const double *row, double *rest);
 /* The same with gaps that an acceleration of one closes by 1 / closing. */
 int mstmm_step_placing(const mstmm_work *work, double t, const double *row, double closing);
+/* Does the step at hand ask rows of loops for positions?  One that is cut short asks them for
+ * accelerations: gaps over its length squared would be nothing but slips and rounding. */
+int mstmm_step_places(const mstmm_work *work);
 int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const double *u,
                      double *dq);
 /* `laws`: that of laws alone */

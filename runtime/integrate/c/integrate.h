@@ -163,6 +163,7 @@ typedef struct mstmm_run_count {
   int64_t laws_tangents; /* how many of the tangents were those of laws alone */
   /* Newton: the last one is; stages still to be solved by exact ones, and how many in a row last */
   int64_t by_laws, exact_left, exact_row;
+  int64_t by_positions;  /* Newton: the last tangent is that of rows of positions */
   int64_t tangent_valid; /* the workspace holds where it was taken */
   int64_t tangent_held;  /* and the system has it factored */
   /* Rosenbrock: steps still to be made by evaluated accelerations, and how many in a row last

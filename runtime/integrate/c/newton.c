@@ -44,8 +44,16 @@ static int wants_laws(const mstmm_work *work) {
   return work->implicit->laws_spare && run->count.exact_left == 0;
 }
 
+/* Tangents are those of the rows that the step at hand has, or the kept one had. */
+static void ask_rows(const mstmm_work *work) {
+  if (work->implicit->placing)
+    work->implicit->ask_positions(work->system->context, (int)work->run->count.by_positions);
+}
+
 static int take(const mstmm_work *work, const mstmm_newton_equations *stage, int laws) {
   mstmm_run *run = work->run;
+  run->count.by_positions = mstmm_step_places(work);
+  ask_rows(work);
   memcpy(work->base, work->y_stage, (size_t)work->row * sizeof(double));
   run->real.contraction = -1.0;
   run->real.tangent_t = stage->t;
@@ -62,7 +70,8 @@ static int take(const mstmm_work *work, const mstmm_newton_equations *stage, int
 static int serves(const mstmm_work *work, const mstmm_newton_equations *stage) {
   const mstmm_run *run = work->run;
   const int laws = (int)run->count.by_laws;
-  return run->count.tangent_valid && run->real.contraction <= (laws ? SLOW_BY_LAWS : SLOW) &&
+  return run->count.tangent_valid && run->count.by_positions == mstmm_step_places(work) &&
+         run->real.contraction <= (laws ? SLOW_BY_LAWS : SLOW) &&
          fabs(stage->s / run->real.tangent_s - 1.0) <= (laws ? CHANGED_BY_LAWS : CHANGED);
 }
 
@@ -71,6 +80,7 @@ static int hold(const mstmm_work *work, const mstmm_newton_equations *stage) {
   mstmm_run *run = work->run;
   const mstmm_implicit *at = work->implicit;
   if (run->count.tangent_held) return 0;
+  ask_rows(work);
   const int code = (run->count.by_laws && at->laws ? at->laws : at->tangent)(
       work->system->context, run->real.tangent_t, work->base, mstmm_row_a(work, work->base),
       run->real.tangent_s, run->real.tangent_sq, stage->kappa);
@@ -81,7 +91,7 @@ static int hold(const mstmm_work *work, const mstmm_newton_equations *stage) {
 /* One iteration; *size is that of the increment. */
 static int improve(const mstmm_work *work, const mstmm_newton_equations *stage, double *size) {
   work->run->count.iterations++;
-  int status = work->implicit->placing
+  int status = mstmm_step_places(work)
                    ? mstmm_step_placing(work, stage->t, work->y_stage, 1.0 / stage->cq)
                    : mstmm_step_residual(work, stage->t, work->y_stage, NULL);
   for (int i = 0; i < work->implicit->n_u; i++) work->residual[i] = -work->residual[i];

@@ -270,7 +270,8 @@ class Alpha(Implicit):
         backward: Houbolt's differences over three steps; the constants serve the first two.
         one_iteration: one linearised equation a step, at the predictor u'_1 = u'_0.
         on_positions: rows of closed loops are met by positions at the step's end, with their
-            multipliers as unknowns (index 3); their speeds err by the method's own order.
+            multipliers as unknowns (index 3); their speeds err by the method's own order.  Steps
+            that are cut short ask rows for accelerations.
     """
 
     kind: ClassVar[int] = ALPHA

@@ -181,14 +181,74 @@ def test_driven_and_in_sessions() -> None:
     assert np.abs(session.q - run.q[-1]).max() < 1e-12  # code for the scene may have come between
 
 
+END, STEP = 0.4, 1e-3
+
+
 @pytest.fixture(scope="module")
 def bar() -> mstmm.Model:
     return mstmm.compile(mstmm.Scene(**four_bar(speed=3.0)))
 
 
+def off(run: mstmm.Result, model: mstmm.Model) -> float:
+    """Largest error of the speeds, rad/s, beside DOP853."""
+    assert run.success, run.message
+    exact = model.simulate(float(run.t[-1]), rtol=1e-11, atol=1e-13, output_times=run.t)
+    return float(np.abs(run.u - exact.u).max())
+
+
+@pytest.mark.parametrize("method", ["genalpha-index3", "hht-index3"])
+@pytest.mark.parametrize("before", [1e-4, 1e-6, 1e-8, 1e-11])
+def test_a_break_just_before_the_grid(method: str, before: float, bar: mstmm.Model) -> None:
+    """A load of next to nothing, switched on `before` (s) a point of the grid."""
+    load = {"on": "coupler", "force": [f"where(t < {0.2 - before:.14f}, 0, 1e-9)", 0, 0]}
+    model = mstmm.compile(mstmm.Scene(**four_bar(speed=3.0), load=[load]))
+    at: dict[str, Any] = {"step": STEP, "output_times": np.linspace(0.2, END, 201)}
+    errors = [off(one.simulate(END, method, **at), bar) for one in (model, bar)]
+    print(errors)
+    assert errors[0] < 1.2 * errors[1]
+
+
+def off_in_ticks(model: mstmm.Model, tick: float, step: float, radius: float) -> float:
+    """`off` of a session in ticks of `tick` s."""
+    session = model.session(method="genalpha-index3", step=step, radius=radius)
+    exact, errors = model.session(method="dop853", rtol=1e-11, atol=1e-13), []
+    while session.t < END:
+        session.advance(tick)
+        exact.advance(session.t - exact.t)
+        errors.append(float(np.abs(session.u - exact.u).max()))
+    return max(errors)
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.8, 0.95])
+@pytest.mark.parametrize("tick", [3.3e-3, 3.0001e-3, 2.99999e-3, 1.0001e-3, 7e-4])
+def test_ticks_cut_steps(tick: float, radius: float, bar: mstmm.Model) -> None:
+    whole = off_in_ticks(bar, STEP, STEP, radius)
+    errors = [off_in_ticks(bar, tick, step, radius) for step in (2 * STEP, STEP, STEP / 2)]
+    print(whole, errors)
+    assert errors[1] < 1.5 * whole and errors[2] < 0.5 * whole
+    assert errors[0] < 6 * whole
+
+
+def test_bounces_just_before_the_grid() -> None:
+    """The crank hits a stop at times around a point of the grid, some of them very near to it."""
+    scene = four_bar(speed=3.0)
+    end: dict[str, Any] = {"output_times": [0.25]}
+    free = mstmm.compile(mstmm.Scene(**scene))
+    there = free.simulate(0.2, "genalpha-index3", step=STEP, output_times=[0.2])
+    errors = []
+    for before in np.linspace(0.0, 4e-6, 9):
+        stop = there.q[-1, 0] - before * there.u[-1, 0]
+        event = {"when": f"foot.q > {stop:.12f}", "do": "bounce", "restitution": 0.6}
+        model = mstmm.compile(mstmm.Scene(**scene, event=[event]))
+        run = model.simulate(0.25, "genalpha-index3", step=STEP, **end)
+        errors.append(off(run, model))
+    print(errors)
+    assert max(errors) < 2 * np.median(errors) < 1e-3
+
+
 def test_equal_runs_give_equal_bits(bar: mstmm.Model) -> None:
     """A run stands where the last one began, and begins without slips as that did."""
-    runs = [bar.simulate(0.1, "genalpha-index3", step=1e-3) for _ in range(3)]
+    runs = [bar.simulate(0.1, "genalpha-index3", step=STEP) for _ in range(3)]
     assert all(np.array_equal(run.u, runs[0].u) for run in runs[1:])
 
 
