@@ -71,20 +71,20 @@ static int answered(mstmm_scene_run *run, const mstmm_strike *strike, real t, co
     return mstmm_run_correction(&state);
 }
 
-/* Rate of the event with other speeds than those of y: *rate, and the sum of its terms' sizes. */
+/* How the event is met with other speeds than those of y. */
 static int met(mstmm_scene_run *run, const mstmm_event_action *action, const real *slopes, real t,
-               const real *y, const real *u, real *rate, real *size)
+               const real *y, const real *u, mstmm_meeting *found)
 {
     const int code = mstmm_probes_seen(run, t, y, u);
     if (code) return code;
-    *rate = slopes[0];
-    *size = fabs(slopes[0]);
+    *found = (mstmm_meeting){.rate = slopes[0], .size = fabs(slopes[0])};
     for (int k = 0; k < action->n_slopes; k++) {
         const int place = action->places[2 * k], at = -1 - place;
         const real speed = place >= 0 ? u[action->places[2 * k + 1]]
                                       : run->probe_values[6 * (at / 3) + 3 + at % 3];
-        *rate += slopes[1 + k] * speed;
-        *size += fabs(slopes[1 + k] * speed);
+        found->rate += slopes[1 + k] * speed;
+        found->size += fabs(slopes[1 + k] * speed);
+        found->steepness += fabs(slopes[1 + k]);
     }
     return 0;
 }
@@ -123,29 +123,56 @@ static int thrown(mstmm_scene_run *run, const mstmm_event_action *action, parts 
     return code;
 }
 
-int mstmm_bounce(mstmm_scene_run *run, int event, real t, real *y)
+int mstmm_meeting_of(mstmm_scene_run *run, int event, real t, const real *y, const real *u,
+                     mstmm_meeting *found)
 {
     const mstmm_event_action *action = &run->events[event];
-    const parts at = parts_of(run, action);
-    real *u = y + run->model->nq, *fastest = run->memory + action->release;
-    real before = 0, behind = 0, size = 0;
-    int code = slopes_at(run, action, t, y, at.slopes);
-    if (!code) code = met(run, action, at.slopes, t, y, u, &before, &size);
-    if (!code && !(before > 0)) return MSTMM_FIRE_CONTINUE; /* it leaves already */
-    if (!code) code = thrown(run, action, at, t, y);
-    if (!code) code = met(run, action, at.slopes, t, y, at.speeds, &behind, &size);
-    if (!code && !(behind - before > MOVED * size)) {
+    const int code = slopes_at(run, action, t, y, action->numbers);
+    return code ? code : met(run, action, action->numbers, t, y, u, found);
+}
+
+/* The blow itself: new speeds in y. */
+static int strike(mstmm_scene_run *run, int event, parts at, real t, real *y, real before)
+{
+    const mstmm_event_action *action = &run->events[event];
+    real *u = y + run->model->nq;
+    mstmm_meeting behind;
+    int code = thrown(run, action, at, t, y);
+    if (!code) code = met(run, action, at.slopes, t, y, at.speeds, &behind);
+    if (!code && !(behind.rate - before > MOVED * behind.size)) {
         run->failure.element = event;
         code = run->failure.reason = MSTMM_FAILED_BOUNCE;
     }
-    if (code) return -code;
-    const real push = -(1 + action->restitution) * before / (behind - before);
+    if (code) return code;
+    const real push = -(1 + action->restitution) * before / (behind.rate - before);
     for (int j = 0; j < run->model->nu; j++) u[j] += at.before[j] + push * at.answer[j];
-    /* An impulse does its size times the mean of the speeds along it before and behind, which are
-     * the rates but for what the event itself moves by. */
-    if (run->with_power)
-        u[run->model->nu] += push * ((1 - action->restitution) * before / 2 - at.slopes[0]);
-    *fastest = fmax(*fastest, before);
-    const int rests = action->restitution * before < AT_REST * *fastest;
+    return 0;
+}
+
+/* The same with its work: places stay where they are, so that all of it is kinetic energy.  What
+ * drives and moving walls do is in it, of which the impulse along the slopes alone knows nothing. */
+static int strike_with_work(mstmm_scene_run *run, int event, parts at, real t, real *y, real before)
+{
+    real *u = y + run->model->nq, had, has;
+    int code = mstmm_kinetic_seen(run, t, y, u, &had);
+    if (!code) code = strike(run, event, at, t, y, before);
+    if (!code) code = mstmm_kinetic_seen(run, t, y, u, &has);
+    if (!code) u[run->model->nu] += has - had;
+    return code;
+}
+
+int mstmm_bounce(mstmm_scene_run *run, int event, real t, real *y)
+{
+    const mstmm_event_action *action = &run->events[event];
+    real *fastest = run->memory + action->release;
+    mstmm_meeting before;
+    int code = mstmm_meeting_of(run, event, t, y, y + run->model->nq, &before);
+    if (!code && !(before.rate > 0)) return MSTMM_FIRE_CONTINUE; /* it leaves already */
+    if (!code)
+        code = (run->with_power ? strike_with_work : strike)(run, event, parts_of(run, action), t,
+                                                            y, before.rate);
+    if (code) return -code;
+    *fastest = fmax(*fastest, before.rate);
+    const int rests = action->restitution * before.rate < AT_REST * *fastest;
     return rests ? MSTMM_FIRE_STOP : MSTMM_FIRE_RESTART;
 }

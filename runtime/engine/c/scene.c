@@ -278,22 +278,40 @@ static int scene_accept(void *context, double t, double *y)
     return code ? code : mstmm_controllers_act(run, t, y);
 }
 
+/* Poses and velocities of all bodies of a state with speeds u, to be read from `state`. */
+static int moved(mstmm_scene_run *run, real t, const real *y, const real *u, mstmm_state *state)
+{
+    *state = state_of(run->model, run->workspace, t, run->memory, &run->failure);
+    state->q = y;
+    state->u = u;
+    state->qdot = mstmm_spare_qdot(state);
+    mstmm_ground(state);
+    return mstmm_run_motion(state);
+}
+
 int mstmm_probes_seen(mstmm_scene_run *run, real t, const real *y, const real *u)
 {
     if (!run->n_probes) return 0;
     real *one = run->probe_values + 6 * run->n_probes;
-    mstmm_state state = state_of(run->model, run->workspace, t, run->memory, &run->failure);
-    state.q = y;
-    state.u = u;
-    state.qdot = mstmm_spare_qdot(&state);
-    mstmm_ground(&state);
-    const int code = mstmm_run_motion(&state);
+    mstmm_state state;
+    const int code = moved(run, t, y, u, &state);
     if (code) return code;
     for (int k = 0; k < run->n_probes; k++) {
         observe_probe(&state, &run->probes[k], one);
         memcpy(run->probe_values + 6 * k, one, 6 * sizeof(real));
     }
     return 0;
+}
+
+int mstmm_kinetic_seen(mstmm_scene_run *run, real t, const real *y, const real *u, real *energy)
+{
+    mstmm_state state;
+    real inertia[21], momentum[6];
+    const int code = moved(run, t, y, u, &state);
+    *energy = 0;
+    for (int i = 0; i < run->model->n_bodies && !code; i++)
+        *energy += kinetic_energy(&state, i, inertia, momentum);
+    return code;
 }
 
 /* A state inside a step, to be put in order behind the numbers of the probes. */

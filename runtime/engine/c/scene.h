@@ -60,6 +60,12 @@ typedef struct {
     real *numbers; /* 1 + n_slopes + 4 nu: scratch */
 } mstmm_event_action;
 
+/* How the value of a bounce's event changes at a state: its rate, the sum of the sizes of that's
+ * terms, and that of its slopes by places, 1/m, 1/rad. */
+typedef struct {
+    real rate, size, steepness;
+} mstmm_meeting;
+
 /* Parts of what that code works on: the base point (t, q, u, a), steps, slopes, factors, known
  * increments. */
 typedef struct {
@@ -127,6 +133,9 @@ int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y);
  * others are settled all the same. */
 int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, const real *t,
                             real *memory, real *y);
+/* How event number `event`, which bounces, is met at y with the speeds u (nu). */
+int mstmm_meeting_of(mstmm_scene_run *run, int event, real t, const real *y, const real *u,
+                     mstmm_meeting *found);
 /* cdef end */
 
 /* The numbers of a probe whose body moves as its bias motion and `delta` (6) say. */
@@ -142,6 +151,8 @@ int mstmm_stage_speeds(mstmm_scene_run *run, double t, const double *y, const do
 
 /* Places and velocities of the probes of a state with speeds u, to `probe_values`. */
 int mstmm_probes_seen(mstmm_scene_run *run, real t, const real *y, const real *u);
+/* Kinetic energy of a state with speeds u, rotors and flexible bodies' modes with it. */
+int mstmm_kinetic_seen(mstmm_scene_run *run, real t, const real *y, const real *u, real *energy);
 /* The integrator's view of `run`, evaluated by the looped engine. */
 void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system);
 
