@@ -189,9 +189,5 @@ def _switch_at(system: SceneSystem, run: Run) -> str:
 
 def _margins(system: SceneSystem, t: float, y: Array) -> Array:
     """Of all switches that are watched: each is zero where it switches."""
-    calls, ffi = system.system, system.engine.ffi
-    values = np.empty(calls.n_events + calls.n_switches)
-    state = np.ascontiguousarray(y)
-    pointers = (ffi.from_buffer("double[]", x) for x in (state, values))
-    failed = calls.events(calls.context, t, *pointers)
-    return np.ones(calls.n_switches) if failed else values[calls.n_events :]
+    values = system.watched(t, y)
+    return np.ones(system.system.n_switches) if values is None else values[system.system.n_events :]

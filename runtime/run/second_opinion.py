@@ -109,11 +109,8 @@ class Equations:
 
     def watched(self, t: float, y: Array) -> Array:
         """Values of the events, and behind them the margins of switches."""
-        values = np.empty(self.calls.n_events + self.calls.n_switches)
-        state = np.ascontiguousarray(y)
-        if len(values) and self.calls.events(
-            self.calls.context, t, self._c(state), self._c(values)
-        ):
+        values = self.scene.watched(t, y)
+        if values is None:
             text = self.engine.failure_text(self.scene.run.failure, t)
             raise _Ended(Status.EVENT_FAILED, text)
         return values

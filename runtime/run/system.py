@@ -25,8 +25,9 @@ from ..pack.layout import StateNames
 from ..pack.letting_go import let_go_before
 from ..pack.packed import resize
 from ..pack.qr import refuse_steps
-from ..pack.records.bounces import Bounce, refuse_beyond_stops
+from ..pack.records.bounces import Bounce
 from ..pack.switches import MOST
+from .behind import refuse_behind
 from .controllers import Controllers
 
 
@@ -189,11 +190,31 @@ class SceneSystem:
         if packed.system.strained >= 0:
             near = self.run.strain > packed.model.loops_strain
             self.memory[packed.system.strained] = near
-        refuse_beyond_stops(packed.scene, packed.layout, packed.watched.bounces, y)
+        refuse_behind(self, t, y)
         lib = self.engine.lib
         if lib.mstmm_controllers_act(self.run, t, self.engine.pointer(y)) > 0:
             raise NumericalFailure(self.engine.failure_text(self.run.failure, t))
         return y
+
+    def watched(self, t: float, y: Array) -> Array | None:
+        """Values of the events, >= 0 where they hold, and behind them the margins of switches;
+        None where they cannot be evaluated."""
+        calls, pointer = self.system, self.engine.pointer
+        values = np.empty(calls.n_events + calls.n_switches)
+        state = np.ascontiguousarray(y)
+        if not len(values):
+            return values
+        failed = calls.events(calls.context, t, pointer(state), pointer(values))
+        return None if failed else values
+
+    def meeting(self, event: int, t: float, y: Array, u: Array) -> Any:
+        """`mstmm_meeting`: how the value of an event that bounces changes at a state with speeds u
+        (nu,).  Raises NumericalFailure where that cannot be evaluated."""
+        engine, found = self.engine, self.engine.ffi.new("mstmm_meeting *")
+        state, speeds = (engine.pointer(np.ascontiguousarray(x)) for x in (y, u))
+        if engine.lib.mstmm_meeting_of(self.run, event, t, state, speeds, found):
+            raise NumericalFailure(engine.failure_text(self.run.failure, t))
+        return found
 
     def start(self, t: float, q: ArrayLike, u: ArrayLike) -> Array:
         """State vector at t with driven coordinates, quaternions, loops and memory in order.

@@ -208,8 +208,7 @@ def test_a_blade_strikes_the_floor(end: str, height: float) -> None:
 
     def heights(side: float) -> list[float]:
         moved = [q + side * 1e-5 * row for row in np.eye(one.nq)]
-        states = [one.simulate(1e-9, initial=(x, 0 * before), output_times=[0.0]) for x in moved]
-        return [float(state.position(end)[0, 1]) for state in states]
+        return [float(one.positions(x, end)[1]) for x in moved]
 
     row = (np.array(heights(-1.0)) - heights(1.0)) / 2e-5
     answer = np.linalg.solve(one.mass_matrix(q), row)
@@ -220,3 +219,74 @@ def test_a_blade_strikes_the_floor(end: str, height: float) -> None:
 def test_a_shape_alone_is_no_place() -> None:
     with pytest.raises(mstmm.SceneError, match="strikes places"):
         bladed("blade.q[0] > 0.01").simulate(0.1)
+
+
+def begun(when: str, height: float, speed: float, **more: Any) -> mstmm.Model:
+    scene = ball(when=when)
+    scene["hinge"][0]["initial"] = {"q": height, "u": speed}
+    return model(scene | more)
+
+
+@pytest.mark.parametrize("method", ["dop853", "rodas4p2", "scipy-DOP853"])
+@pytest.mark.parametrize(
+    ("when", "height", "speed"),
+    [
+        ("ball.y <= 0", 0.0, 0.0),
+        ("ball.y <= 0", 1e-12, 0.0),
+        ("ball.y <= 0", -0.1, 0.0),
+        ("ball.y <= 0", -0.1, -2.0),
+        ("fall.q < 0", 0.0, 0.0),
+        ("ball.y^2 < 4", 2.0, 0.0),
+        ("ball.y <= 0.5*t", 0.0, 0.5),
+    ],
+)
+def test_what_begins_on_a_floor_must_leave_it(
+    when: str, height: float, speed: float, method: str
+) -> None:
+    with pytest.raises(mstmm.SceneError, match='event "floor": the run begins'):
+        begun(when, height, speed).simulate(0.1, method)
+
+
+@pytest.mark.parametrize("method", ["dop853", "scipy-DOP853"])
+@pytest.mark.parametrize("sinks", [0.0, 0.5])
+def test_what_leaves_its_floor_comes_back_to_it(sinks: float, method: str) -> None:
+    """3 m/s upwards from a floor that sinks: together again after 2 (3 + sinks) / g."""
+    run = begun(f"ball.y <= -{sinks}*t", 0.0, 3.0).simulate(0.8, method, rtol=1e-10)
+    assert run.t[run.event > 0][-1] == pytest.approx(2 * (3.0 + sinks) / G, rel=1e-9)
+    assert run.success and run.u[-1, 0] > -3.0
+
+
+def test_what_begins_with_a_blow_is_thrown_back_at_once() -> None:
+    run = begun("ball.y <= 0", 0.0, -1.0).simulate(0.15)
+    assert run.t[run.event > 0].tolist() == [0.0]
+    assert run.u[-1, 0] == pytest.approx(0.8 - G * 0.15, rel=1e-9)
+
+
+def test_from_behind_a_floor_the_way_out_is_open() -> None:
+    """0.1 m below it by 3 m/s upwards: thrown back when the ball comes down to it."""
+    run = begun("ball.y <= 0", -0.1, 3.0).simulate(0.7, rtol=1e-10)
+    hits = run.t[run.event > 0]
+    assert hits.tolist() == pytest.approx([(3.0 + np.sqrt(9.0 - 0.2 * G)) / G], rel=1e-9)
+
+
+def test_what_an_acceleration_takes_away_may_begin_at_rest_on_a_wall() -> None:
+    """A ceiling, and a rod whose tip is as near to a wall as it comes: both fall away from it."""
+    assert begun("ball.y >= 1", 1.0, 0.0).simulate(0.4).q[-1, 0] == pytest.approx(1 - G * 0.08)
+    hinge = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod"}
+    wall = {"name": "wall", "when": "rod.tip.x >= 1", "do": "bounce", "restitution": 0.5}
+    one = model({"gravity": [0, -G, 0], "body": [rod("rod", 1.0, 1.0)], "hinge": [hinge],
+                 "event": [wall]})  # fmt: skip
+    assert one.simulate(0.5).success
+
+
+def test_two_balls_that_touch() -> None:
+    """Both fall: nothing moves them together or apart."""
+    bodies = [{"name": name, "mass": 1.0, "inertia": [0.1, 0.1, 0.1]} for name in "ab"]
+    hinges = [{"name": f"f{name}", "type": "free", "inboard": "ground", "outboard": name,
+               "initial": {"q": [place, 0, 0, 1, 0, 0, 0]}}
+              for name, place in (("a", 0.0), ("b", 0.2))]  # fmt: skip
+    event = {"name": "hit", "when": "(a.x - b.x)^2 + (a.y - b.y)^2 <= 0.04", "do": "bounce",
+             "restitution": 1.0}  # fmt: skip
+    scene = {"gravity": [0, -G, 0], "body": bodies, "hinge": hinges, "event": [event]}
+    with pytest.raises(mstmm.SceneError, match='event "hit"'):
+        model(scene).simulate(0.1)

@@ -126,6 +126,11 @@ def test_a_start_that_leaves_a_stop_is_taken() -> None:
     assert one.simulate(0.5).q[-1, 0] == pytest.approx(0.5)
 
 
+def test_a_start_that_moves_against_a_stop_is_thrown_back() -> None:
+    one = model(slider({"upper": 1.0, "restitution": 0.5}, q=1.0, u=1.0))
+    assert one.simulate(0.5).q[-1, 0] == pytest.approx(0.75)
+
+
 @pytest.mark.parametrize("number", [1, 5])
 def test_speeds_that_are_no_rates(number: int) -> None:
     """One message, and none that leads to a stop which would be refused as well."""

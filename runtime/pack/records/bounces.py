@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.ir import Port
 from mstmm.ir.graph import Graph, Node
@@ -19,8 +18,6 @@ from ..values import condition_value, inputs_port, resolver, state_ports, values
 
 #: Numbers of an end among those that events read: its place, then its velocity.
 _NUMBERS, _PLACE = 6, 3
-#: Parts of a coordinate, or of 1 rad or m, within which it is at a stop.
-_AT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -68,24 +65,6 @@ def _bounce(
     ports = [*state_ports(layout), Port("points", (_NUMBERS * len(probes),)), inputs_port(layout)]
     kernel = values_kernel(graph, "bounce", ports, [derivative(value, {time: 1}), *slopes])
     return Bounce(number, event.restitution, compile_tape(kernel), tuple(places))
-
-
-def refuse_beyond_stops(scene: Scene, layout: Layout, thrown: Iterable[Bounce], y: Array) -> None:
-    """SceneError for a state that begins beyond a hard stop of a hinge, or on one without leaving
-    it: nothing would throw it back."""
-    for bounce in thrown:
-        comparison = scene.events[bounce.event].when.comparison
-        if bounce.event < len(scene.event) or comparison is None:
-            continue
-        (place, speed), limit = bounce.places[0], comparison[2].constant or 0.0
-        outwards, close = 1.0 if comparison[1] == ">" else -1.0, _AT * max(1.0, abs(limit))
-        beyond, parting = outwards * (y[place] - limit), -outwards * y[layout.nq + speed]
-        if beyond > close or (beyond >= -close and not parting > 0):
-            raise SceneError(
-                f"{scene.happening(bounce.event)}: {layout.q_names[place]} = {y[place]:.9g} begins "
-                f"{'beyond' if beyond > close else 'on'} it, at {limit:.9g}, where nothing throws "
-                "it back; begin between the stops, or let it leave at the start"
-            )
 
 
 def _place(layout: Layout, event: Event, leaf: Element) -> tuple[int, int]:
