@@ -8,10 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mstmm.arrays import Array
 from mstmm.scene import Hinge, Scene
 
+from .blows import kept_by_blows
 from .evidence import Drift
 from .flexible.momentum import undeformed
 from .record import Record
@@ -84,10 +86,10 @@ def _stored(parts: Mapping[str, Array]) -> float:
 def momentum(result: Record) -> list[Drift]:
     """Drift of the components of momentum that nothing outside the scene changes.
 
-    Components that are zero throughout are left out.  Angular momentum is taken about the origin,
-    or about the one point of the ground through which a scene is held.  Scales: sqrt(2 m T), at
-    rest with a part of what is stored for T, and the larger of the largest angular momentum and
-    that times the scene's reach.
+    Components that are zero throughout, and those that a blow may have changed, are left out.
+    Angular momentum is taken about the origin, or about the one point of the ground through which a
+    scene is held.  Scales: sqrt(2 m T), at rest with a part of what is stored for T, and the larger
+    of the largest angular momentum and that times the scene's reach.
     """
     scene, found = result.model.scene, list[Drift]()
     flexible = result.model.flexible
@@ -102,21 +104,28 @@ def momentum(result: Record) -> list[Drift]:
     pivot, about = _pivot(result, reach)
     reach = max((_largest(result.position(name) - pivot) for name in names), default=0.0)
     kinetic = _largest(result.energies()["kinetic"])
-    force, moment = _support(result, reach, kinetic, pivot)
     mass = _mass(result)
     linear, angular = result.momentum(), result.angular_momentum()
     angular = angular - np.cross(pivot, linear)
+    asked = np.array(_support(result, reach, kinetic, pivot)) & _unweighted(scene)
+    asked &= np.array([linear.any(axis=0), angular.any(axis=0)])
+    asked = kept_by_blows(result, _roots(scene), pivot, asked.ravel()).reshape(2, 3)
     speed = np.sqrt(2 * max(kinetic, _AT_REST * _stored(result.energies()))) * np.sqrt(mass)
     scale = max(_largest(np.linalg.norm(angular, axis=1)), speed * reach)
     for k, axis in enumerate("xyz"):
-        others = [g for j, g in enumerate(scene.gravity) if j != k]
-        if scene.gravity[k] == 0 and force[k] and linear[:, k].any():
+        if asked[0, k]:
             change = _change(linear[:, k])
             found.append(Drift(f"momentum {axis}", "kg*m/s", change, speed, "that moves"))
-        if not any(others) and moment[k] and angular[:, k].any():
+        if asked[1, k]:
             name, change = f"angular momentum {axis}{about}", _change(angular[:, k])
             found.append(Drift(name, "kg*m2/s", change, scale, "that turns"))
     return found
+
+
+def _unweighted(scene: Scene) -> NDArray[np.bool_]:
+    """(2, 3): along which axes weights do not push, and about which they do not turn."""
+    still = np.array(scene.gravity) == 0
+    return np.array([still, [still[[1, 2]].all(), still[[0, 2]].all(), still[[0, 1]].all()]])
 
 
 def _isolated(scene: Scene) -> bool:
