@@ -5,8 +5,6 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 #: Signals that ask a run to end with what it has.
@@ -35,8 +33,7 @@ class Interrupt:
 _open: list[Interrupt] = []
 
 
-@contextmanager
-def interruptible() -> Iterator[Interrupt]:
+class interruptible:
     """Ctrl-C and SIGTERM are told instead of ending anything, so that no sample is lost.
 
     Within another such block both are told: what ends for another reason while a signal comes does
@@ -45,48 +42,48 @@ def interruptible() -> Iterator[Interrupt]:
     this process was told to ignore (nohup, a script's background job) stays ignored.
     Where nobody has asked for PATIENCE, the next signal is a KeyboardInterrupt.
     """
-    told = Interrupt()
-    if threading.current_thread() is not threading.main_thread():
-        yield told
-        return
-    if _open:  # its handler tells all
-        _open.append(told)
+
+    def __enter__(self) -> Interrupt:
+        self._told, self._came, self._since = Interrupt(), 0, 0.0
+        self._before: list[tuple[signal.Signals, Any]] = []
+        self._here = threading.get_ident() == threading.main_thread().ident
+        if self._here:
+            if not _open:  # else the outermost one's handler tells all
+                self._handle()
+            _open.append(self._told)
+        return self._told
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if not self._here:
+            return
+        _open.pop()  # before a signal can be an exception again
+        if _open:
+            _open[0].heard = _open[0].heard or self._told.heard
+            return
+        self._restore()
+        if self._came and not self._told.heard and kind is None:
+            signal.raise_signal(self._came)
+
+    def _handle(self) -> None:
         try:
-            yield told
-        finally:
-            _open.pop()
-            _open[0].heard = _open[0].heard or told.heard
-        return
-    with _handled(told) as came:
-        yield told
-    if came and not told.heard:
-        signal.raise_signal(came[0])
+            for which in INTERRUPTS:
+                previous = signal.getsignal(which)
+                if previous is not None and previous is not signal.SIG_IGN:
+                    self._before.append((which, previous))
+                    signal.signal(which, self._note)
+        except BaseException:  # a signal that came between
+            self._restore()
+            raise
 
-
-@contextmanager
-def _handled(told: Interrupt) -> Iterator[list[int]]:
-    """The outermost block: which signals have come."""
-    came, since = list[int](), [0.0]
-
-    def note(which: int, _: object) -> None:
-        came.append(which)
-        for one in _open:
-            one.come()
-        if not since[0]:
-            since[0] = time.monotonic()
-        elif time.monotonic() - since[0] > PATIENCE:
-            raise KeyboardInterrupt
-
-    before: list[tuple[signal.Signals, Any]] = []
-    _open.append(told)
-    try:
-        for which in INTERRUPTS:
-            previous = signal.getsignal(which)
-            if previous is not None and previous is not signal.SIG_IGN:
-                before.append((which, previous))
-                signal.signal(which, note)
-        yield came
-    finally:
-        for which, previous in reversed(before):
+    def _restore(self) -> None:
+        for which, previous in reversed(self._before):
             signal.signal(which, previous)
-        _open.pop()
+
+    def _note(self, which: int, _: object) -> None:
+        self._came = which
+        for one in (self._told, *_open):
+            one.come()
+        if not self._since:
+            self._since = time.monotonic()
+        elif time.monotonic() - self._since > PATIENCE:
+            raise KeyboardInterrupt

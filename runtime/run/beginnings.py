@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from weakref import WeakKeyDictionary
 
+import numpy as np
+
 from mstmm.arrays import Array
 
 from ..engine.compiled import Compiled
@@ -18,13 +20,14 @@ _MOST = 200
 
 
 class Beginnings:
-    """Runs of one engine from one state over the same times with the same samples, one after the
-    other: the integrator of one stands at the start of the next, while the code is the same.
+    """Runs of one engine over the same times with the same samples, one after the other: the
+    integrator of one stands at the start of the next, while the code is the same.
     """
 
     def __init__(self) -> None:
         self._made: tuple[SceneSystem, Run] | None = None
-        self._energy: float | None = None
+        #: Time (s), state and energy (J) of a start.
+        self._known: tuple[float, Array, float] | None = None
 
     def begin(
         self, engine: Engine, compiled: SceneCode | None, settings: Settings, q: Array, u: Array
@@ -46,16 +49,12 @@ class Beginnings:
     def _serves(system: SceneSystem, compiled: SceneCode | None, settings: Settings) -> bool:
         return system.goes_by(compiled) and system.on_positions == asks_positions(settings)
 
-    def from_elsewhere(self) -> Beginnings:
-        """The same for runs from another state."""
-        self._energy = None
-        return self
-
     def _energy_at(self, system: SceneSystem, t: float, start: Array) -> float:
-        """That of the start, J, looked at once."""
-        if self._energy is None:
-            self._energy = energy_at(system, t, start)
-        return self._energy
+        """That of the start, J, looked at once for runs from the same."""
+        known = self._known
+        if known is None or known[0] != t or not np.array_equal(known[1], start):
+            known = self._known = t, start.copy(), energy_at(system, t, start)
+        return known[2]
 
 
 #: The integrator of a model's last run, and over which times with which samples.
@@ -66,7 +65,7 @@ def taken(model: Compiled, settings: Settings) -> Beginnings:
     """Beginnings of a run: of the model's last one where that was over the same times with the same
     samples.  Of several threads one gets it."""
     times, found = _waiting.pop(model, (None, None))
-    return Beginnings() if found is None or times != _times(settings) else found.from_elsewhere()
+    return Beginnings() if found is None or times != _times(settings) else found
 
 
 def put_back(model: Compiled, settings: Settings, beginnings: Beginnings) -> None:
