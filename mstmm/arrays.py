@@ -25,7 +25,7 @@ def real(name: str, value: Any, expected: str = "a finite number") -> float:
     if type(value) is float and math.isfinite(value):
         return value
     number = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
-    if isinstance(number, bool | np.bool_) or not isinstance(number, Real):
+    if isinstance(number, bool | np.bool_) or not isinstance(number, Real) or _masked(value):
         raise SceneError(f"{name} = {short(value)}: expected {expected}")
     try:
         found = float(number)
@@ -81,10 +81,14 @@ def _ready(value: ArrayLike) -> TypeGuard[Array]:
     return type(value) is np.ndarray and value.dtype is _DOUBLE
 
 
-def _masked(value: ArrayLike) -> bool:
+def _masked(value: Any) -> bool:
     """Whether a mask hides some of it; without numpy.ma, which takes its time, there are none."""
     known = sys.modules.get("numpy.ma")
-    return known is not None and bool(known.is_masked(value))
+    if known is None:
+        return False
+    return bool(known.is_masked(value)) or (
+        isinstance(value, list | tuple) and any(map(_masked, value))
+    )
 
 
 def _converted(value: ArrayLike) -> Array:

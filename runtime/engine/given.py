@@ -102,7 +102,8 @@ def _signal(name: str, given: Any) -> dict[str, Any] | None:
 
 
 def _over_time(given: Any) -> bool:
-    return not isinstance(given, str) and hasattr(given, "__len__")
+    alone = isinstance(given, str) or getattr(given, "ndim", 1) == 0  # arrays of one number
+    return not alone and hasattr(given, "__len__")
 
 
 def _plain(name: str, key: str, value: Any) -> Any:

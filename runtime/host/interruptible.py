@@ -61,7 +61,8 @@ class interruptible:
             _open[0].heard = _open[0].heard or self._told.heard
             return
         self._restore()
-        if self._came and not self._told.heard and kind is None:
+        answered = kind is not None and issubclass(kind, KeyboardInterrupt)
+        if self._came and not (self._told.heard or answered):
             signal.raise_signal(self._came)
 
     def _handle(self) -> None:

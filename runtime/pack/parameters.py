@@ -79,29 +79,40 @@ def changed(scene: Scene, changes: Mapping[str, float]) -> Scene:
     """
     data = data_of(scene)
     there: dict[str, float] | None = None
-    given_as = dict[str, str]()
+    given_as, together = dict[str, str](), dict[str, list[str]]()
     for path, given in by_name("parameters", changes).items():
         value = real(f'parameter "{path}"', given)
         own = next((one for one in scene.names.meant(path) if _set(data, one, value)), None)
         if own is None:
             there = there or read(scene)
             raise _unknown(path, there)
-        same = next((one for one in given_as if _overlap(own, one)), None)
+        beside = together.setdefault(_EVERY.sub("", own), [])
+        alike = [one for one in beside if _meets(own, one)]
+        there = read(scene) if alike and there is None else there
+        same = next((one for one in alike if _meant(own, there) == _meant(one, there)), None)
         if same is not None:
             other = given_as[same]
             raise SceneError(f'parameters "{other}" and "{path}" are one number; give one of them')
         given_as[own] = path
+        beside.append(own)
     for beam in data.get("beam", []):  # an end "tip" with axes of its own stays at the tip
         if "tip" in beam["ends"]:
             beam["ends"]["tip"]["position"] = [beam["length"], 0.0, 0.0]
     return made_of(data, scene)
 
 
-def _overlap(name: str, other: str) -> bool:
-    """Whether two names stand for the same number, or one without an index for several with it."""
-    if name == other or name.count("[") == other.count("["):
-        return name == other
-    return _EVERY.sub("", name) == _EVERY.sub("", other)
+def _meets(name: str, other: str) -> bool:
+    """Whether two names stand for a number together: words without an index stand for each."""
+    words, others = ([part.partition("[") for part in one.split(".")] for one in (name, other))
+    return len(words) == len(others) and all(
+        mine[0] == theirs[0] and (mine[2] == theirs[2] or not (mine[1] and theirs[1]))
+        for mine, theirs in zip(words, others, strict=True)
+    )
+
+
+def _meant(name: str, there: Mapping[str, float] | None) -> set[str]:
+    """All numbers that a name stands for, or itself."""
+    return {one for one in there or () if _meets(name, one)} or {name}
 
 
 def made_of(data: dict[str, Any], scene: Scene, where: str = "scene") -> Scene:

@@ -33,6 +33,8 @@ def kept_by_blows(
     momentum along each axis, then angular momentum about `pivot` (3,) in m; `roots` are the hinges
     on the ground."""
     kept, blows = asked.copy(), _blows(result)
+    if blows is None:
+        return np.zeros_like(asked)
     if blows and kept.any():
         scene = _Whole(result, roots, pivot)
         for row, event in blows:
@@ -42,10 +44,13 @@ def kept_by_blows(
     return kept
 
 
-def _blows(result: Record) -> list[tuple[int, int]]:
-    """(sample, event) of each of them."""
+def _blows(result: Record) -> list[tuple[int, int]] | None:
+    """(sample, event) of each of them; None where there may be some that no sample shows."""
     thrown = {bounce.event for bounce in result.model.packed.watched.bounces}
     rows = np.flatnonzero(result.event > 0).tolist()
+    count = result.statistics
+    if thrown and (count is None or len(rows) < count.events):
+        return None
     return [(k, event) for k in rows if (event := int(result.event[k]) - 1) in thrown]
 
 

@@ -16,11 +16,12 @@ from mstmm.errors import NumericalFailure, SceneError
 from ..engine.engine import Engine
 from ..pack.records.bounces import Bounce
 
-#: Within this part of the largest coordinate or speed, or of 1 rad or m and a second, a state is on
-#: what throws back, and does not move against it.
+#: Within this part of the places and speeds that it reads, or of 1 rad or m and a second, a state
+#: is on what throws back, and does not move against it.
 _CLOSE = 1e-9
-#: Time, s, after which what rests there shows whether its acceleration takes it away.
-_SOON = 1e-3
+#: Times, s, after one of which what rests there shows whether its acceleration takes it away:
+#: gently, or while it turns fast.
+_SOON = 1e-3, 1e-6
 
 
 class Watched(Protocol):
@@ -49,7 +50,7 @@ def refuse_behind(system: Watched, t: float, y: Array) -> None:
 
 def _refuse(system: Watched, bounce: Bounce, value: float, t: float, y: Array) -> None:
     met = system.meeting(bounce.event, t, y, _speeds(system, y))
-    close = _CLOSE * met.steepness * _largest(y[: system.engine.nq])
+    close = _CLOSE * met.reach
     if not value >= -close:
         return
     rate, beyond = _rate(system, bounce, t, y), value > close
@@ -66,28 +67,27 @@ def _speeds(system: Watched, y: Array) -> Array:
     return y[engine.nq : engine.nq + engine.nu]
 
 
-def _largest(values: Array) -> float:
-    return float(np.abs(values).max(initial=1.0))
-
-
 def _rate(system: Watched, bounce: Bounce, t: float, y: Array) -> float:
     """That with which a state moves on into it, 1/s: below 0 where it leaves, or stands and is
     taken away by its acceleration; 0 where it rests there."""
     met = system.meeting(bounce.event, t, y, _speeds(system, y))
-    still = _CLOSE * met.steepness * _largest(_speeds(system, y))
+    still = _CLOSE * (met.size + met.steepness)
     if abs(met.rate) > still:
         return float(met.rate)
-    soon = _soon(system, t, y)
-    met = system.meeting(bounce.event, t + _SOON, soon, _speeds(system, soon))
-    return float(met.rate) if met.rate < -still else 0.0
+    rates = []
+    for wait in _SOON:
+        soon = _state_soon(system, t, y, wait)
+        met = system.meeting(bounce.event, t + wait, soon, _speeds(system, soon))
+        rates.append(float(met.rate))
+    return min(rates) if min(rates) < -still else 0.0
 
 
-def _soon(system: Watched, t: float, y: Array) -> Array:
+def _state_soon(system: Watched, t: float, y: Array, wait: float) -> Array:
     """The state that its acceleration leads to."""
     engine = system.engine
     q, u, memory = (np.array(x)[None] for x in (y[: engine.nq], _speeds(system, y), system.memory))
-    gained = _SOON * engine.accelerations(t, q, u, memory)[1]
-    moved = _SOON * engine.accelerations(t, q, u + gained / 2, memory)[0]
+    gained = wait * engine.accelerations(t, q, u, memory)[1]
+    moved = wait * engine.accelerations(t, q, u + gained / 2, memory)[0]
     return np.concatenate([(q + moved)[0], (u + gained)[0]])
 
 

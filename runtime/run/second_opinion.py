@@ -43,6 +43,9 @@ METHODS = {
 #: Those that solve equations in every step, and take their Jacobian.
 _IMPLICIT = ("Radau", "BDF", "LSODA")
 
+#: Part of the next flight that the first step behind a blow takes at most, to end in the air.
+_FLIGHT = 0.3
+
 #: Points inside a step at which events are looked at.
 _LOOKS = np.linspace(0.0, 1.0, 9)[1:]
 
@@ -165,6 +168,12 @@ class _Loop:
         self.steps = self.fired = 0
         #: The last event, and how long before it another was, s.
         self.met, self.apart = settings.t_start, 0.0
+        bounces = self.system.engine.packed.watched.bounces
+        #: Part of its speed, at least, with which what is thrown back leaves; which events do that,
+        #: and the one that has just done it.
+        self.thrown = min((bounce.restitution for bounce in bounces), default=1.0)
+        self.bounces = {bounce.event for bounce in bounces}
+        self.aloft: int | None = None
         self.sizes: list[float] = []
         self.t, self.last = settings.t_start, np.zeros(0)
         self.interrupted = Interrupt()
@@ -254,9 +263,22 @@ class _Loop:
                 return np.array(self.last)
             self.sample(end, solver.y)
             self.truth &= self.events(end, solver.y) >= 0
+            self.refuse_unseen_flight()
             if self.closes and not _goes_on(solver, self.last, self.atol, self.settings.rtol):
                 break
         return np.array(self.last)
+
+    def refuse_unseen_flight(self) -> None:
+        """What does not leave by a fraction of its flight flies lower than the tolerances see."""
+        thrown, self.aloft = self.aloft, None
+        if thrown is not None and self.truth[thrown]:
+            raise self.stopped(thrown)
+
+    def stopped(self, event: int) -> _Ended:
+        """The end of a run that an event stops, or what comes to rest there."""
+        scene = self.system.scene
+        said = f"stopped by {scene.event_names[event]} at t = {self.t:.9g} s"
+        return _Ended(Status.STOPPED, said + rest_of(scene, event))
 
     def refuse_start(self, y: Array) -> None:
         """SciPy chooses its first step from the rates: from nan a step that never ends."""
@@ -311,7 +333,7 @@ class _Loop:
         name, longest = METHODS[method], self.longest_step()
         first = self.settings.first_step if self.t == self.settings.t_start else 0.0
         if self.apart:  # events that follow ever faster are not to be stepped over
-            first = self.apart / 2
+            first = self.apart * _FLIGHT * self.thrown
         first = min(first, stop - self.t)
         common = {"rtol": max(self.settings.rtol, 2.3e-14), "atol": self.atol}
         if method in sundials.METHODS:
@@ -384,9 +406,8 @@ class _Loop:
             self.rows.append(before)
         self.rows.append((t, np.array(y), np.array(self.system.scene.memory), event + 1))
         if answer == lib.MSTMM_FIRE_STOP:
-            name = self.system.scene.event_names[event]
-            rests = rest_of(self.system.scene, event)
-            raise _Ended(Status.STOPPED, f"stopped by {name} at t = {t:.9g} s{rests}")
+            raise self.stopped(event)
+        self.aloft = event if self.apart and event in self.bounces else None
         return True
 
     def first_switch(self, solver: Any) -> tuple[int, float] | None:
@@ -435,7 +456,7 @@ class _Loop:
             return switch
         dense, left = solver.dense_output(), solver.t_old
         end = solver.t if switch is None else switch[1]
-        false = self.events(left, dense(left)) < 0
+        false = (self.events(left, dense(left)) < 0) | ~self.truth
         for right in solver.t_old + _LOOKS * (end - solver.t_old):
             values = self.events(right, dense(right))
             risen = [int(i) for i in np.flatnonzero((values >= 0) & false)]

@@ -190,10 +190,10 @@ class SceneSystem:
         if packed.system.strained >= 0:
             near = self.run.strain > packed.model.loops_strain
             self.memory[packed.system.strained] = near
-        refuse_behind(self, t, y)
         lib = self.engine.lib
         if lib.mstmm_controllers_act(self.run, t, self.engine.pointer(y)) > 0:
             raise NumericalFailure(self.engine.failure_text(self.run.failure, t))
+        refuse_behind(self, t, y)
         return y
 
     def watched(self, t: float, y: Array) -> Array | None:

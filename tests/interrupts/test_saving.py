@@ -173,6 +173,13 @@ def test_an_interrupt_that_nobody_hears_comes_again(heard: None, inner: bool, ou
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+def test_an_interrupt_comes_again_behind_an_error(heard: None) -> None:
+    with pytest.raises(KeyboardInterrupt) as caught, interruptible.interruptible():
+        signal.raise_signal(signal.SIGINT)
+        raise ValueError
+    assert isinstance(caught.value.__context__, ValueError)
+
+
 def test_a_run_that_ends_by_itself_hands_an_interrupt_on(
     heard: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:

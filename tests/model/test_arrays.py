@@ -78,6 +78,11 @@ MISFITS: dict[str, tuple[Call, str]] = {
         lambda m: m.inverse_dynamics(Q, U, np.ma.masked_equal([1.0, 0.0], 0.0)),
         ": expected an array of real numbers",
     ),
+    "a masked number": (lambda m: m.simulate(np.ma.masked), "t_end = masked: expected a time"),
+    "rows with a mask": (
+        lambda m: m.simulate_batch(([np.ma.masked_equal([1.0, 0.0], 0.0)], [U]), t_end=0.1),
+        "expected an array of real numbers",
+    ),
     "complex numbers": (lambda m: m.inverse_dynamics(Q, U, [1j, 0]), "udot = [1j, 0]"),
     "no number": (lambda m: m.accelerations(Q, [np.nan, 0]), "u[0] = nan: expected a finite"),
     "no time": (lambda m: m.accelerations(Q, U, np.inf), "t = inf: expected a finite number"),

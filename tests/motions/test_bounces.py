@@ -290,3 +290,71 @@ def test_two_balls_that_touch() -> None:
     scene = {"gravity": [0, -G, 0], "body": bodies, "hinge": hinges, "event": [event]}
     with pytest.raises(mstmm.SceneError, match='event "hit"'):
         model(scene).simulate(0.1)
+
+
+@pytest.mark.parametrize("restitution", [0.5, 0.3, 0.1, 0.01])
+@pytest.mark.parametrize(
+    "method", ["dop853", "scipy-DOP853", "scipy-Radau", "scipy-LSODA", "sundials-BDF"]
+)
+def test_a_ball_comes_to_rest_on_its_floor(method: str, restitution: float) -> None:
+    """Flights by flights shorter, none of which a step may span: t = sqrt(2 h / g) (1 + e)/(1 - e)
+    if there were no end of them."""
+    one = model(ball(when="ball.y <= 0", restitution=restitution))
+    height = one.initial_state()[0][0]
+    run = one.simulate(10.0, method)
+    assert "follow ever faster" in run.message
+    assert run.q.min() > -1e-9
+    ideal = np.sqrt(2 * height / G) * (1 + restitution) / (1 - restitution)
+    assert run.t[-1] == pytest.approx(ideal, rel=1e-4)
+
+
+@pytest.mark.parametrize("push", [1.0, -1.0])
+def test_what_a_controller_does_at_the_start_tells_a_start_on_a_stop(push: float) -> None:
+    """Its input counts, not what the input was before it acted."""
+    limits = {"lower": -1.0, "upper": 0.0, "restitution": 0.5}
+    scene = {
+        "gravity": [0, 0, 0], "body": [{"name": "cart", "mass": 1.0}],
+        "input": [{"name": "motor", "value": -push}], "output": [{"name": "place", "of": "rail.q"}],
+        "controller": [{"name": "c", "sample_time": 10.0, "inputs": ["place"],
+                        "outputs": ["motor"], "D": [[0.0]], "offset": [push]}],
+        "hinge": [{"name": "rail", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
+                   "outboard": "cart", "law": {"effort": "motor", "limits": limits}}],
+    }  # fmt: skip
+    if push > 0:
+        with pytest.raises(mstmm.SceneError, match="begins on it"):
+            model(scene).simulate(1.0)
+    else:
+        assert model(scene).simulate(1.0).q[-1, 0] == pytest.approx(-0.5)
+
+
+@pytest.mark.parametrize("far", [0.0, 7e6])
+def test_a_start_is_on_a_stop_by_its_own_coordinate(far: float) -> None:
+    """However far and fast the rest of the scene is."""
+
+    def begun_at(angle: float, rate: float) -> mstmm.Model:
+        free = {"name": "orbit", "type": "free", "inboard": "ground", "outboard": "hub",
+                "initial": {"q": [far, 0, 0, 1, 0, 0, 0],
+                            "u": [0, far / 1e3, 0, 0, 0, 0]}}  # fmt: skip
+        pin = {"name": "panel_pin", "type": "pin", "inboard": "hub", "outboard": "panel",
+               "initial": {"q": angle, "u": rate},
+               "law": {"limits": {"lower": -1.0, "upper": 0.0, "restitution": 0.5}}}  # fmt: skip
+        bodies = [{"name": "hub", "mass": 100.0, "inertia": [10.0] * 3},
+                  {"name": "panel", "mass": 5.0, "center_of_mass": [0.5, 0, 0],
+                   "inertia": [0.1, 1.5, 1.5]}]  # fmt: skip
+        return model({"gravity": [0, 0, 0], "body": bodies, "hinge": [free, pin]})
+
+    assert begun_at(-5e-3, 0.0).simulate(0.1).success
+    assert begun_at(0.0, -5e-6).simulate(0.1).success
+    with pytest.raises(mstmm.SceneError, match="begins beyond it"):
+        begun_at(5e-3, -0.1).simulate(0.1)
+
+
+@pytest.mark.parametrize("rate", [10.0, 1e4])
+def test_a_wheel_that_touches_at_its_lowest_point_goes_on(rate: float) -> None:
+    wheel = {"name": "wheel", "mass": 1.0, "inertia": [0.1] * 3, "ends": {"rim": [1, 0, 0]}}
+    pin = {"name": "axle", "type": "pin", "inboard": "ground", "outboard": "wheel",
+           "initial": {"q": -np.pi / 2, "u": rate}}  # fmt: skip
+    event = {"name": "floor", "when": "wheel.rim.y <= -1", "do": "bounce", "restitution": 0.5}
+    scene = {"gravity": [0, 0, 0], "body": [wheel], "hinge": [pin], "event": [event]}
+    run = model(scene).simulate(0.1 / rate)
+    assert run.q[-1, 0] == pytest.approx(-np.pi / 2 + 0.1)

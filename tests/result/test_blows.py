@@ -135,3 +135,15 @@ def test_a_hub_with_a_blade() -> None:
     kept = {drift.name: drift.relative for drift in run.certificate.momentum}
     assert {"momentum x", "momentum y", "angular momentum z"} <= set(kept)
     assert max(kept.values()) < 1e-7
+
+
+def test_blows_between_output_times_are_not_forgotten() -> None:
+    """No sample shows them, so that nothing is known of what they have left."""
+    scene = {
+        "gravity": [0, 0, 0], "body": bodies("ball"),
+        "hinge": [free("ball", [0, 0, 0], [1, 0.2, 0, 0, 0, 0.5])], "event": events("ball.x > 1"),
+    }  # fmt: skip
+    assert "y" in asked(scene)
+    model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
+    run = model.simulate(2.0, output_times=[0.0, 0.5, 2.0], certify=True)
+    assert run.trusted and not run.certificate.momentum

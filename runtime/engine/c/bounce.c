@@ -80,11 +80,13 @@ static int met(mstmm_scene_run *run, const mstmm_event_action *action, const rea
     *found = (mstmm_meeting){.rate = slopes[0], .size = fabs(slopes[0])};
     for (int k = 0; k < action->n_slopes; k++) {
         const int place = action->places[2 * k], at = -1 - place;
-        const real speed = place >= 0 ? u[action->places[2 * k + 1]]
-                                      : run->probe_values[6 * (at / 3) + 3 + at % 3];
+        const real *probe = run->probe_values + 6 * (at / 3) + at % 3;
+        const real speed = place >= 0 ? u[action->places[2 * k + 1]] : probe[3];
+        const real far = place >= 0 ? y[place] : probe[0];
         found->rate += slopes[1 + k] * speed;
         found->size += fabs(slopes[1 + k] * speed);
         found->steepness += fabs(slopes[1 + k]);
+        found->reach += fabs(slopes[1 + k]) * fmax(1, fabs(far));
     }
     return 0;
 }

@@ -61,9 +61,10 @@ typedef struct {
 } mstmm_event_action;
 
 /* How the value of a bounce's event changes at a state: its rate, the sum of the sizes of that's
- * terms, and that of its slopes by places, 1/m, 1/rad. */
+ * terms, that of its slopes by places, 1/m, 1/rad, and that of these times the places or 1 m, 1 rad,
+ * in parts of which the value is known. */
 typedef struct {
-    real rate, size, steepness;
+    real rate, size, steepness, reach;
 } mstmm_meeting;
 
 /* Parts of what that code works on: the base point (t, q, u, a), steps, slopes, factors, known
