@@ -1727,7 +1727,6 @@ int mstmm_sweep_planar_pin_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_planar_pin_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_planar_pin_complement(real *restrict W);
 int mstmm_sweep_planar_pin_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_planar_pin_couple(const real *restrict y, const real *restrict z,
     real *restrict L_ij);

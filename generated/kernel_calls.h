@@ -2252,16 +2252,6 @@ static inline int mstmm_planar_answer_by(struct mstmm_planar_answer to)
 }
 #define mstmm_planar_answer(...) mstmm_planar_answer_by((struct mstmm_planar_answer){__VA_ARGS__})
 
-struct mstmm_planar_complement {
-    real *W;
-};
-static inline int mstmm_planar_complement_by(struct mstmm_planar_complement to)
-{
-    return mstmm_sweep_planar_pin_complement(
-        to.W);
-}
-#define mstmm_planar_complement(...) mstmm_planar_complement_by((struct mstmm_planar_complement){__VA_ARGS__})
-
 struct mstmm_planar_divide {
     const real *F;
     const real *y;

@@ -28,7 +28,6 @@ int mstmm_sweep_planar_pin_push(const real *restrict Rc, const real *restrict r,
 int mstmm_sweep_planar_pin_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_planar_pin_complement(real *restrict W);
 int mstmm_sweep_planar_pin_divide(const real *restrict F, const real *restrict y, real *restrict z);
 int mstmm_sweep_planar_pin_couple(const real *restrict y, const real *restrict z,
     real *restrict L_ij);
@@ -590,63 +589,6 @@ static const mstmm_port mstmm_sweep_planar_pin_answer_inputs[] = {
 static const mstmm_port mstmm_sweep_planar_pin_answer_outputs[] = {
     {"udot", 1, "", 0, 0},
     {"delta", 6, "", 0, 0},
-};
-
-/* what a hinge with 1 speeds lets go and holds, in a plane
- * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
- * out W[6][6] rows: H^+, then what the hinge holds
- */
-int mstmm_sweep_planar_pin_complement(real *restrict W)
-{
-    const real t0 = 0.0 < 1.0;
-    if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    W[0] = 0.0;
-    W[1] = 0.0;
-    W[5] = 1.0;
-    W[6] = 0.0;
-    W[7] = 1.0;
-    W[11] = 0.0;
-    W[12] = 0.0;
-    W[13] = 0.0;
-    W[17] = 0.0;
-    W[18] = 0.0;
-    W[19] = 0.0;
-    W[23] = 0.0;
-    W[24] = 0.0;
-    W[25] = 0.0;
-    W[29] = 0.0;
-    const real t1 = 0.0 < 0.0;
-    const real t2 = sqrt(1.0);
-    const real t3 = -t2;
-    const real t4 = t1 != 0 ? t3 : t2;
-    const real t5 = fabs(0.0);
-    const real t6 = t2 + t5;
-    const real t7 = t2 * t6;
-    const real t8 = 0.0 < t7;
-    const real t9 = 1.0 / t7;
-    const real t10 = t8 != 0 ? t9 : 0.0;
-    const real t11 = t4 * t10;
-    const real t12 = -t11;
-    W[30] = t12;
-    W[31] = 0.0;
-    const real t13 = 1.0 - t10;
-    W[35] = t13;
-    return 0;
-}
-
-static int mstmm_sweep_planar_pin_complement_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    (void)in;
-    return mstmm_sweep_planar_pin_complement(out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_complement_outputs[] = {
-    {"W", 36, "", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_planar_pin_complement_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
 };
 
 /* a column's rows divided by D, across a hinge with 1 speeds, in a plane
@@ -1456,18 +1398,6 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .guards = NULL,
     },
     {
-        .name = "complement",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_complement,
-        .call = mstmm_sweep_planar_pin_complement_call,
-        .n_inputs = 0,
-        .n_outputs = 1,
-        .inputs = NULL,
-        .outputs = mstmm_sweep_planar_pin_complement_outputs,
-        .ir_hash = "d9fa611b263758be2866609a99e6c063afe25945b3ecb0dfbd9bcefeda2ba9de",
-        .n_guards = 1,
-        .guards = mstmm_sweep_planar_pin_complement_guards,
-    },
-    {
         .name = "divide",
         .function = (void (*)(void))mstmm_sweep_planar_pin_divide,
         .call = mstmm_sweep_planar_pin_divide_call,
@@ -1653,7 +1583,7 @@ const mstmm_element mstmm_sweep_planar_pin = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "planar_pin",
-    .hash = "f09b7a531d78720a2781db5587894614cd33bebf7b6c94058f605ddf0a4c5a6d",
+    .hash = "152ae3fed76caf1fec695766d5f93b075b7bd0b0b8c7620d8f83745413e4a1b3",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1663,6 +1593,6 @@ const mstmm_element mstmm_sweep_planar_pin = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 24,
+    .n_kernels = 23,
     .kernels = mstmm_sweep_planar_pin_kernels,
 };

@@ -332,9 +332,9 @@ mstmm_generic_tangent_answer_known_kernel *const mstmm_generic_tangent_answer_kn
 static const real mstmm_plane[36] = {
     0, 0, 0, 0, 0, 1,
     0, 1, 0, 0, 0, 0,
-    0, 0, 0, 0, 0, 0,
-    0, 0, 0, 0, 0, 0,
-    0, 0, 0, 0, 0, 0,
+    0, 0, 1, 0, 0, 0,
+    0, 0, 0, 1, 0, 0,
+    0, 0, 0, 0, 1, 0,
     -1, 0, 0, 0, 0, 0,
 };
 

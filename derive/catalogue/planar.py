@@ -48,8 +48,7 @@ _TAKEN: dict[tuple[str, str], str] = {
     ("hinge", "pin"): "forward",
     ("body", "rigid"): "inertia bias_load",
     ("sweep", "frames"): "pose velocity",
-    ("sweep", "generic1"): "factor push push_on_ground answer complement divide"
-    " couple answered pull",
+    ("sweep", "generic1"): "factor push push_on_ground answer divide couple answered pull",
     ("sweep", "loops"): "meet slip drift row known told act close shed multiplier_more",
 }  # fmt: skip
 

@@ -82,9 +82,9 @@ def _header(name: str, said: str, included: list[str], lines: Iterable[str]) -> 
 
 
 def _plane(specs: Specs) -> str:
-    """The directions of pins in a plane, which ask for nothing that changes."""
-    kernel = next(k for k in specs["sweep", "planar_pin"].kernels if k.name == "complement")
-    (numbers,) = evaluate_floats(kernel, {}).values()
+    """The directions of a pin about z, which are the same in every position."""
+    kernel = next(k for k in specs["sweep", "generic1"].kernels if k.name == "complement")
+    (numbers,) = evaluate_floats(kernel, {"H": [0, 0, 0, 0, 0, 1]}).values()
     rows = (numbers[k : k + 6] for k in range(0, len(numbers), 6))
     lines = ",\n".join("    " + ", ".join(f"{entry + 0.0:g}" for entry in row) for row in rows)
     return f"static const real mstmm_plane[{len(numbers)}] = {{\n{lines},\n}};\n"
