@@ -86,9 +86,10 @@ def _masked(value: Any) -> bool:
     known = sys.modules.get("numpy.ma")
     if known is None:
         return False
-    return bool(known.is_masked(value)) or (
-        isinstance(value, list | tuple) and any(map(_masked, value))
-    )
+    if isinstance(value, known.MaskedArray):
+        return bool(known.is_masked(value))
+    several = value if isinstance(value, list | tuple) else ()
+    return any(type(one) is not float and _masked(one) for one in several)
 
 
 def _converted(value: ArrayLike) -> Array:

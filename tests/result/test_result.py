@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -283,9 +285,9 @@ def test_table_shows_units_and_both_ends(run: Result) -> None:
 
 
 @pytest.mark.parametrize("rows", [1, 2.5, True, "3"])
-def test_a_table_of_no_number_of_rows_is_refused(run: Result, rows: object) -> None:
+def test_a_table_of_no_number_of_rows_is_refused(run: Result, rows: Any) -> None:
     with pytest.raises(mstmm.SceneError, match=r"rows = .*: expected a whole number of rows, 2"):
-        run.table("energy", rows=rows)  # type: ignore[arg-type]
+        run.table("energy", rows=rows)
 
 
 def test_a_pendulum_swings_as_the_elliptic_functions_say() -> None:
