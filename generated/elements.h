@@ -1708,9 +1708,8 @@ int mstmm_sweep_modal_modal_effort_slope(int n, const real *restrict H, const re
 
 extern const mstmm_element mstmm_sweep_planar_pin;
 int mstmm_sweep_planar_pin_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot);
+    const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict Rc, real *restrict motion, real *restrict qdot);
 int mstmm_sweep_planar_pin_inertia(const real *restrict p, real *restrict S);
 int mstmm_sweep_planar_pin_bias_load(const real *restrict p, const real *restrict motion,
     real *restrict e);
@@ -1718,6 +1717,15 @@ int mstmm_sweep_planar_pin_pose(const real *restrict A_I, const real *restrict x
     const real *restrict Rc, const real *restrict r, real *restrict A, real *restrict x);
 int mstmm_sweep_planar_pin_velocity(const real *restrict Rc, const real *restrict r,
     const real *restrict v_I, const real *restrict w_I, real *restrict v);
+int mstmm_sweep_planar_pin_point(const real *restrict A, const real *restrict x,
+    const real *restrict v, const real *restrict motion, const real *restrict offset,
+    real *restrict x_K, real *restrict v_K);
+int mstmm_sweep_planar_pin_turning(const real *restrict A, const real *restrict motion,
+    real *restrict w_K);
+int mstmm_sweep_planar_pin_end_frame(const real *restrict A, const real *restrict R_end,
+    real *restrict A_end);
+int mstmm_sweep_planar_pin_applied_load(const real *restrict A, const real *restrict A_F,
+    const real *restrict offset, const real *restrict F, const real *restrict M, real *restrict e);
 int mstmm_sweep_planar_pin_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict J, const real *restrict floor_, const real *restrict S, real *restrict F,
     real *restrict G, real *restrict S_I);

@@ -2136,17 +2136,15 @@ struct mstmm_planar_forward {
     const real *p;
     const real *q;
     const real *u;
-    const real *s;
     const real *motion_I;
     real *Rc;
-    real *r;
     real *motion;
     real *qdot;
 };
 static inline int mstmm_planar_forward_by(struct mstmm_planar_forward to)
 {
     return mstmm_sweep_planar_pin_forward(
-        to.Rt, to.ro, to.p, to.q, to.u, to.s, to.motion_I, to.Rc, to.r, to.motion, to.qdot);
+        to.Rt, to.ro, to.p, to.q, to.u, to.motion_I, to.Rc, to.motion, to.qdot);
 }
 #define mstmm_planar_forward(...) mstmm_planar_forward_by((struct mstmm_planar_forward){__VA_ARGS__})
 
@@ -2201,6 +2199,61 @@ static inline int mstmm_planar_velocity_by(struct mstmm_planar_velocity to)
         to.Rc, to.r, to.v_I, to.w_I, to.v);
 }
 #define mstmm_planar_velocity(...) mstmm_planar_velocity_by((struct mstmm_planar_velocity){__VA_ARGS__})
+
+struct mstmm_planar_point {
+    const real *A;
+    const real *x;
+    const real *v;
+    const real *motion;
+    const real *offset;
+    real *x_K;
+    real *v_K;
+};
+static inline int mstmm_planar_point_by(struct mstmm_planar_point to)
+{
+    return mstmm_sweep_planar_pin_point(
+        to.A, to.x, to.v, to.motion, to.offset, to.x_K, to.v_K);
+}
+#define mstmm_planar_point(...) mstmm_planar_point_by((struct mstmm_planar_point){__VA_ARGS__})
+
+struct mstmm_planar_turning {
+    const real *A;
+    const real *motion;
+    real *w_K;
+};
+static inline int mstmm_planar_turning_by(struct mstmm_planar_turning to)
+{
+    return mstmm_sweep_planar_pin_turning(
+        to.A, to.motion, to.w_K);
+}
+#define mstmm_planar_turning(...) mstmm_planar_turning_by((struct mstmm_planar_turning){__VA_ARGS__})
+
+struct mstmm_planar_end_frame {
+    const real *A;
+    const real *R_end;
+    real *A_end;
+};
+static inline int mstmm_planar_end_frame_by(struct mstmm_planar_end_frame to)
+{
+    return mstmm_sweep_planar_pin_end_frame(
+        to.A, to.R_end, to.A_end);
+}
+#define mstmm_planar_end_frame(...) mstmm_planar_end_frame_by((struct mstmm_planar_end_frame){__VA_ARGS__})
+
+struct mstmm_planar_applied_load {
+    const real *A;
+    const real *A_F;
+    const real *offset;
+    const real *F;
+    const real *M;
+    real *e;
+};
+static inline int mstmm_planar_applied_load_by(struct mstmm_planar_applied_load to)
+{
+    return mstmm_sweep_planar_pin_applied_load(
+        to.A, to.A_F, to.offset, to.F, to.M, to.e);
+}
+#define mstmm_planar_applied_load(...) mstmm_planar_applied_load_by((struct mstmm_planar_applied_load){__VA_ARGS__})
 
 struct mstmm_planar_factor {
     const real *Rc;

@@ -64,6 +64,26 @@
 #define MSTMM_ROW_X 9
 #define MSTMM_ROW_TOLD 10
 #define MSTMM_ROW 11
+/* A body in a plane, and what its record gives. */
+#define MSTMM_FLAT_A 0
+#define MSTMM_FLAT_X 2
+#define MSTMM_FLAT_V 5
+#define MSTMM_FLAT_MOTION 7
+#define MSTMM_FLAT_R 11
+#define MSTMM_FLAT_TAU 13
+#define MSTMM_FLAT_S 14
+#define MSTMM_FLAT_E 20
+#define MSTMM_FLAT_DELTA 23
+#define MSTMM_FLAT_F 26
+#define MSTMM_FLAT_OFFSET 27
+#define MSTMM_FLAT_GAIN 28
+#define MSTMM_FLAT 31
+#define MSTMM_GIVEN_TURN 0
+#define MSTMM_GIVEN_SHIFT 2
+#define MSTMM_GIVEN_ROTOR 5
+#define MSTMM_GIVEN_FLOOR 6
+#define MSTMM_GIVEN_P 7
+#define MSTMM_GIVEN 11
 /* cdef end */
 
 /* Arrays of a flexible body of n modes, and of one of its sections. */

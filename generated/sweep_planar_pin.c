@@ -9,9 +9,8 @@
 
 extern const mstmm_element mstmm_sweep_planar_pin;
 int mstmm_sweep_planar_pin_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot);
+    const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict Rc, real *restrict motion, real *restrict qdot);
 int mstmm_sweep_planar_pin_inertia(const real *restrict p, real *restrict S);
 int mstmm_sweep_planar_pin_bias_load(const real *restrict p, const real *restrict motion,
     real *restrict e);
@@ -19,6 +18,15 @@ int mstmm_sweep_planar_pin_pose(const real *restrict A_I, const real *restrict x
     const real *restrict Rc, const real *restrict r, real *restrict A, real *restrict x);
 int mstmm_sweep_planar_pin_velocity(const real *restrict Rc, const real *restrict r,
     const real *restrict v_I, const real *restrict w_I, real *restrict v);
+int mstmm_sweep_planar_pin_point(const real *restrict A, const real *restrict x,
+    const real *restrict v, const real *restrict motion, const real *restrict offset,
+    real *restrict x_K, real *restrict v_K);
+int mstmm_sweep_planar_pin_turning(const real *restrict A, const real *restrict motion,
+    real *restrict w_K);
+int mstmm_sweep_planar_pin_end_frame(const real *restrict A, const real *restrict R_end,
+    real *restrict A_end);
+int mstmm_sweep_planar_pin_applied_load(const real *restrict A, const real *restrict A_F,
+    const real *restrict offset, const real *restrict F, const real *restrict M, real *restrict e);
 int mstmm_sweep_planar_pin_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict J, const real *restrict floor_, const real *restrict S, real *restrict F,
     real *restrict G, real *restrict S_I);
@@ -65,63 +73,51 @@ int mstmm_sweep_planar_pin_multiplier_more(const real *restrict inverse, const r
 /* bias motion behind the pin hinge, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
- * in  Rt[3][3] rotation, inboard hinge axes to parent axes
- * in  ro[3] (m) inboard point Q in the parent, parent axes
+ * in  Rt[2] rotation, inboard hinge axes to parent axes
+ * in  ro[2] (m) inboard point Q in the parent, parent axes
  * in  p[0] parameters
  * in  q[1] coordinates: angle [rad]
  * in  u[1] speeds: angle_rate [rad/s]
- * in  s[1] prescribed part of udot (zero where free)
- * in  motion_I[9] bias motion of the parent: w, wd, rdd of its P, parent axes
- * out Rc[3][3] rotation, body axes to parent axes
- * out r[3] (m) P of the body from P of the parent, parent axes
- * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
+ * in  motion_I[4] bias motion of the parent: w, wd, rdd of its P, parent axes
+ * out Rc[2] rotation, body axes to parent axes
+ * out motion[4] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[1] coordinate rates
  */
 int mstmm_sweep_planar_pin_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot)
+    const real *restrict p, const real *restrict q, const real *restrict u,
+    const real *restrict motion_I, real *restrict Rc, real *restrict motion, real *restrict qdot)
 {
     (void)p;
     const real t0 = cos(q[0]);
     const real t1 = Rt[0] * t0;
     const real t2 = sin(q[0]);
-    const real t3 = Rt[3] * t2;
+    const real t3 = Rt[1] * t2;
     const real t4 = t1 - t3;
     Rc[0] = t4;
-    const real t5 = Rt[3] * t0;
+    const real t5 = Rt[1] * t0;
     const real t6 = Rt[0] * t2;
     const real t7 = t5 + t6;
-    Rc[3] = t7;
-    r[0] = ro[0];
-    r[1] = ro[1];
-    r[2] = ro[2];
-    motion[0] = 0.0;
-    motion[1] = 0.0;
-    const real t8 = u[0] + motion_I[2];
-    motion[2] = t8;
-    motion[3] = 0.0;
-    motion[4] = 0.0;
-    const real t9 = s[0] + motion_I[5];
-    motion[5] = t9;
-    const real t10 = ro[1] * motion_I[5];
-    const real t11 = motion_I[2] * motion_I[2];
-    const real t12 = ro[0] * t11;
-    const real t13 = t10 + t12;
-    const real t14 = motion_I[6] - t13;
-    const real t15 = t4 * t14;
-    const real t16 = ro[0] * motion_I[5];
-    const real t17 = ro[1] * t11;
-    const real t18 = t16 - t17;
-    const real t19 = motion_I[7] + t18;
-    const real t20 = t7 * t19;
-    const real t21 = t15 + t20;
-    motion[6] = t21;
-    const real t22 = t4 * t19;
-    const real t23 = t7 * t14;
-    const real t24 = t22 - t23;
-    motion[7] = t24;
-    motion[8] = 0.0;
+    Rc[1] = t7;
+    const real t8 = u[0] + motion_I[0];
+    motion[0] = t8;
+    motion[1] = motion_I[1];
+    const real t9 = ro[1] * motion_I[1];
+    const real t10 = motion_I[0] * motion_I[0];
+    const real t11 = ro[0] * t10;
+    const real t12 = t9 + t11;
+    const real t13 = motion_I[2] - t12;
+    const real t14 = t4 * t13;
+    const real t15 = ro[0] * motion_I[1];
+    const real t16 = ro[1] * t10;
+    const real t17 = t15 - t16;
+    const real t18 = motion_I[3] + t17;
+    const real t19 = t7 * t18;
+    const real t20 = t14 + t19;
+    motion[2] = t20;
+    const real t21 = t4 * t18;
+    const real t22 = t7 * t13;
+    const real t23 = t21 - t22;
+    motion[3] = t23;
     qdot[0] = u[0];
     return 0;
 }
@@ -129,43 +125,38 @@ int mstmm_sweep_planar_pin_forward(const real *restrict Rt, const real *restrict
 static int mstmm_sweep_planar_pin_forward_call(int n, const real *const *in, real *const *out)
 {
     (void)n;
-    return mstmm_sweep_planar_pin_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
+    return mstmm_sweep_planar_pin_forward(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2]);
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
+    {"Rt", 2, "", 0, 0},
+    {"ro", 2, "m", 0, 0},
     {"p", 0, "", 0, 0},
     {"q", 1, "", 0, 0},
     {"u", 1, "", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
+    {"motion_I", 4, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
+    {"Rc", 2, "", 0, 0},
+    {"motion", 4, "", 0, 0},
     {"qdot", 1, "", 0, 0},
 };
 
 /* mass matrix of the rigid body, in a plane
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
- * in  p[10] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
- * out S[21] f = S a + e of everything outboard, at P
+ * in  p[4] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
+ * out S[6] f = S a + e of everything outboard, at P
  */
 int mstmm_sweep_planar_pin_inertia(const real *restrict p, real *restrict S)
 {
     S[0] = p[0];
     S[1] = 0.0;
     const real t0 = -p[2];
-    S[5] = t0;
-    S[6] = p[0];
-    S[10] = p[1];
-    S[11] = p[0];
-    S[15] = p[4];
-    S[18] = p[7];
-    S[20] = p[9];
+    S[2] = t0;
+    S[3] = p[0];
+    S[4] = p[1];
+    S[5] = p[3];
     return 0;
 }
 
@@ -176,56 +167,41 @@ static int mstmm_sweep_planar_pin_inertia_call(int n, const real *const *in, rea
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_inertia_inputs[] = {
-    {"p", 10, "", 0, 0},
+    {"p", 4, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_inertia_outputs[] = {
-    {"S", 21, "", 0, 0},
+    {"S", 6, "", 0, 0},
 };
 
 /* load that the bias motion of the rigid body needs, in a plane
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
- * in  p[10] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
- * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
- * out e[6] (N, N*m) force part of f = S a + e, at P
+ * in  p[4] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
+ * in  motion[4] bias motion of the body: w, wd, rdd of its P, own axes
+ * out e[3] (N, N*m) force part of f = S a + e, at P
  */
 int mstmm_sweep_planar_pin_bias_load(const real *restrict p, const real *restrict motion,
     real *restrict e)
 {
-    const real t0 = p[0] * motion[6];
-    const real t1 = p[2] * motion[5];
-    const real t2 = motion[2] * motion[2];
+    const real t0 = p[0] * motion[2];
+    const real t1 = p[2] * motion[1];
+    const real t2 = motion[0] * motion[0];
     const real t3 = p[1] * t2;
     const real t4 = t1 + t3;
     const real t5 = t0 - t4;
     e[0] = t5;
-    const real t6 = p[0] * motion[7];
-    const real t7 = p[1] * motion[5];
+    const real t6 = p[0] * motion[3];
+    const real t7 = p[1] * motion[1];
     const real t8 = p[2] * t2;
     const real t9 = t7 - t8;
     const real t10 = t6 + t9;
     e[1] = t10;
-    e[2] = 0.0;
-    const real t11 = p[6] * motion[5];
-    const real t12 = p[8] * motion[2];
-    const real t13 = motion[2] * t12;
-    const real t14 = t11 - t13;
-    const real t15 = p[3] * motion[7];
-    const real t16 = t14 - t15;
-    e[3] = t16;
-    const real t17 = p[3] * motion[6];
-    const real t18 = p[8] * motion[5];
-    const real t19 = p[6] * motion[2];
-    const real t20 = motion[2] * t19;
-    const real t21 = t18 + t20;
-    const real t22 = t17 + t21;
-    e[4] = t22;
-    const real t23 = p[1] * motion[7];
-    const real t24 = p[9] * motion[5];
-    const real t25 = p[2] * motion[6];
-    const real t26 = t24 - t25;
-    const real t27 = t23 + t26;
-    e[5] = t27;
+    const real t11 = p[1] * motion[3];
+    const real t12 = p[3] * motion[1];
+    const real t13 = p[2] * motion[2];
+    const real t14 = t12 - t13;
+    const real t15 = t11 + t14;
+    e[2] = t15;
     return 0;
 }
 
@@ -236,53 +212,45 @@ static int mstmm_sweep_planar_pin_bias_load_call(int n, const real *const *in, r
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_bias_load_inputs[] = {
-    {"p", 10, "", 0, 0},
-    {"motion", 9, "", 0, 0},
+    {"p", 4, "", 0, 0},
+    {"motion", 4, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_bias_load_outputs[] = {
-    {"e", 6, "N, N*m", 0, 0},
+    {"e", 3, "N, N*m", 0, 0},
 };
 
 /* pose of a body, in a plane
- * in  A_I[3][3] rotation, parent axes to inertial axes
+ * in  A_I[2] rotation, parent axes to inertial axes
  * in  x_I[3] (m) P of the parent, inertial axes
- * in  Rc[3][3] rotation, body axes to parent axes
+ * in  Rc[2] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
- * out A[3][3] rotation, body axes to inertial axes
+ * out A[2] rotation, body axes to inertial axes
  * out x[3] (m) P of the body, inertial axes
  */
 int mstmm_sweep_planar_pin_pose(const real *restrict A_I, const real *restrict x_I,
     const real *restrict Rc, const real *restrict r, real *restrict A, real *restrict x)
 {
     const real t0 = A_I[0] * Rc[0];
-    const real t1 = A_I[3] * Rc[3];
+    const real t1 = A_I[1] * Rc[1];
     const real t2 = t0 - t1;
     A[0] = t2;
-    const real t3 = A_I[0] * Rc[3];
-    const real t4 = A_I[3] * Rc[0];
+    const real t3 = A_I[0] * Rc[1];
+    const real t4 = A_I[1] * Rc[0];
     const real t5 = t3 + t4;
-    const real t6 = -t5;
-    A[1] = t6;
-    A[2] = 0.0;
-    A[3] = t5;
-    A[4] = t2;
-    A[5] = 0.0;
-    A[6] = 0.0;
-    A[7] = 0.0;
-    A[8] = 1.0;
-    const real t7 = A_I[0] * r[0];
-    const real t8 = A_I[3] * r[1];
-    const real t9 = t7 - t8;
-    const real t10 = x_I[0] + t9;
-    x[0] = t10;
-    const real t11 = A_I[3] * r[0];
-    const real t12 = A_I[0] * r[1];
-    const real t13 = t11 + t12;
-    const real t14 = x_I[1] + t13;
-    x[1] = t14;
-    const real t15 = x_I[2] + r[2];
-    x[2] = t15;
+    A[1] = t5;
+    const real t6 = A_I[0] * r[0];
+    const real t7 = A_I[1] * r[1];
+    const real t8 = t6 - t7;
+    const real t9 = x_I[0] + t8;
+    x[0] = t9;
+    const real t10 = A_I[1] * r[0];
+    const real t11 = A_I[0] * r[1];
+    const real t12 = t10 + t11;
+    const real t13 = x_I[1] + t12;
+    x[1] = t13;
+    const real t14 = x_I[2] + r[2];
+    x[2] = t14;
     return 0;
 }
 
@@ -293,40 +261,39 @@ static int mstmm_sweep_planar_pin_pose_call(int n, const real *const *in, real *
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_pose_inputs[] = {
-    {"A_I", 9, "", 0, 0},
+    {"A_I", 2, "", 0, 0},
     {"x_I", 3, "m", 0, 0},
-    {"Rc", 9, "", 0, 0},
+    {"Rc", 2, "", 0, 0},
     {"r", 3, "m", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_pose_outputs[] = {
-    {"A", 9, "", 0, 0},
+    {"A", 2, "", 0, 0},
     {"x", 3, "m", 0, 0},
 };
 
 /* velocity of a body's input end, in a plane
- * in  Rc[3][3] rotation, body axes to parent axes
+ * in  Rc[2] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  v_I[3] (m/s) velocity of the parent's P, parent axes
- * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
- * out v[3] (m/s) velocity of P, body axes
+ * in  v_I[2] (m/s) velocity of the parent's P, parent axes
+ * in  w_I[1] (rad/s) angular velocity of the parent, parent axes
+ * out v[2] (m/s) velocity of P, body axes
  */
 int mstmm_sweep_planar_pin_velocity(const real *restrict Rc, const real *restrict r,
     const real *restrict v_I, const real *restrict w_I, real *restrict v)
 {
-    const real t0 = r[1] * w_I[2];
+    const real t0 = r[1] * w_I[0];
     const real t1 = v_I[0] - t0;
     const real t2 = Rc[0] * t1;
-    const real t3 = r[0] * w_I[2];
+    const real t3 = r[0] * w_I[0];
     const real t4 = v_I[1] + t3;
-    const real t5 = Rc[3] * t4;
+    const real t5 = Rc[1] * t4;
     const real t6 = t2 + t5;
     v[0] = t6;
     const real t7 = Rc[0] * t4;
-    const real t8 = Rc[3] * t1;
+    const real t8 = Rc[1] * t1;
     const real t9 = t7 - t8;
     v[1] = t9;
-    v[2] = 0.0;
     return 0;
 }
 
@@ -337,98 +304,315 @@ static int mstmm_sweep_planar_pin_velocity_call(int n, const real *const *in, re
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_velocity_inputs[] = {
-    {"Rc", 9, "", 0, 0},
+    {"Rc", 2, "", 0, 0},
     {"r", 3, "m", 0, 0},
-    {"v_I", 3, "m/s", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
+    {"v_I", 2, "m/s", 0, 0},
+    {"w_I", 1, "rad/s", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_velocity_outputs[] = {
-    {"v", 3, "m/s", 0, 0},
+    {"v", 2, "m/s", 0, 0},
+};
+
+/* motion of a point of a body, in a plane
+ * in  A[2] rotation, body axes to inertial axes
+ * in  x[3] (m) P of the body, inertial axes
+ * in  v[2] (m/s) velocity of P, body axes
+ * in  motion[4] bias motion of the body: w, wd, rdd of its P, own axes
+ * in  offset[3] (m) point of the body from P, body axes
+ * out x_K[3] (m) position, inertial axes
+ * out v_K[3] (m/s) velocity, inertial axes
+ */
+int mstmm_sweep_planar_pin_point(const real *restrict A, const real *restrict x,
+    const real *restrict v, const real *restrict motion, const real *restrict offset,
+    real *restrict x_K, real *restrict v_K)
+{
+    const real t0 = A[0] * offset[0];
+    const real t1 = A[1] * offset[1];
+    const real t2 = t0 - t1;
+    const real t3 = x[0] + t2;
+    x_K[0] = t3;
+    const real t4 = A[1] * offset[0];
+    const real t5 = A[0] * offset[1];
+    const real t6 = t4 + t5;
+    const real t7 = x[1] + t6;
+    x_K[1] = t7;
+    const real t8 = x[2] + offset[2];
+    x_K[2] = t8;
+    const real t9 = motion[0] * offset[1];
+    const real t10 = v[0] - t9;
+    const real t11 = A[0] * t10;
+    const real t12 = motion[0] * offset[0];
+    const real t13 = v[1] + t12;
+    const real t14 = A[1] * t13;
+    const real t15 = t11 - t14;
+    v_K[0] = t15;
+    const real t16 = A[1] * t10;
+    const real t17 = A[0] * t13;
+    const real t18 = t16 + t17;
+    v_K[1] = t18;
+    v_K[2] = 0.0;
+    return 0;
+}
+
+static int mstmm_sweep_planar_pin_point_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_planar_pin_point(in[0], in[1], in[2], in[3], in[4], out[0], out[1]);
+}
+
+static const mstmm_port mstmm_sweep_planar_pin_point_inputs[] = {
+    {"A", 2, "", 0, 0},
+    {"x", 3, "m", 0, 0},
+    {"v", 2, "m/s", 0, 0},
+    {"motion", 4, "", 0, 0},
+    {"offset", 3, "m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_planar_pin_point_outputs[] = {
+    {"x_K", 3, "m", 0, 0},
+    {"v_K", 3, "m/s", 0, 0},
+};
+
+/* turning of a body, in a plane
+ * in  A[2] rotation, body axes to inertial axes
+ * in  motion[4] bias motion of the body: w, wd, rdd of its P, own axes
+ * out w_K[3] (rad/s) angular velocity, inertial axes
+ */
+int mstmm_sweep_planar_pin_turning(const real *restrict A, const real *restrict motion,
+    real *restrict w_K)
+{
+    (void)A;
+    w_K[0] = 0.0;
+    w_K[1] = 0.0;
+    w_K[2] = motion[0];
+    return 0;
+}
+
+static int mstmm_sweep_planar_pin_turning_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_planar_pin_turning(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_planar_pin_turning_inputs[] = {
+    {"A", 2, "", 0, 0},
+    {"motion", 4, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_planar_pin_turning_outputs[] = {
+    {"w_K", 3, "rad/s", 0, 0},
+};
+
+/* axes of an end, in a plane
+ * in  A[2] rotation, body axes to inertial axes
+ * in  R_end[3][3] rotation, end axes to body axes
+ * out A_end[3][3] rotation, end axes to inertial axes
+ */
+int mstmm_sweep_planar_pin_end_frame(const real *restrict A, const real *restrict R_end,
+    real *restrict A_end)
+{
+    const real t0 = A[0] * R_end[0];
+    const real t1 = A[1] * R_end[3];
+    const real t2 = t0 - t1;
+    A_end[0] = t2;
+    const real t3 = A[0] * R_end[1];
+    const real t4 = A[1] * R_end[4];
+    const real t5 = t3 - t4;
+    A_end[1] = t5;
+    const real t6 = A[0] * R_end[2];
+    const real t7 = A[1] * R_end[5];
+    const real t8 = t6 - t7;
+    A_end[2] = t8;
+    const real t9 = A[1] * R_end[0];
+    const real t10 = A[0] * R_end[3];
+    const real t11 = t9 + t10;
+    A_end[3] = t11;
+    const real t12 = A[1] * R_end[1];
+    const real t13 = A[0] * R_end[4];
+    const real t14 = t12 + t13;
+    A_end[4] = t14;
+    const real t15 = A[1] * R_end[2];
+    const real t16 = A[0] * R_end[5];
+    const real t17 = t15 + t16;
+    A_end[5] = t17;
+    A_end[6] = R_end[6];
+    A_end[7] = R_end[7];
+    A_end[8] = R_end[8];
+    return 0;
+}
+
+static int mstmm_sweep_planar_pin_end_frame_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_planar_pin_end_frame(in[0], in[1], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_planar_pin_end_frame_inputs[] = {
+    {"A", 2, "", 0, 0},
+    {"R_end", 9, "", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_planar_pin_end_frame_outputs[] = {
+    {"A_end", 9, "", 0, 0},
+};
+
+/* load applied at a point of a body, in a plane
+ * in  A[2] rotation, body axes to inertial axes
+ * in  A_F[3][3] rotation, axes of the load to inertial axes
+ * in  offset[3] (m) point of the body from P, body axes
+ * in  F[3] (N) force, axes of the load
+ * in  M[3] (N*m) moment, axes of the load
+ * out e[3] (N, N*m) contribution to e, added to what is there
+ */
+int mstmm_sweep_planar_pin_applied_load(const real *restrict A, const real *restrict A_F,
+    const real *restrict offset, const real *restrict F, const real *restrict M, real *restrict e)
+{
+    const real t0 = A[0] * A_F[0];
+    const real t1 = A[1] * A_F[3];
+    const real t2 = t0 + t1;
+    const real t3 = F[0] * t2;
+    const real t4 = A[0] * A_F[1];
+    const real t5 = A[1] * A_F[4];
+    const real t6 = t4 + t5;
+    const real t7 = F[1] * t6;
+    const real t8 = t3 + t7;
+    const real t9 = A[0] * A_F[2];
+    const real t10 = A[1] * A_F[5];
+    const real t11 = t9 + t10;
+    const real t12 = F[2] * t11;
+    const real t13 = t8 + t12;
+    const real t14 = -t13;
+    e[0] += t14;
+    const real t15 = A[0] * A_F[3];
+    const real t16 = A[1] * A_F[0];
+    const real t17 = t15 - t16;
+    const real t18 = F[0] * t17;
+    const real t19 = A[0] * A_F[4];
+    const real t20 = A[1] * A_F[1];
+    const real t21 = t19 - t20;
+    const real t22 = F[1] * t21;
+    const real t23 = t18 + t22;
+    const real t24 = A[0] * A_F[5];
+    const real t25 = A[1] * A_F[2];
+    const real t26 = t24 - t25;
+    const real t27 = F[2] * t26;
+    const real t28 = t23 + t27;
+    const real t29 = -t28;
+    e[1] += t29;
+    const real t30 = offset[1] * t13;
+    const real t31 = offset[0] * t28;
+    const real t32 = t30 - t31;
+    const real t33 = A_F[6] * M[0];
+    const real t34 = A_F[7] * M[1];
+    const real t35 = t33 + t34;
+    const real t36 = A_F[8] * M[2];
+    const real t37 = t35 + t36;
+    const real t38 = t32 - t37;
+    e[2] += t38;
+    return 0;
+}
+
+static int mstmm_sweep_planar_pin_applied_load_call(int n, const real *const *in, real *const *out)
+{
+    (void)n;
+    return mstmm_sweep_planar_pin_applied_load(in[0], in[1], in[2], in[3], in[4], out[0]);
+}
+
+static const mstmm_port mstmm_sweep_planar_pin_applied_load_inputs[] = {
+    {"A", 2, "", 0, 0},
+    {"A_F", 9, "", 0, 0},
+    {"offset", 3, "m", 0, 0},
+    {"F", 3, "N", 0, 0},
+    {"M", 3, "N*m", 0, 0},
+};
+
+static const mstmm_port mstmm_sweep_planar_pin_applied_load_outputs[] = {
+    {"e", 3, "N, N*m", 1, 0},
 };
 
 /* S carried across a hinge with 1 free speed, and the factor of D, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
- * in  Rc[3][3] rotation, body axes to parent axes
+ * in  Rc[2] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  J[1] (kg*m2 or kg) rotor inertia reflected to the speeds
- * in  floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
- * in  S[21] f = S a + e of everything outboard, at P
+ * in  floor[1] (kg, kg*m2) least inertia along and about an axis that is not rounding
+ * in  S[6] f = S a + e of everything outboard, at P
  * out F[1] D = L diag(d) L^T: L, and 1 / d on the diagonal
- * out G[1][6] D^-1 H^T S
- * out S_I[21] contribution to the parent's S, added to what is there
+ * out G[3] D^-1 H^T S
+ * out S_I[6] contribution to the parent's S, added to what is there
  */
 int mstmm_sweep_planar_pin_factor(const real *restrict Rc, const real *restrict r,
     const real *restrict J, const real *restrict floor_, const real *restrict S, real *restrict F,
     real *restrict G, real *restrict S_I)
 {
-    const real t0 = J[0] + S[20];
+    const real t0 = J[0] + S[5];
     const real t1 = 0.0 < t0;
     if (!(t1 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t2 = 0.0 < floor_[1];
-    const real t3 = S[20] * ((real)1 / (real)300000000000000);
-    const real t4 = t2 != 0 ? floor_[1] : t3;
+    const real t2 = 0.0 < floor_[0];
+    const real t3 = S[5] * ((real)1 / (real)300000000000000);
+    const real t4 = t2 != 0 ? floor_[0] : t3;
     const real t5 = t4 < t0;
     if (!(t5 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
     const real t6 = 1.0 / t0;
     F[0] = t6;
-    const real t7 = S[5] * t6;
+    const real t7 = S[2] * t6;
     G[0] = t7;
-    const real t8 = S[10] * t6;
+    const real t8 = S[4] * t6;
     G[1] = t8;
-    const real t9 = S[20] * t6;
-    G[5] = t9;
-    const real t10 = S[5] * t7;
+    const real t9 = S[5] * t6;
+    G[2] = t9;
+    const real t10 = S[2] * t7;
     const real t11 = S[0] - t10;
     const real t12 = Rc[0] * t11;
-    const real t13 = S[5] * t8;
+    const real t13 = S[2] * t8;
     const real t14 = S[1] - t13;
-    const real t15 = Rc[3] * t14;
+    const real t15 = Rc[1] * t14;
     const real t16 = t12 - t15;
     const real t17 = Rc[0] * t16;
     const real t18 = Rc[0] * t14;
-    const real t19 = S[10] * t8;
-    const real t20 = S[6] - t19;
-    const real t21 = Rc[3] * t20;
+    const real t19 = S[4] * t8;
+    const real t20 = S[3] - t19;
+    const real t21 = Rc[1] * t20;
     const real t22 = t18 - t21;
-    const real t23 = Rc[3] * t22;
+    const real t23 = Rc[1] * t22;
     const real t24 = t17 - t23;
     S_I[0] += t24;
-    const real t25 = Rc[3] * t16;
+    const real t25 = Rc[1] * t16;
     const real t26 = Rc[0] * t22;
     const real t27 = t25 + t26;
     S_I[1] += t27;
-    const real t28 = S[5] * t9;
-    const real t29 = S[5] - t28;
+    const real t28 = S[2] * t9;
+    const real t29 = S[2] - t28;
     const real t30 = Rc[0] * t29;
-    const real t31 = S[10] * t9;
-    const real t32 = S[10] - t31;
-    const real t33 = Rc[3] * t32;
+    const real t31 = S[4] * t9;
+    const real t32 = S[4] - t31;
+    const real t33 = Rc[1] * t32;
     const real t34 = t30 - t33;
     const real t35 = r[0] * t27;
     const real t36 = r[1] * t24;
     const real t37 = t35 - t36;
     const real t38 = t34 + t37;
-    S_I[5] += t38;
-    const real t39 = Rc[3] * t11;
+    S_I[2] += t38;
+    const real t39 = Rc[1] * t11;
     const real t40 = t18 + t39;
-    const real t41 = Rc[3] * t40;
+    const real t41 = Rc[1] * t40;
     const real t42 = Rc[0] * t20;
     const real t43 = t15 + t42;
     const real t44 = Rc[0] * t43;
     const real t45 = t41 + t44;
-    S_I[6] += t45;
-    const real t46 = Rc[3] * t29;
+    S_I[3] += t45;
+    const real t46 = Rc[1] * t29;
     const real t47 = Rc[0] * t32;
     const real t48 = t46 + t47;
     const real t49 = r[0] * t45;
     const real t50 = r[1] * t27;
     const real t51 = t49 - t50;
     const real t52 = t48 + t51;
-    S_I[10] += t52;
-    const real t53 = S[20] * t9;
-    const real t54 = S[20] - t53;
+    S_I[4] += t52;
+    const real t53 = S[5] * t9;
+    const real t54 = S[5] - t53;
     const real t55 = r[0] * t52;
     const real t56 = r[1] * t38;
     const real t57 = t55 - t56;
@@ -437,7 +621,7 @@ int mstmm_sweep_planar_pin_factor(const real *restrict Rc, const real *restrict 
     const real t60 = t58 - t59;
     const real t61 = t57 + t60;
     const real t62 = t54 + t61;
-    S_I[20] += t62;
+    S_I[5] += t62;
     return 0;
 }
 
@@ -448,17 +632,17 @@ static int mstmm_sweep_planar_pin_factor_call(int n, const real *const *in, real
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_factor_inputs[] = {
-    {"Rc", 9, "", 0, 0},
+    {"Rc", 2, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"J", 1, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
+    {"floor", 1, "kg, kg*m2", 0, 0},
+    {"S", 6, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_factor_outputs[] = {
     {"F", 1, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
+    {"G", 3, "", 0, 0},
+    {"S_I", 6, "", 1, 0},
 };
 
 static const mstmm_guard mstmm_sweep_planar_pin_factor_guards[] = {
@@ -469,45 +653,45 @@ static const mstmm_guard mstmm_sweep_planar_pin_factor_guards[] = {
 /* load of a column carried across a hinge with 1 free speed, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
- * in  Rc[3][3] rotation, body axes to parent axes
+ * in  Rc[2] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
- * in  G[1][6] D^-1 H^T S
- * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  G[3] D^-1 H^T S
+ * in  e[3] (N, N*m) force part of f = S a + e, at P
  * in  tau[1] (N, N*m) the column's efforts on the free coordinates
  * out y[1] (N, N*m) tau - H^T e
- * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
+ * out e_I[3] (N, N*m) contribution to the parent's e, added to what is there
  */
 int mstmm_sweep_planar_pin_push(const real *restrict Rc, const real *restrict r,
     const real *restrict G, const real *restrict e, const real *restrict tau, real *restrict y,
     real *restrict e_I)
 {
-    const real t0 = tau[0] - e[5];
+    const real t0 = tau[0] - e[2];
     y[0] = t0;
     const real t1 = G[0] * t0;
     const real t2 = e[0] + t1;
     const real t3 = Rc[0] * t2;
     const real t4 = G[1] * t0;
     const real t5 = e[1] + t4;
-    const real t6 = Rc[3] * t5;
+    const real t6 = Rc[1] * t5;
     const real t7 = t3 - t6;
     e_I[0] += t7;
-    const real t8 = Rc[3] * t2;
+    const real t8 = Rc[1] * t2;
     const real t9 = Rc[0] * t5;
     const real t10 = t8 + t9;
     e_I[1] += t10;
-    const real t11 = G[5] * t0;
-    const real t12 = e[5] + t11;
-    const real t13 = Rc[3] * r[0];
+    const real t11 = G[2] * t0;
+    const real t12 = e[2] + t11;
+    const real t13 = Rc[1] * r[0];
     const real t14 = Rc[0] * r[1];
     const real t15 = t13 - t14;
     const real t16 = t2 * t15;
     const real t17 = Rc[0] * r[0];
-    const real t18 = Rc[3] * r[1];
+    const real t18 = Rc[1] * r[1];
     const real t19 = t17 + t18;
     const real t20 = t5 * t19;
     const real t21 = t16 + t20;
     const real t22 = t12 + t21;
-    e_I[5] += t22;
+    e_I[2] += t22;
     return 0;
 }
 
@@ -518,56 +702,56 @@ static int mstmm_sweep_planar_pin_push_call(int n, const real *const *in, real *
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_push_inputs[] = {
-    {"Rc", 9, "", 0, 0},
+    {"Rc", 2, "", 0, 0},
     {"r", 3, "m", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
+    {"G", 3, "", 0, 0},
+    {"e", 3, "N, N*m", 0, 0},
     {"tau", 1, "N, N*m", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_push_outputs[] = {
     {"y", 1, "N, N*m", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
+    {"e_I", 3, "N, N*m", 1, 0},
 };
 
 /* accelerations that answer a column, across a hinge with 1 free speed, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
- * in  Rc[3][3] rotation, body axes to parent axes
+ * in  Rc[2] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  F[1] D = L diag(d) L^T: L, and 1 / d on the diagonal
- * in  G[1][6] D^-1 H^T S
+ * in  G[3] D^-1 H^T S
  * in  y[1] (N, N*m) tau - H^T e
- * in  delta_I[6] deviation of the parent's acceleration
+ * in  delta_I[3] deviation of the parent's acceleration
  * out udot[1] accelerations of the free coordinates
- * out delta[6] deviation of the body's acceleration, at P
+ * out delta[3] deviation of the body's acceleration, at P
  */
 int mstmm_sweep_planar_pin_answer(const real *restrict Rc, const real *restrict r,
     const real *restrict F, const real *restrict G, const real *restrict y,
     const real *restrict delta_I, real *restrict udot, real *restrict delta)
 {
     const real t0 = F[0] * y[0];
-    const real t1 = r[1] * delta_I[5];
+    const real t1 = r[1] * delta_I[2];
     const real t2 = delta_I[0] - t1;
     const real t3 = Rc[0] * t2;
-    const real t4 = r[0] * delta_I[5];
+    const real t4 = r[0] * delta_I[2];
     const real t5 = delta_I[1] + t4;
-    const real t6 = Rc[3] * t5;
+    const real t6 = Rc[1] * t5;
     const real t7 = t3 + t6;
     const real t8 = G[0] * t7;
     const real t9 = Rc[0] * t5;
-    const real t10 = Rc[3] * t2;
+    const real t10 = Rc[1] * t2;
     const real t11 = t9 - t10;
     const real t12 = G[1] * t11;
     const real t13 = t8 + t12;
-    const real t14 = G[5] * delta_I[5];
+    const real t14 = G[2] * delta_I[2];
     const real t15 = t13 + t14;
     const real t16 = t0 - t15;
     udot[0] = t16;
     delta[0] = t7;
     delta[1] = t11;
-    const real t17 = delta_I[5] + t16;
-    delta[5] = t17;
+    const real t17 = delta_I[2] + t16;
+    delta[2] = t17;
     return 0;
 }
 
@@ -578,17 +762,17 @@ static int mstmm_sweep_planar_pin_answer_call(int n, const real *const *in, real
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_answer_inputs[] = {
-    {"Rc", 9, "", 0, 0},
+    {"Rc", 2, "", 0, 0},
     {"r", 3, "m", 0, 0},
     {"F", 1, "", 0, 0},
-    {"G", 6, "", 0, 0},
+    {"G", 3, "", 0, 0},
     {"y", 1, "N, N*m", 0, 0},
-    {"delta_I", 6, "", 0, 0},
+    {"delta_I", 3, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_answer_outputs[] = {
     {"udot", 1, "", 0, 0},
-    {"delta", 6, "", 0, 0},
+    {"delta", 3, "", 0, 0},
 };
 
 /* a column's rows divided by D, across a hinge with 1 speeds, in a plane
@@ -713,14 +897,14 @@ static const mstmm_port mstmm_sweep_planar_pin_pull_outputs[] = {
 /* load of a column felt by a hinge on the ground with 1 free speed, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
- * in  e[6] (N, N*m) force part of f = S a + e, at P
+ * in  e[3] (N, N*m) force part of f = S a + e, at P
  * in  tau[1] (N, N*m) the column's efforts on the free coordinates
  * out y[1] (N, N*m) tau - H^T e
  */
 int mstmm_sweep_planar_pin_push_on_ground(const real *restrict e, const real *restrict tau,
     real *restrict y)
 {
-    const real t0 = tau[0] - e[5];
+    const real t0 = tau[0] - e[2];
     y[0] = t0;
     return 0;
 }
@@ -732,7 +916,7 @@ static int mstmm_sweep_planar_pin_push_on_ground_call(int n, const real *const *
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_push_on_ground_inputs[] = {
-    {"e", 6, "N, N*m", 0, 0},
+    {"e", 3, "N, N*m", 0, 0},
     {"tau", 1, "N, N*m", 0, 0},
 };
 
@@ -743,16 +927,16 @@ static const mstmm_port mstmm_sweep_planar_pin_push_on_ground_outputs[] = {
 /* the two sides of a hinge that closes a loop, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  A_C[3][3] rotation, axes of C to inertial axes
+ * in  A_C[2] rotation, axes of C to inertial axes
  * in  x_C[3] (m) origin of C, inertial axes
- * in  A_B[3][3] rotation, axes of B to inertial axes
+ * in  A_B[2] rotation, axes of B to inertial axes
  * in  x_B[3] (m) P of B, inertial axes
- * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
- * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r_e[2] (m) the end of B that the hinge holds, from P, axes of B
+ * in  Rc[2] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
- * out R_C[3][3] rotation, axes of C to axes of B
- * out r_A[3] (m) the end of B from P of A, axes of A
- * out d[3] (m) that end from the origin of C, axes of C
+ * out R_C[2] rotation, axes of C to axes of B
+ * out r_A[2] (m) the end of B from P of A, axes of A
+ * out d[2] (m) that end from the origin of C, axes of C
  */
 int mstmm_sweep_planar_pin_meet(const real *restrict A_C, const real *restrict x_C,
     const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
@@ -760,36 +944,36 @@ int mstmm_sweep_planar_pin_meet(const real *restrict A_C, const real *restrict x
     real *restrict d)
 {
     const real t0 = A_C[0] * A_B[0];
-    const real t1 = A_C[3] * A_B[3];
+    const real t1 = A_C[1] * A_B[1];
     const real t2 = t0 + t1;
     R_C[0] = t2;
-    const real t3 = A_C[0] * A_B[3];
-    const real t4 = A_C[3] * A_B[0];
+    const real t3 = A_C[0] * A_B[1];
+    const real t4 = A_C[1] * A_B[0];
     const real t5 = t3 - t4;
     const real t6 = -t5;
-    R_C[3] = t6;
+    R_C[1] = t6;
     const real t7 = A_B[0] * r_e[0];
-    const real t8 = A_B[3] * r_e[1];
+    const real t8 = A_B[1] * r_e[1];
     const real t9 = t7 - t8;
     const real t10 = t9 - x_C[0];
     const real t11 = x_B[0] + t10;
     const real t12 = A_C[0] * t11;
-    const real t13 = A_B[3] * r_e[0];
+    const real t13 = A_B[1] * r_e[0];
     const real t14 = A_B[0] * r_e[1];
     const real t15 = t13 + t14;
     const real t16 = t15 - x_C[1];
     const real t17 = x_B[1] + t16;
-    const real t18 = A_C[3] * t17;
+    const real t18 = A_C[1] * t17;
     const real t19 = t12 + t18;
     const real t20 = Rc[0] * t19;
     const real t21 = A_C[0] * t17;
-    const real t22 = A_C[3] * t11;
+    const real t22 = A_C[1] * t11;
     const real t23 = t21 - t22;
-    const real t24 = Rc[3] * t23;
+    const real t24 = Rc[1] * t23;
     const real t25 = t20 - t24;
     const real t26 = r[0] + t25;
     r_A[0] = t26;
-    const real t27 = Rc[3] * t19;
+    const real t27 = Rc[1] * t19;
     const real t28 = Rc[0] * t23;
     const real t29 = t27 + t28;
     const real t30 = r[1] + t29;
@@ -806,57 +990,57 @@ static int mstmm_sweep_planar_pin_meet_call(int n, const real *const *in, real *
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_meet_inputs[] = {
-    {"A_C", 9, "", 0, 0},
+    {"A_C", 2, "", 0, 0},
     {"x_C", 3, "m", 0, 0},
-    {"A_B", 9, "", 0, 0},
+    {"A_B", 2, "", 0, 0},
     {"x_B", 3, "m", 0, 0},
-    {"r_e", 3, "m", 0, 0},
-    {"Rc", 9, "", 0, 0},
+    {"r_e", 2, "m", 0, 0},
+    {"Rc", 2, "", 0, 0},
     {"r", 3, "m", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_meet_outputs[] = {
-    {"R_C", 9, "", 0, 0},
-    {"r_A", 3, "m", 0, 0},
-    {"d", 3, "m", 0, 0},
+    {"R_C", 2, "", 0, 0},
+    {"r_A", 2, "m", 0, 0},
+    {"d", 2, "m", 0, 0},
 };
 
 /* slip of a hinge that closes a loop, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  R_C[3][3] rotation, axes of C to axes of B
- * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
- * in  d[3] (m) that end from the origin of C, axes of C
- * in  v_C[3] (m/s) velocity of C, own axes
- * in  w_C[3] (rad/s) angular velocity of C, own axes
- * in  v_B[3] (m/s) velocity of P of B, own axes
- * in  w_B[3] (rad/s) angular velocity of B, own axes
- * out slip[6] rate of d and relative angular velocity, axes of C
+ * in  R_C[2] rotation, axes of C to axes of B
+ * in  r_e[2] (m) the end of B that the hinge holds, from P, axes of B
+ * in  d[2] (m) that end from the origin of C, axes of C
+ * in  v_C[2] (m/s) velocity of C, own axes
+ * in  w_C[1] (rad/s) angular velocity of C, own axes
+ * in  v_B[2] (m/s) velocity of P of B, own axes
+ * in  w_B[1] (rad/s) angular velocity of B, own axes
+ * out slip[3] rate of d and relative angular velocity, axes of C
  */
 int mstmm_sweep_planar_pin_slip(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict v_C, const real *restrict w_C,
     const real *restrict v_B, const real *restrict w_B, real *restrict slip)
 {
-    const real t0 = r_e[1] * w_B[2];
+    const real t0 = r_e[1] * w_B[0];
     const real t1 = v_B[0] - t0;
     const real t2 = R_C[0] * t1;
-    const real t3 = r_e[0] * w_B[2];
+    const real t3 = r_e[0] * w_B[0];
     const real t4 = v_B[1] + t3;
-    const real t5 = R_C[3] * t4;
+    const real t5 = R_C[1] * t4;
     const real t6 = t2 + t5;
-    const real t7 = d[1] * w_C[2];
+    const real t7 = d[1] * w_C[0];
     const real t8 = t7 - v_C[0];
     const real t9 = t6 + t8;
     slip[0] = t9;
     const real t10 = R_C[0] * t4;
-    const real t11 = R_C[3] * t1;
+    const real t11 = R_C[1] * t1;
     const real t12 = t10 - t11;
-    const real t13 = d[0] * w_C[2];
+    const real t13 = d[0] * w_C[0];
     const real t14 = v_C[1] + t13;
     const real t15 = t12 - t14;
     slip[1] = t15;
-    const real t16 = w_B[2] - w_C[2];
-    slip[5] = t16;
+    const real t16 = w_B[0] - w_C[0];
+    slip[2] = t16;
     return 0;
 }
 
@@ -867,70 +1051,70 @@ static int mstmm_sweep_planar_pin_slip_call(int n, const real *const *in, real *
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_slip_inputs[] = {
-    {"R_C", 9, "", 0, 0},
-    {"r_e", 3, "m", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"v_C", 3, "m/s", 0, 0},
-    {"w_C", 3, "rad/s", 0, 0},
-    {"v_B", 3, "m/s", 0, 0},
-    {"w_B", 3, "rad/s", 0, 0},
+    {"R_C", 2, "", 0, 0},
+    {"r_e", 2, "m", 0, 0},
+    {"d", 2, "m", 0, 0},
+    {"v_C", 2, "m/s", 0, 0},
+    {"w_C", 1, "rad/s", 0, 0},
+    {"v_B", 2, "m/s", 0, 0},
+    {"w_B", 1, "rad/s", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_slip_outputs[] = {
-    {"slip", 6, "", 0, 0},
+    {"slip", 3, "", 0, 0},
 };
 
 /* drift of a hinge that closes a loop, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  R_C[3][3] rotation, axes of C to axes of B
- * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
- * in  d[3] (m) that end from the origin of C, axes of C
- * in  slip[6] rate of d and relative angular velocity, axes of C
- * in  motion_C[9] bias motion of C: w, wd, rdd, own axes
- * in  motion_B[9] bias motion of B: w, wd, rdd, own axes
- * out drift[6] rate of the slip in the bias motion, axes of C
+ * in  R_C[2] rotation, axes of C to axes of B
+ * in  r_e[2] (m) the end of B that the hinge holds, from P, axes of B
+ * in  d[2] (m) that end from the origin of C, axes of C
+ * in  slip[3] rate of d and relative angular velocity, axes of C
+ * in  motion_C[4] bias motion of C: w, wd, rdd, own axes
+ * in  motion_B[4] bias motion of B: w, wd, rdd, own axes
+ * out drift[3] rate of the slip in the bias motion, axes of C
  */
 int mstmm_sweep_planar_pin_drift(const real *restrict R_C, const real *restrict r_e,
     const real *restrict d, const real *restrict slip, const real *restrict motion_C,
     const real *restrict motion_B, real *restrict drift)
 {
-    const real t0 = slip[1] * motion_C[2];
+    const real t0 = slip[1] * motion_C[0];
     const real t1 = t0 * 2.0;
-    const real t2 = t1 - motion_C[6];
-    const real t3 = r_e[1] * motion_B[5];
-    const real t4 = motion_B[2] * motion_B[2];
+    const real t2 = t1 - motion_C[2];
+    const real t3 = r_e[1] * motion_B[1];
+    const real t4 = motion_B[0] * motion_B[0];
     const real t5 = r_e[0] * t4;
     const real t6 = t3 + t5;
-    const real t7 = motion_B[6] - t6;
+    const real t7 = motion_B[2] - t6;
     const real t8 = R_C[0] * t7;
-    const real t9 = r_e[0] * motion_B[5];
+    const real t9 = r_e[0] * motion_B[1];
     const real t10 = r_e[1] * t4;
     const real t11 = t9 - t10;
-    const real t12 = motion_B[7] + t11;
-    const real t13 = R_C[3] * t12;
+    const real t12 = motion_B[3] + t11;
+    const real t13 = R_C[1] * t12;
     const real t14 = t8 + t13;
-    const real t15 = d[1] * motion_C[5];
-    const real t16 = motion_C[2] * motion_C[2];
+    const real t15 = d[1] * motion_C[1];
+    const real t16 = motion_C[0] * motion_C[0];
     const real t17 = d[0] * t16;
     const real t18 = t15 + t17;
     const real t19 = t14 + t18;
     const real t20 = t2 + t19;
     drift[0] = t20;
     const real t21 = R_C[0] * t12;
-    const real t22 = R_C[3] * t7;
+    const real t22 = R_C[1] * t7;
     const real t23 = t21 - t22;
     const real t24 = d[1] * t16;
-    const real t25 = d[0] * motion_C[5];
+    const real t25 = d[0] * motion_C[1];
     const real t26 = t24 - t25;
     const real t27 = t23 + t26;
-    const real t28 = slip[0] * motion_C[2];
+    const real t28 = slip[0] * motion_C[0];
     const real t29 = 2.0 * t28;
-    const real t30 = motion_C[7] + t29;
+    const real t30 = motion_C[3] + t29;
     const real t31 = t27 - t30;
     drift[1] = t31;
-    const real t32 = motion_B[5] - motion_C[5];
-    drift[5] = t32;
+    const real t32 = motion_B[1] - motion_C[1];
+    drift[2] = t32;
     return 0;
 }
 
@@ -941,38 +1125,38 @@ static int mstmm_sweep_planar_pin_drift_call(int n, const real *const *in, real 
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_drift_inputs[] = {
-    {"R_C", 9, "", 0, 0},
-    {"r_e", 3, "m", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"slip", 6, "", 0, 0},
-    {"motion_C", 9, "", 0, 0},
-    {"motion_B", 9, "", 0, 0},
+    {"R_C", 2, "", 0, 0},
+    {"r_e", 2, "m", 0, 0},
+    {"d", 2, "m", 0, 0},
+    {"slip", 3, "", 0, 0},
+    {"motion_C", 4, "", 0, 0},
+    {"motion_B", 4, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_drift_outputs[] = {
-    {"drift", 6, "", 0, 0},
+    {"drift", 3, "", 0, 0},
 };
 
 /* row of a direction of a hinge that closes a loop, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  w[6] the direction: a row of W
- * in  R_C[3][3] rotation, axes of C to axes of B
- * in  r_e[3] (m) the end of B that the hinge holds, from P, axes of B
- * in  Rc[3][3] rotation, body axes to parent axes
- * in  r_A[3] (m) the end of B from P of A, axes of A
- * out J_A[6] row by the acceleration of A, at its P
- * out J_B[6] row by the acceleration of B, at its P
+ * in  w[3] the direction: a row of W
+ * in  R_C[2] rotation, axes of C to axes of B
+ * in  r_e[2] (m) the end of B that the hinge holds, from P, axes of B
+ * in  Rc[2] rotation, body axes to parent axes
+ * in  r_A[2] (m) the end of B from P of A, axes of A
+ * out J_A[3] row by the acceleration of A, at its P
+ * out J_B[3] row by the acceleration of B, at its P
  */
 int mstmm_sweep_planar_pin_row(const real *restrict w, const real *restrict R_C,
     const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
     real *restrict J_B)
 {
-    const real t0 = w[1] * Rc[3];
+    const real t0 = w[1] * Rc[1];
     const real t1 = w[0] * Rc[0];
     const real t2 = t0 - t1;
     J_A[0] = t2;
-    const real t3 = w[0] * Rc[3];
+    const real t3 = w[0] * Rc[1];
     const real t4 = w[1] * Rc[0];
     const real t5 = t3 + t4;
     const real t6 = -t5;
@@ -981,21 +1165,21 @@ int mstmm_sweep_planar_pin_row(const real *restrict w, const real *restrict R_C,
     const real t8 = r_A[1] * t7;
     const real t9 = r_A[0] * t5;
     const real t10 = t8 - t9;
-    const real t11 = t10 - w[5];
-    J_A[5] = t11;
+    const real t11 = t10 - w[2];
+    J_A[2] = t11;
     const real t12 = w[0] * R_C[0];
-    const real t13 = w[1] * R_C[3];
+    const real t13 = w[1] * R_C[1];
     const real t14 = t12 - t13;
     J_B[0] = t14;
-    const real t15 = w[0] * R_C[3];
+    const real t15 = w[0] * R_C[1];
     const real t16 = w[1] * R_C[0];
     const real t17 = t15 + t16;
     J_B[1] = t17;
     const real t18 = r_e[0] * t17;
     const real t19 = r_e[1] * t14;
     const real t20 = t18 - t19;
-    const real t21 = w[5] + t20;
-    J_B[5] = t21;
+    const real t21 = w[2] + t20;
+    J_B[2] = t21;
     return 0;
 }
 
@@ -1006,23 +1190,23 @@ static int mstmm_sweep_planar_pin_row_call(int n, const real *const *in, real *c
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_row_inputs[] = {
-    {"w", 6, "", 0, 0},
-    {"R_C", 9, "", 0, 0},
-    {"r_e", 3, "m", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r_A", 3, "m", 0, 0},
+    {"w", 3, "", 0, 0},
+    {"R_C", 2, "", 0, 0},
+    {"r_e", 2, "m", 0, 0},
+    {"Rc", 2, "", 0, 0},
+    {"r_A", 2, "m", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_row_outputs[] = {
-    {"J_A", 6, "", 0, 0},
-    {"J_B", 6, "", 0, 0},
+    {"J_A", 3, "", 0, 0},
+    {"J_B", 3, "", 0, 0},
 };
 
 /* known parts of the rows of a hinge that closes a loop, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  W[6][6] rows: H^+, then what the hinge holds
- * in  relative[6] motion of the end of B relative to C
+ * in  W[18] rows: H^+, then what the hinge holds
+ * in  relative[3] motion of the end of B relative to C
  * out l[6] rows of what is known
  */
 int mstmm_sweep_planar_pin_known(const real *restrict W, const real *restrict relative,
@@ -1031,37 +1215,37 @@ int mstmm_sweep_planar_pin_known(const real *restrict W, const real *restrict re
     const real t0 = W[0] * relative[0];
     const real t1 = W[1] * relative[1];
     const real t2 = t0 + t1;
-    const real t3 = W[5] * relative[5];
+    const real t3 = W[2] * relative[2];
     const real t4 = t2 + t3;
     l[0] = t4;
-    const real t5 = W[6] * relative[0];
-    const real t6 = W[7] * relative[1];
+    const real t5 = W[3] * relative[0];
+    const real t6 = W[4] * relative[1];
     const real t7 = t5 + t6;
-    const real t8 = W[11] * relative[5];
+    const real t8 = W[5] * relative[2];
     const real t9 = t7 + t8;
     l[1] = t9;
-    const real t10 = W[12] * relative[0];
-    const real t11 = W[13] * relative[1];
+    const real t10 = W[6] * relative[0];
+    const real t11 = W[7] * relative[1];
     const real t12 = t10 + t11;
-    const real t13 = W[17] * relative[5];
+    const real t13 = W[8] * relative[2];
     const real t14 = t12 + t13;
     l[2] = t14;
-    const real t15 = W[18] * relative[0];
-    const real t16 = W[19] * relative[1];
+    const real t15 = W[9] * relative[0];
+    const real t16 = W[10] * relative[1];
     const real t17 = t15 + t16;
-    const real t18 = W[23] * relative[5];
+    const real t18 = W[11] * relative[2];
     const real t19 = t17 + t18;
     l[3] = t19;
-    const real t20 = W[24] * relative[0];
-    const real t21 = W[25] * relative[1];
+    const real t20 = W[12] * relative[0];
+    const real t21 = W[13] * relative[1];
     const real t22 = t20 + t21;
-    const real t23 = W[29] * relative[5];
+    const real t23 = W[14] * relative[2];
     const real t24 = t22 + t23;
     l[4] = t24;
-    const real t25 = W[30] * relative[0];
-    const real t26 = W[31] * relative[1];
+    const real t25 = W[15] * relative[0];
+    const real t26 = W[16] * relative[1];
     const real t27 = t25 + t26;
-    const real t28 = W[35] * relative[5];
+    const real t28 = W[17] * relative[2];
     const real t29 = t27 + t28;
     l[5] = t29;
     return 0;
@@ -1074,8 +1258,8 @@ static int mstmm_sweep_planar_pin_known_call(int n, const real *const *in, real 
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_known_inputs[] = {
-    {"W", 36, "", 0, 0},
-    {"relative", 6, "", 0, 0},
+    {"W", 18, "", 0, 0},
+    {"relative", 3, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_known_outputs[] = {
@@ -1085,11 +1269,11 @@ static const mstmm_port mstmm_sweep_planar_pin_known_outputs[] = {
 /* acceleration along a direction of a hinge that closes a loop, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  J_A[6] row by the acceleration of A, at its P
- * in  J_B[6] row by the acceleration of B, at its P
+ * in  J_A[3] row by the acceleration of A, at its P
+ * in  J_B[3] row by the acceleration of B, at its P
  * in  l[1] row of what is known
- * in  delta_A[6] deviation of the acceleration of A
- * in  delta_B[6] deviation of the acceleration of B
+ * in  delta_A[3] deviation of the acceleration of A
+ * in  delta_B[3] deviation of the acceleration of B
  * out c[1] acceleration along the direction
  */
 int mstmm_sweep_planar_pin_told(const real *restrict J_A, const real *restrict J_B,
@@ -1099,12 +1283,12 @@ int mstmm_sweep_planar_pin_told(const real *restrict J_A, const real *restrict J
     const real t0 = J_A[0] * delta_A[0];
     const real t1 = J_A[1] * delta_A[1];
     const real t2 = t0 + t1;
-    const real t3 = J_A[5] * delta_A[5];
+    const real t3 = J_A[2] * delta_A[2];
     const real t4 = t2 + t3;
     const real t5 = J_B[0] * delta_B[0];
     const real t6 = J_B[1] * delta_B[1];
     const real t7 = t5 + t6;
-    const real t8 = J_B[5] * delta_B[5];
+    const real t8 = J_B[2] * delta_B[2];
     const real t9 = t7 + t8;
     const real t10 = t4 + t9;
     const real t11 = l[0] + t10;
@@ -1119,11 +1303,11 @@ static int mstmm_sweep_planar_pin_told_call(int n, const real *const *in, real *
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_told_inputs[] = {
-    {"J_A", 6, "", 0, 0},
-    {"J_B", 6, "", 0, 0},
+    {"J_A", 3, "", 0, 0},
+    {"J_B", 3, "", 0, 0},
     {"l", 1, "", 0, 0},
-    {"delta_A", 6, "", 0, 0},
-    {"delta_B", 6, "", 0, 0},
+    {"delta_A", 3, "", 0, 0},
+    {"delta_B", 3, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_told_outputs[] = {
@@ -1133,9 +1317,9 @@ static const mstmm_port mstmm_sweep_planar_pin_told_outputs[] = {
 /* load of an effort, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
- * in  J[6] load of an effort of one
+ * in  J[3] load of an effort of one
  * in  tau[1] (N, N*m) effort
- * out e[6] (N, N*m) force part of f = S a + e, added to what is there
+ * out e[3] (N, N*m) force part of f = S a + e, added to what is there
  */
 int mstmm_sweep_planar_pin_act(const real *restrict J, const real *restrict tau, real *restrict e)
 {
@@ -1145,9 +1329,9 @@ int mstmm_sweep_planar_pin_act(const real *restrict J, const real *restrict tau,
     const real t2 = J[1] * tau[0];
     const real t3 = -t2;
     e[1] += t3;
-    const real t4 = J[5] * tau[0];
+    const real t4 = J[2] * tau[0];
     const real t5 = -t4;
-    e[5] += t5;
+    e[2] += t5;
     return 0;
 }
 
@@ -1158,22 +1342,22 @@ static int mstmm_sweep_planar_pin_act_call(int n, const real *const *in, real *c
 }
 
 static const mstmm_port mstmm_sweep_planar_pin_act_inputs[] = {
-    {"J", 6, "", 0, 0},
+    {"J", 3, "", 0, 0},
     {"tau", 1, "N, N*m", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_act_outputs[] = {
-    {"e", 6, "N, N*m", 1, 0},
+    {"e", 3, "N, N*m", 1, 0},
 };
 
 /* a row closed where its ends meet, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  K[6] column of the row, at P of the body that it is seen from
+ * in  K[3] column of the row, at P of the body that it is seen from
  * in  l[1] what of the row does not go by multipliers or motion
- * out S[21] S of the body, added to what is there
- * out e[6] e of the body, added to what is there
+ * out S[6] S of the body, added to what is there
+ * out e[3] e of the body, added to what is there
  */
 int mstmm_sweep_planar_pin_close(const real *restrict inverse, const real *restrict K,
     const real *restrict l, real *restrict S, real *restrict e)
@@ -1183,22 +1367,22 @@ int mstmm_sweep_planar_pin_close(const real *restrict inverse, const real *restr
     S[0] += t1;
     const real t2 = K[1] * t0;
     S[1] += t2;
-    const real t3 = K[5] * t0;
-    S[5] += t3;
+    const real t3 = K[2] * t0;
+    S[2] += t3;
     const real t4 = inverse[0] * K[1];
     const real t5 = K[1] * t4;
-    S[6] += t5;
-    const real t6 = K[5] * t4;
-    S[10] += t6;
-    const real t7 = inverse[0] * K[5];
-    const real t8 = K[5] * t7;
-    S[20] += t8;
+    S[3] += t5;
+    const real t6 = K[2] * t4;
+    S[4] += t6;
+    const real t7 = inverse[0] * K[2];
+    const real t8 = K[2] * t7;
+    S[5] += t8;
     const real t9 = l[0] * t0;
     e[0] += t9;
     const real t10 = l[0] * t4;
     e[1] += t10;
     const real t11 = l[0] * t7;
-    e[5] += t11;
+    e[2] += t11;
     return 0;
 }
 
@@ -1210,22 +1394,22 @@ static int mstmm_sweep_planar_pin_close_call(int n, const real *const *in, real 
 
 static const mstmm_port mstmm_sweep_planar_pin_close_inputs[] = {
     {"inverse", 1, "", 0, 0},
-    {"K", 6, "", 0, 0},
+    {"K", 3, "", 0, 0},
     {"l", 1, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_close_outputs[] = {
-    {"S", 21, "", 1, 0},
-    {"e", 6, "", 1, 0},
+    {"S", 6, "", 1, 0},
+    {"e", 3, "", 1, 0},
 };
 
 /* column of a row that stays while another is closed, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  K[6] column of the row, at P of the body that it is seen from
+ * in  K[3] column of the row, at P of the body that it is seen from
  * in  L_p[1] entry of L of the row that closes and another
- * out K_p[6] column of row p, added to what is there
+ * out K_p[3] column of row p, added to what is there
  */
 int mstmm_sweep_planar_pin_shed(const real *restrict inverse, const real *restrict K,
     const real *restrict L_p, real *restrict K_p)
@@ -1238,10 +1422,10 @@ int mstmm_sweep_planar_pin_shed(const real *restrict inverse, const real *restri
     const real t4 = inverse[0] * t3;
     const real t5 = -t4;
     K_p[1] += t5;
-    const real t6 = K[5] * L_p[0];
+    const real t6 = K[2] * L_p[0];
     const real t7 = inverse[0] * t6;
     const real t8 = -t7;
-    K_p[5] += t8;
+    K_p[2] += t8;
     return 0;
 }
 
@@ -1253,20 +1437,20 @@ static int mstmm_sweep_planar_pin_shed_call(int n, const real *const *in, real *
 
 static const mstmm_port mstmm_sweep_planar_pin_shed_inputs[] = {
     {"inverse", 1, "", 0, 0},
-    {"K", 6, "", 0, 0},
+    {"K", 3, "", 0, 0},
     {"L_p", 1, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_shed_outputs[] = {
-    {"K_p", 6, "", 1, 0},
+    {"K_p", 3, "", 1, 0},
 };
 
 /* share of a motion in a multiplier, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
  * in  inverse[1] 1 / L_rr, zero where nothing moves the row
- * in  K[6] column of the row, at P of the body that it is seen from
- * in  delta[6] deviation of the acceleration of the body
+ * in  K[3] column of the row, at P of the body that it is seen from
+ * in  delta[3] deviation of the acceleration of the body
  * out x[1] multiplier of row r, added to what is there
  */
 int mstmm_sweep_planar_pin_multiplier_more(const real *restrict inverse, const real *restrict K,
@@ -1277,8 +1461,8 @@ int mstmm_sweep_planar_pin_multiplier_more(const real *restrict inverse, const r
     const real t2 = inverse[0] * K[1];
     const real t3 = delta[1] * t2;
     const real t4 = t1 + t3;
-    const real t5 = inverse[0] * K[5];
-    const real t6 = delta[5] * t5;
+    const real t5 = inverse[0] * K[2];
+    const real t6 = delta[2] * t5;
     const real t7 = t4 + t6;
     x[0] += t7;
     return 0;
@@ -1292,8 +1476,8 @@ static int mstmm_sweep_planar_pin_multiplier_more_call(int n, const real *const 
 
 static const mstmm_port mstmm_sweep_planar_pin_multiplier_more_inputs[] = {
     {"inverse", 1, "", 0, 0},
-    {"K", 6, "", 0, 0},
-    {"delta", 6, "", 0, 0},
+    {"K", 3, "", 0, 0},
+    {"delta", 3, "", 0, 0},
 };
 
 static const mstmm_port mstmm_sweep_planar_pin_multiplier_more_outputs[] = {
@@ -1305,11 +1489,11 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .name = "forward",
         .function = (void (*)(void))mstmm_sweep_planar_pin_forward,
         .call = mstmm_sweep_planar_pin_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
+        .n_inputs = 6,
+        .n_outputs = 3,
         .inputs = mstmm_sweep_planar_pin_forward_inputs,
         .outputs = mstmm_sweep_planar_pin_forward_outputs,
-        .ir_hash = "761de36e15a372dbc9ed9cd6d67ac072488cd1c12e75f30dfe695d0bcb6f15b4",
+        .ir_hash = "69103edd6c0d581c8d96f02c068de81b9e4c1d4b4e0d0e869117a41f360dbfa7",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1321,7 +1505,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_inertia_inputs,
         .outputs = mstmm_sweep_planar_pin_inertia_outputs,
-        .ir_hash = "762ab1a059b66549a3094a419229606670fc283ae0b16f06ce40e64ac7126daa",
+        .ir_hash = "9221973075f2a4079ea64a14a058fde1c9bfb12d2f7457147ae3bd878c55fd26",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1333,7 +1517,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_bias_load_inputs,
         .outputs = mstmm_sweep_planar_pin_bias_load_outputs,
-        .ir_hash = "68b22d1b758decf565f32aeefad5db7e137d54995c28afc16282edd98d3cb293",
+        .ir_hash = "785dc2ef8abb65383f196b8949cde3bbbae72ac47a8ad39226f7c778a326c799",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1345,7 +1529,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_planar_pin_pose_inputs,
         .outputs = mstmm_sweep_planar_pin_pose_outputs,
-        .ir_hash = "8666c085f11dcdd240e25db0c16137af254759eb543f5773cb78f57bad983e36",
+        .ir_hash = "292105364161b6dc2dfad3c7619d471167607bc48a2c4387ff64f050764fcbd7",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1357,7 +1541,55 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_velocity_inputs,
         .outputs = mstmm_sweep_planar_pin_velocity_outputs,
-        .ir_hash = "c134b8b09b6b8ee3cb57c0cd2ca3406fde093e3b4f4ebf2fea3344873e02fa46",
+        .ir_hash = "0836c2a92d4eee18e79265ef3ea5797b31a40b7d54785bd338c17a88e4d58a97",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "point",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_point,
+        .call = mstmm_sweep_planar_pin_point_call,
+        .n_inputs = 5,
+        .n_outputs = 2,
+        .inputs = mstmm_sweep_planar_pin_point_inputs,
+        .outputs = mstmm_sweep_planar_pin_point_outputs,
+        .ir_hash = "fa4b38d0074fe495bb2f1ded388f32e2b8dd14d57a5c8e1c032d4ba9cba05c86",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "turning",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_turning,
+        .call = mstmm_sweep_planar_pin_turning_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_planar_pin_turning_inputs,
+        .outputs = mstmm_sweep_planar_pin_turning_outputs,
+        .ir_hash = "08afa7cc22aa31864a24562c3437fc705fd629a88974624bc9e74261fe597ce0",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "end_frame",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_end_frame,
+        .call = mstmm_sweep_planar_pin_end_frame_call,
+        .n_inputs = 2,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_planar_pin_end_frame_inputs,
+        .outputs = mstmm_sweep_planar_pin_end_frame_outputs,
+        .ir_hash = "c23f318f4acc45aed30ec797f35142fa54efe0ff7bfbf1652edb32c91efd6095",
+        .n_guards = 0,
+        .guards = NULL,
+    },
+    {
+        .name = "applied_load",
+        .function = (void (*)(void))mstmm_sweep_planar_pin_applied_load,
+        .call = mstmm_sweep_planar_pin_applied_load_call,
+        .n_inputs = 5,
+        .n_outputs = 1,
+        .inputs = mstmm_sweep_planar_pin_applied_load_inputs,
+        .outputs = mstmm_sweep_planar_pin_applied_load_outputs,
+        .ir_hash = "8559b0588f4ed4eed30ea245354c5aa7c4a45a0b9d50256c8fc8882ed75636c1",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1369,7 +1601,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_planar_pin_factor_inputs,
         .outputs = mstmm_sweep_planar_pin_factor_outputs,
-        .ir_hash = "cedef5f55a7e4467bfff4f9c0c6f10f9a2723cefe041338ccba20d1b3ef157ee",
+        .ir_hash = "ccd108f49956a66dd6726e3c7036f5034b84c637e969c4ea6bbad8479e4411af",
         .n_guards = 2,
         .guards = mstmm_sweep_planar_pin_factor_guards,
     },
@@ -1381,7 +1613,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_planar_pin_push_inputs,
         .outputs = mstmm_sweep_planar_pin_push_outputs,
-        .ir_hash = "254ff71fe442f1aaa344b0dae6adbb814a7e7100139f6c307d02471f43d1f537",
+        .ir_hash = "1ce826d919d23a4430fbdf8bb7d1a545215fb8be26d228f0e299878bdf1f3173",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1393,7 +1625,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_planar_pin_answer_inputs,
         .outputs = mstmm_sweep_planar_pin_answer_outputs,
-        .ir_hash = "1b27484f1df881b08722e115c911848a3f107dabfada42ce582ba138c88fdf06",
+        .ir_hash = "e773bedcf6f08b485138df1ab72e081733969ce0a4af4417c2c35fbf5c65047c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1453,7 +1685,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_push_on_ground_inputs,
         .outputs = mstmm_sweep_planar_pin_push_on_ground_outputs,
-        .ir_hash = "7b6cc06aba1362131bbda926b2ec742b5763c7f07690d6662184515abed33b70",
+        .ir_hash = "772e6e01239aee97f17a9cba2f28aa3ac726de57f1049deae400430011b52295",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1465,7 +1697,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 3,
         .inputs = mstmm_sweep_planar_pin_meet_inputs,
         .outputs = mstmm_sweep_planar_pin_meet_outputs,
-        .ir_hash = "6cbdcf0606cf4e145869e33a4171153251362bab9f19cbca0e28b4a38f20bb94",
+        .ir_hash = "4074c92772748a6efd252c017bf3d0a02ecf026e216e222d4b091348c6f73dfb",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1477,7 +1709,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_slip_inputs,
         .outputs = mstmm_sweep_planar_pin_slip_outputs,
-        .ir_hash = "451de64ceaf8c8da5d95663effbf3837a8c991cf64976da40cad5fe6807ab58d",
+        .ir_hash = "bc747cb4a3bc1331c267fab68302852ae1bf9cebf13e9de42ea6d4d0af79f45b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1489,7 +1721,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_drift_inputs,
         .outputs = mstmm_sweep_planar_pin_drift_outputs,
-        .ir_hash = "ab4dff677a5242b0827671f7ad5078c5d349e62ca8e16048a40ff90a34fd621b",
+        .ir_hash = "d432656baf93b4825f2b5fc7ef99c097b6495718053d56fdfc1ef8a491f9f47c",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1501,7 +1733,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_planar_pin_row_inputs,
         .outputs = mstmm_sweep_planar_pin_row_outputs,
-        .ir_hash = "d4d63135459a88d367ce806361b0cf4b24a7ba0e9ac3d2926acc8df2bf68e56c",
+        .ir_hash = "62fc4f777db8d5ea3ca8dda5dcdee56b46ac7975edc67e6a3e93198a62f862fa",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1513,7 +1745,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_known_inputs,
         .outputs = mstmm_sweep_planar_pin_known_outputs,
-        .ir_hash = "cecb6a68dd74e2614d70bcc00636d48b30894c4a01a5badf634a9d9b09a0e281",
+        .ir_hash = "f18a6dc12a699c93e731ee0d3a16d896e86075996a44a106466a05dc4b625363",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1525,7 +1757,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_told_inputs,
         .outputs = mstmm_sweep_planar_pin_told_outputs,
-        .ir_hash = "618d5352127b27a51a0e90ecca844b31b8b99e2061f209998366c586085e5fc2",
+        .ir_hash = "a14f18d89b0eb81f00658166acd56913a748151510fbc28e46af7a9322f3fe4a",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1537,7 +1769,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_act_inputs,
         .outputs = mstmm_sweep_planar_pin_act_outputs,
-        .ir_hash = "493113c372e5ee521271abb669fc9a25ccb59e6d3c9490b49ac9820d3b430e26",
+        .ir_hash = "5c0f474de4d64a8a95524deb88480e4fdfb7d69128dd0c3331c472434adf81c8",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1549,7 +1781,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 2,
         .inputs = mstmm_sweep_planar_pin_close_inputs,
         .outputs = mstmm_sweep_planar_pin_close_outputs,
-        .ir_hash = "5b3bc9d6eeb971b9e3054e00385d7591f7abc6420cdb36756b9bc5a4aec14f8f",
+        .ir_hash = "48dcb517ec42042dca5fd735358d0b0b132e5244cbb3b5a3a7a99f67129f6196",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1561,7 +1793,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_shed_inputs,
         .outputs = mstmm_sweep_planar_pin_shed_outputs,
-        .ir_hash = "d5465d4511aebbf89b40cca7de3325e4d760a17c91c9613cf4b6f5fc6d2ef7eb",
+        .ir_hash = "68015bca907c0321664c0c3390ccbafea899c3f8c39596b1613ebdec5aab1b51",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1573,7 +1805,7 @@ static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
         .n_outputs = 1,
         .inputs = mstmm_sweep_planar_pin_multiplier_more_inputs,
         .outputs = mstmm_sweep_planar_pin_multiplier_more_outputs,
-        .ir_hash = "4cac5f1d0e1582179555e0911df7c17d9a25330f43082b57503d292e32d7b308",
+        .ir_hash = "b246604a8d85cdc6b5c1c6a3d1aee28dedb955693001fa63b8a3eeb75156962b",
         .n_guards = 0,
         .guards = NULL,
     },
@@ -1583,7 +1815,7 @@ const mstmm_element mstmm_sweep_planar_pin = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "planar_pin",
-    .hash = "152ae3fed76caf1fec695766d5f93b075b7bd0b0b8c7620d8f83745413e4a1b3",
+    .hash = "2a7cad38763a7936d75589d29944fe07be38434002683baf4e6c2f9f78b37319",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -1593,6 +1825,6 @@ const mstmm_element mstmm_sweep_planar_pin = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 23,
+    .n_kernels = 27,
     .kernels = mstmm_sweep_planar_pin_kernels,
 };

@@ -329,13 +329,13 @@ mstmm_generic_tangent_answer_known_kernel *const mstmm_generic_tangent_answer_kn
     mstmm_sweep_generic6_tangent_answer_known,
 };
 
-static const real mstmm_plane[36] = {
-    0, 0, 0, 0, 0, 1,
-    0, 1, 0, 0, 0, 0,
-    0, 0, 1, 0, 0, 0,
-    0, 0, 0, 1, 0, 0,
-    0, 0, 0, 0, 1, 0,
-    -1, 0, 0, 0, 0, 0,
+static const real mstmm_directions[18] = {
+    0, 0, 1,
+    0, 1, 0,
+    0, 0, 0,
+    0, 0, 0,
+    0, 0, 0,
+    -1, 0, 0,
 };
 
 int64_t mstmm_modal_numbers(int n) { return (int64_t)40 * n + 2 * (int64_t)n * n; }
@@ -1725,38 +1725,26 @@ static int mstmm_at_couplings_answered(mstmm_state *state, int index)
     return 0;
 }
 
-/* Accelerations that are given: all, or none so far. */
-static int mstmm_at_prescribed_in_plane(mstmm_state *state, int index)
-{
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_set_zero(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), nu);
-    return 0;
-}
-
 /* Hinge motion, bias motion, own inertia and own load of a body. */
-static int mstmm_at_forward_in_plane(mstmm_state *state, int index, const real *parent_motion)
+static int mstmm_at_forward_in_plane(mstmm_state *state, int index)
 {
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
+    const mstmm_flat_body *body = &state->model->flat[index];
+    real *block = mstmm_flat_block(state, index);
+    real *parent = mstmm_flat_block(state, body->parent);
     int code;
-    if (mstmm_idle(state->observed, body)) return 0;
+    if (body->idle) return 0;
     code = mstmm_planar_forward(
-        .Rt = body->connection, .ro = body->connection + 9, .p = body->hinge_p,
-        .q = state->q + body->q, .u = state->u + body->u,
-        .s = mstmm_of_speeds(block, nu, MSTMM_SPEED_S), .motion_I = parent_motion,
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .motion = block + MSTMM_BLOCK_MOTION, .qdot = state->qdot + body->q);
+        .Rt = body->given + MSTMM_GIVEN_TURN, .ro = body->given + MSTMM_GIVEN_SHIFT,
+        .p = mstmm_zeros, .q = state->q + body->q, .u = state->u + body->u,
+        .motion_I = parent + MSTMM_FLAT_MOTION, .Rc = block + MSTMM_FLAT_R,
+        .motion = block + MSTMM_FLAT_MOTION, .qdot = state->qdot + body->q);
     if (code) return mstmm_fail(state, MSTMM_FAILED_HINGE, index, code);
-    if (!mstmm_aside(state->model, state->observed, index)) {
+    if (!body->aside) {
         mstmm_planar_inertia(
-            .p = body->body_p, .S = block + MSTMM_BLOCK_S);
+            .p = body->given + MSTMM_GIVEN_P, .S = block + MSTMM_FLAT_S);
         mstmm_planar_bias_load(
-            .p = body->body_p, .motion = block + MSTMM_BLOCK_MOTION, .e = block + MSTMM_BLOCK_E);
-        mstmm_frames_pivot_floor(
-            .S = block + MSTMM_BLOCK_S, .floor_ = block + MSTMM_BLOCK_FLOOR);
+            .p = body->given + MSTMM_GIVEN_P, .motion = block + MSTMM_FLAT_MOTION,
+            .e = block + MSTMM_FLAT_E);
     }
     return 0;
 }
@@ -1764,15 +1752,15 @@ static int mstmm_at_forward_in_plane(mstmm_state *state, int index, const real *
 /* Efforts of the caller where the sweep reads them. */
 static int mstmm_at_efforts_in_plane(mstmm_state *state, int index)
 {
-    const mstmm_body *body = &state->model->bodies[index];
+    const mstmm_flat_body *body = &state->model->flat[index];
     if (state->efforts) {
-        real *block = state->workspace + body->block;
-        const int nu = body->nu;
-        mstmm_set(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), state->efforts + body->u, nu);
+        real *block = mstmm_flat_block(state, index);
+        const int nu = 1;
+        mstmm_set(block + MSTMM_FLAT_TAU, state->efforts + body->u, nu);
     } else {
-        real *block = state->workspace + body->block;
-        const int nu = body->nu;
-        mstmm_set_zero(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), nu);
+        real *block = mstmm_flat_block(state, index);
+        const int nu = 1;
+        mstmm_set_zero(block + MSTMM_FLAT_TAU, nu);
     }
     return 0;
 }
@@ -1786,8 +1774,8 @@ static int mstmm_at_laws_in_plane(mstmm_state *state, int index)
     real P[1];
     real unused_twist[1];
     const mstmm_law *law = &state->model->laws[index];
-    const mstmm_body *body = &state->model->bodies[law->body];
-    real *block = state->workspace + body->block;
+    const mstmm_flat_body *body = &state->model->flat[law->body];
+    real *block = mstmm_flat_block(state, law->body);
     for (int j = 0; j < law->n; j++)
         effort[j] = mstmm_value_at(state, law->effort[j]);
     if (law->kind == 0) {
@@ -1802,25 +1790,72 @@ static int mstmm_at_laws_in_plane(mstmm_state *state, int index)
             .twist = unused_twist);
     }
     for (int j = 0; j < law->n; j++)
-        (block + MSTMM_BLOCK_FIXED + MSTMM_SPEED_TAU * body->nu + law->speed)[j] += tau[j];
+        (block + MSTMM_FLAT_TAU)[j] += tau[j];
     return 0;
 }
 
 /* Axes, position and velocity of P of a body, inertial axes. */
 static int mstmm_at_poses_in_plane(mstmm_state *state, int index)
 {
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    real *parent = mstmm_block(state->model, state->workspace, body->parent);
-    if (mstmm_idle(state->observed, body)) return 0;
+    const mstmm_flat_body *body = &state->model->flat[index];
+    real *block = mstmm_flat_block(state, index);
+    real *parent = mstmm_flat_block(state, body->parent);
+    if (body->idle) return 0;
     mstmm_planar_pose(
-        .A_I = parent + MSTMM_BLOCK_A, .x_I = parent + MSTMM_BLOCK_X,
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .A = block + MSTMM_BLOCK_A,
-        .x = block + MSTMM_BLOCK_X);
+        .A_I = parent + MSTMM_FLAT_A, .x_I = parent + MSTMM_FLAT_X, .Rc = block + MSTMM_FLAT_R,
+        .r = body->given + MSTMM_GIVEN_SHIFT, .A = block + MSTMM_FLAT_A,
+        .x = block + MSTMM_FLAT_X);
     mstmm_planar_velocity(
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .v_I = parent + MSTMM_BLOCK_V, .w_I = parent + MSTMM_BLOCK_MOTION,
-        .v = block + MSTMM_BLOCK_V);
+        .Rc = block + MSTMM_FLAT_R, .r = body->given + MSTMM_GIVEN_SHIFT,
+        .v_I = parent + MSTMM_FLAT_V, .w_I = parent + MSTMM_FLAT_MOTION,
+        .v = block + MSTMM_FLAT_V);
+    return 0;
+}
+
+/* Rows of what closes a loop, and the load of a hinge's laws. */
+static int mstmm_at_closures_in_plane(mstmm_state *state, int index)
+{
+    real R_C[2];
+    real lever[2];
+    real d[2];
+    real slip[3];
+    real drift[3];
+    const mstmm_closure *closure = &state->model->closures[index];
+    const mstmm_flat_body *body = &state->model->flat[closure->frame];
+    real *block = mstmm_flat_block(state, closure->frame);
+    real *parent = mstmm_flat_block(state, body->parent);
+    real *outboard = mstmm_flat_block(state, closure->outboard);
+    real *loops = state->workspace + state->model->loops;
+    mstmm_planar_meet(
+        .A_C = block + MSTMM_FLAT_A, .x_C = block + MSTMM_FLAT_X, .A_B = outboard + MSTMM_FLAT_A,
+        .x_B = outboard + MSTMM_FLAT_X, .r_e = closure->end, .Rc = block + MSTMM_FLAT_R,
+        .r = body->given + MSTMM_GIVEN_SHIFT, .R_C = R_C, .r_A = lever, .d = d);
+    mstmm_planar_slip(
+        .R_C = R_C, .r_e = closure->end, .d = d, .v_C = block + MSTMM_FLAT_V,
+        .w_C = block + MSTMM_FLAT_MOTION, .v_B = outboard + MSTMM_FLAT_V,
+        .w_B = outboard + MSTMM_FLAT_MOTION, .slip = slip);
+    mstmm_planar_drift(
+        .R_C = R_C, .r_e = closure->end, .d = d, .slip = slip,
+        .motion_C = block + MSTMM_FLAT_MOTION, .motion_B = outboard + MSTMM_FLAT_MOTION,
+        .drift = drift);
+    mstmm_planar_known(
+        .W = mstmm_directions, .relative = drift, .l = block + MSTMM_FLAT_E);
+    mstmm_planar_row(
+        .w = mstmm_directions, .R_C = R_C, .r_e = closure->end, .Rc = block + MSTMM_FLAT_R,
+        .r_A = lever, .J_A = block + MSTMM_FLAT_S, .J_B = block + MSTMM_FLAT_S + 3);
+    mstmm_planar_act(
+        .J = block + MSTMM_FLAT_S, .tau = block + MSTMM_FLAT_TAU, .e = parent + MSTMM_FLAT_E);
+    mstmm_planar_act(
+        .J = block + MSTMM_FLAT_S + 3, .tau = block + MSTMM_FLAT_TAU,
+        .e = outboard + MSTMM_FLAT_E);
+    for (int c = 0; c < 6; c++) {
+        if (closure->rows[c] < 0) continue;
+        mstmm_planar_row(
+            .w = mstmm_directions + 3 * c, .R_C = R_C, .r_e = closure->end,
+            .Rc = block + MSTMM_FLAT_R, .r_A = lever, .J_A = loops + closure->inner[c],
+            .J_B = loops + closure->outer[c]);
+        memcpy(loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN, block + MSTMM_FLAT_E + c, (size_t)(1) * sizeof(real));
+    }
     return 0;
 }
 
@@ -1831,17 +1866,17 @@ static int mstmm_at_loads_in_plane(mstmm_state *state, int index)
     real F[3];
     real M[3];
     const mstmm_load *load = &state->model->loads[index];
-    real *on = mstmm_block(state->model, state->workspace, load->body);
-    real *axes = mstmm_block(state->model, state->workspace, load->axes);
-    mstmm_frames_end_frame(
-        .A = axes + MSTMM_BLOCK_A, .R_end = load->axes_own, .A_end = A_F);
+    real *on = mstmm_flat_block(state, load->body);
+    real *axes = mstmm_flat_block(state, load->axes);
+    mstmm_planar_end_frame(
+        .A = axes + MSTMM_FLAT_A, .R_end = load->axes_own, .A_end = A_F);
     for (int j = 0; j < 3; j++)
         F[j] = mstmm_value_at(state, load->force[j]);
     for (int j = 0; j < 3; j++)
         M[j] = mstmm_value_at(state, load->moment[j]);
-    mstmm_frames_applied_load(
-        .A = on + MSTMM_BLOCK_A, .A_F = A_F, .offset = load->offset, .F = F, .M = M,
-        .e = on + MSTMM_BLOCK_E);
+    mstmm_planar_applied_load(
+        .A = on + MSTMM_FLAT_A, .A_F = A_F, .offset = load->offset, .F = F, .M = M,
+        .e = on + MSTMM_FLAT_E);
     return 0;
 }
 
@@ -1850,9 +1885,7 @@ static int mstmm_at_forces_in_plane(mstmm_state *state, int index)
 {
     real x_F[3];
     real v_F[3];
-    real unused_a_K[3];
     real w_F[3];
-    real unused_alpha_K[3];
     real A_F[9];
     real x_T[3];
     real v_T[3];
@@ -1867,27 +1900,23 @@ static int mstmm_at_forces_in_plane(mstmm_state *state, int index)
     real F_back[3];
     real M_back[3];
     const mstmm_force *force = &state->model->forces[index];
-    real *from = mstmm_block(state->model, state->workspace, force->body_f);
-    real *to = mstmm_block(state->model, state->workspace, force->body_t);
+    real *from = mstmm_flat_block(state, force->body_f);
+    real *to = mstmm_flat_block(state, force->body_t);
     int code;
-    mstmm_frames_point(
-        .A = from + MSTMM_BLOCK_A, .x = from + MSTMM_BLOCK_X, .v = from + MSTMM_BLOCK_V,
-        .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_f,
-        .gravity = mstmm_zeros, .x_K = x_F, .v_K = v_F, .a_K = unused_a_K);
-    mstmm_frames_turning(
-        .A = from + MSTMM_BLOCK_A, .motion = from + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
-        .w_K = w_F, .alpha_K = unused_alpha_K);
-    mstmm_frames_end_frame(
-        .A = from + MSTMM_BLOCK_A, .R_end = force->axes_f, .A_end = A_F);
-    mstmm_frames_point(
-        .A = to + MSTMM_BLOCK_A, .x = to + MSTMM_BLOCK_X, .v = to + MSTMM_BLOCK_V,
-        .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros, .offset = force->offset_t,
-        .gravity = mstmm_zeros, .x_K = x_T, .v_K = v_T, .a_K = unused_a_K);
-    mstmm_frames_turning(
-        .A = to + MSTMM_BLOCK_A, .motion = to + MSTMM_BLOCK_MOTION, .delta = mstmm_zeros,
-        .w_K = w_T, .alpha_K = unused_alpha_K);
-    mstmm_frames_end_frame(
-        .A = to + MSTMM_BLOCK_A, .R_end = force->axes_t, .A_end = A_T);
+    mstmm_planar_point(
+        .A = from + MSTMM_FLAT_A, .x = from + MSTMM_FLAT_X, .v = from + MSTMM_FLAT_V,
+        .motion = from + MSTMM_FLAT_MOTION, .offset = force->offset_f, .x_K = x_F, .v_K = v_F);
+    mstmm_planar_turning(
+        .A = from + MSTMM_FLAT_A, .motion = from + MSTMM_FLAT_MOTION, .w_K = w_F);
+    mstmm_planar_end_frame(
+        .A = from + MSTMM_FLAT_A, .R_end = force->axes_f, .A_end = A_F);
+    mstmm_planar_point(
+        .A = to + MSTMM_FLAT_A, .x = to + MSTMM_FLAT_X, .v = to + MSTMM_FLAT_V,
+        .motion = to + MSTMM_FLAT_MOTION, .offset = force->offset_t, .x_K = x_T, .v_K = v_T);
+    mstmm_planar_turning(
+        .A = to + MSTMM_FLAT_A, .motion = to + MSTMM_FLAT_MOTION, .w_K = w_T);
+    mstmm_planar_end_frame(
+        .A = to + MSTMM_FLAT_A, .R_end = force->axes_t, .A_end = A_T);
     effort[0] = 0;
     if (force->effort) {
         mstmm_frames_length(
@@ -1902,67 +1931,12 @@ static int mstmm_at_forces_in_plane(mstmm_state *state, int index)
     if (code) return mstmm_fail(state, MSTMM_FAILED_FORCE, index, code);
     mstmm_frames_opposite(
         .x_F = x_F, .x_T = x_T, .F = F, .M = M, .F_back = F_back, .M_back = M_back);
-    mstmm_frames_applied_load(
-        .A = to + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_t, .F = F,
-        .M = M, .e = to + MSTMM_BLOCK_E);
-    mstmm_frames_applied_load(
-        .A = from + MSTMM_BLOCK_A, .A_F = mstmm_identity, .offset = force->offset_f, .F = F_back,
-        .M = M_back, .e = from + MSTMM_BLOCK_E);
-    return 0;
-}
-
-/* Rows of what closes a loop, and the load of a hinge's laws. */
-static int mstmm_at_closures_in_plane(mstmm_state *state, int index)
-{
-    real drift[6];
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    real *parent = mstmm_block(state->model, state->workspace, body->parent);
-    const int nu = body->nu;
-    const mstmm_looped *looped = &state->model->looped[index];
-    const mstmm_closure *closure = looped->closure;
-    real *outboard = closure ? mstmm_block(state->model, state->workspace, closure->outboard) : NULL;
-    real *loops = state->workspace + state->model->loops;
-    real *closed = closure ? loops + closure->numbers : NULL;
-    if (!looped->closure) return 0;
-    mstmm_planar_meet(
-        .A_C = block + MSTMM_BLOCK_A, .x_C = block + MSTMM_BLOCK_X,
-        .A_B = outboard + MSTMM_BLOCK_A, .x_B = outboard + MSTMM_BLOCK_X, .r_e = closure->end,
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .R_C = closed + MSTMM_CLOSURE_R_C, .r_A = closed + MSTMM_CLOSURE_LEVER,
-        .d = closed + MSTMM_CLOSURE_D);
-    mstmm_planar_slip(
-        .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
-        .v_C = block + MSTMM_BLOCK_V, .w_C = block + MSTMM_BLOCK_MOTION,
-        .v_B = outboard + MSTMM_BLOCK_V, .w_B = outboard + MSTMM_BLOCK_MOTION,
-        .slip = closed + MSTMM_CLOSURE_SLIP);
-    mstmm_planar_drift(
-        .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end, .d = closed + MSTMM_CLOSURE_D,
-        .slip = closed + MSTMM_CLOSURE_SLIP, .motion_C = block + MSTMM_BLOCK_MOTION,
-        .motion_B = outboard + MSTMM_BLOCK_MOTION, .drift = drift);
-    mstmm_planar_known(
-        .W = mstmm_plane, .relative = drift, .l = closed + MSTMM_CLOSURE_L);
-    for (int k = 0; k < body->nu; k++) {
-        mstmm_planar_row(
-            .w = mstmm_plane + 6 * k, .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
-            .Rc = block + MSTMM_BLOCK_R, .r_A = closed + MSTMM_CLOSURE_LEVER,
-            .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k, .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k);
-        mstmm_planar_act(
-            .J = closed + MSTMM_CLOSURE_J_A + 6 * k,
-            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k, .e = parent + MSTMM_BLOCK_E);
-        mstmm_planar_act(
-            .J = closed + MSTMM_CLOSURE_J_B + 6 * k,
-            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + k,
-            .e = outboard + MSTMM_BLOCK_E);
-    }
-    for (int c = 0; c < 6; c++) {
-        if (closure->rows[c] < 0) continue;
-        mstmm_planar_row(
-            .w = mstmm_plane + 6 * c, .R_C = closed + MSTMM_CLOSURE_R_C, .r_e = closure->end,
-            .Rc = block + MSTMM_BLOCK_R, .r_A = closed + MSTMM_CLOSURE_LEVER,
-            .J_A = loops + closure->inner[c], .J_B = loops + closure->outer[c]);
-        memcpy(loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN, closed + MSTMM_CLOSURE_L + c, (size_t)(1) * sizeof(real));
-    }
+    mstmm_planar_applied_load(
+        .A = to + MSTMM_FLAT_A, .A_F = mstmm_identity, .offset = force->offset_t, .F = F, .M = M,
+        .e = to + MSTMM_FLAT_E);
+    mstmm_planar_applied_load(
+        .A = from + MSTMM_FLAT_A, .A_F = mstmm_identity, .offset = force->offset_f, .F = F_back,
+        .M = M_back, .e = from + MSTMM_FLAT_E);
     return 0;
 }
 
@@ -1975,11 +1949,11 @@ static int mstmm_at_row_closed_in_plane(mstmm_state *state, int index)
     mstmm_loops_settle(
         .L = line + MSTMM_ROW_PIVOT, .floor_ = &row->floor, .inverse = line + MSTMM_ROW_INVERSE);
     if ((row->body >= 0)) {
-        real *meeting = mstmm_block(state->model, state->workspace, row->body);
+        real *meeting = mstmm_flat_block(state, row->body);
         mstmm_planar_close(
             .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
-            .l = line + MSTMM_ROW_KNOWN, .S = meeting + MSTMM_BLOCK_S,
-            .e = meeting + MSTMM_BLOCK_E);
+            .l = line + MSTMM_ROW_KNOWN, .S = meeting + MSTMM_FLAT_S,
+            .e = meeting + MSTMM_FLAT_E);
     }
     for (int c = 0; c < row->n_others; c++) {
         const mstmm_other *other = &row->others[c];
@@ -2005,51 +1979,50 @@ static int mstmm_at_row_closed_in_plane(mstmm_state *state, int index)
 static int mstmm_at_carried_in_plane(mstmm_state *state, int index)
 {
     real z[1];
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    real *parent = mstmm_block(state->model, state->workspace, body->parent);
-    const int nu = body->nu;
-    const mstmm_looped *looped = &state->model->looped[index];
+    const mstmm_flat_body *body = &state->model->flat[index];
+    real *block = mstmm_flat_block(state, index);
+    real *parent = mstmm_flat_block(state, body->parent);
+    const mstmm_flat_body *looped = body;
     real *loops = state->workspace + state->model->loops;
     int code;
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (body->aside) return 0;
     for (int r = looped->first_row; r < looped->first_row + looped->n_rows; r++) {
         code = mstmm_at_row_closed_in_plane(state, r);
         if (code) return code;
     }
     code = mstmm_planar_factor(
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT, .J = body->rotor,
-        .floor_ = block + MSTMM_BLOCK_FLOOR, .S = block + MSTMM_BLOCK_S,
-        .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
-        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .S_I = parent + MSTMM_BLOCK_S);
+        .Rc = block + MSTMM_FLAT_R, .r = body->given + MSTMM_GIVEN_SHIFT,
+        .J = body->given + MSTMM_GIVEN_ROTOR, .floor_ = body->given + MSTMM_GIVEN_FLOOR,
+        .S = block + MSTMM_FLAT_S, .F = block + MSTMM_FLAT_F, .G = block + MSTMM_FLAT_GAIN,
+        .S_I = parent + MSTMM_FLAT_S);
     if (code) return mstmm_fail(state, MSTMM_FAILED_UNDETERMINED, index, code);
     if ((body->parent >= 0)) {
         mstmm_planar_push(
-            .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-            .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = block + MSTMM_BLOCK_E,
-            .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU),
-            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .e_I = parent + MSTMM_BLOCK_E);
+            .Rc = block + MSTMM_FLAT_R, .r = body->given + MSTMM_GIVEN_SHIFT,
+            .G = block + MSTMM_FLAT_GAIN, .e = block + MSTMM_FLAT_E,
+            .tau = block + MSTMM_FLAT_TAU, .y = block + MSTMM_FLAT_OFFSET,
+            .e_I = parent + MSTMM_FLAT_E);
     } else {
         mstmm_planar_push_on_ground(
-            .e = block + MSTMM_BLOCK_E, .tau = mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU),
-            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET));
+            .e = block + MSTMM_FLAT_E, .tau = block + MSTMM_FLAT_TAU,
+            .y = block + MSTMM_FLAT_OFFSET);
     }
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
         if ((body->parent >= 0)) {
             mstmm_planar_push(
-                .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-                .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN), .e = loops + pending->column,
-                .tau = mstmm_zeros, .y = loops + pending->y, .e_I = loops + pending->onward);
+                .Rc = block + MSTMM_FLAT_R, .r = body->given + MSTMM_GIVEN_SHIFT,
+                .G = block + MSTMM_FLAT_GAIN, .e = loops + pending->column, .tau = mstmm_zeros,
+                .y = loops + pending->y, .e_I = loops + pending->onward);
         }
         if (!(body->parent >= 0)) {
             mstmm_planar_push_on_ground(
                 .e = loops + pending->column, .tau = mstmm_zeros, .y = loops + pending->y);
         }
         mstmm_planar_divide(
-            .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H), .y = loops + pending->y, .z = z);
+            .F = block + MSTMM_FLAT_F, .y = loops + pending->y, .z = z);
         mstmm_planar_answered(
-            .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET), .z = z,
+            .y = block + MSTMM_FLAT_OFFSET, .z = z,
             .l = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_KNOWN);
         for (int b = 0; b <= c; b++) {
             mstmm_planar_couple(
@@ -2069,10 +2042,10 @@ static int mstmm_at_row_found_in_plane(mstmm_state *state, int index)
         .inverse = line + MSTMM_ROW_INVERSE, .l = line + MSTMM_ROW_KNOWN,
         .x = line + MSTMM_ROW_X);
     if ((row->body >= 0)) {
-        real *meeting = mstmm_block(state->model, state->workspace, row->body);
+        real *meeting = mstmm_flat_block(state, row->body);
         mstmm_planar_multiplier_more(
             .inverse = line + MSTMM_ROW_INVERSE, .K = line + MSTMM_ROW_K,
-            .delta = meeting + MSTMM_BLOCK_DELTA, .x = line + MSTMM_ROW_X);
+            .delta = meeting + MSTMM_FLAT_DELTA, .x = line + MSTMM_ROW_X);
     }
     for (int c = 0; c < row->n_others; c++) {
         const mstmm_other *other = &row->others[c];
@@ -2087,28 +2060,25 @@ static int mstmm_at_row_found_in_plane(mstmm_state *state, int index)
 /* Accelerations of a hinge under the multipliers of its open rows. */
 static int mstmm_at_answered_in_plane(mstmm_state *state, int index)
 {
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    real *parent = mstmm_block(state->model, state->workspace, body->parent);
-    const int nu = body->nu;
-    const mstmm_looped *looped = &state->model->looped[index];
+    const mstmm_flat_body *body = &state->model->flat[index];
+    real *block = mstmm_flat_block(state, index);
+    real *parent = mstmm_flat_block(state, body->parent);
+    const mstmm_flat_body *looped = body;
     real *loops = state->workspace + state->model->loops;
     int code;
-    if (mstmm_aside(state->model, state->observed, index)) return 0;
+    if (body->aside) return 0;
     for (int c = 0; c < looped->n_pending; c++) {
         const mstmm_pending *pending = &looped->pending[c];
         mstmm_planar_pull(
             .y = loops + pending->y,
             .x = loops + MSTMM_ROW * (int64_t)pending->row + MSTMM_ROW_X,
-            .y_0 = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET));
+            .y_0 = block + MSTMM_FLAT_OFFSET);
     }
     mstmm_planar_answer(
-        .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
-        .F = mstmm_of_speeds(block, nu, MSTMM_SPEED_H),
-        .G = mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN),
-        .y = mstmm_of_speeds(block, nu, MSTMM_SPEED_OFFSET),
-        .delta_I = parent + MSTMM_BLOCK_DELTA, .udot = state->udot + body->u,
-        .delta = block + MSTMM_BLOCK_DELTA);
+        .Rc = block + MSTMM_FLAT_R, .r = body->given + MSTMM_GIVEN_SHIFT,
+        .F = block + MSTMM_FLAT_F, .G = block + MSTMM_FLAT_GAIN, .y = block + MSTMM_FLAT_OFFSET,
+        .delta_I = parent + MSTMM_FLAT_DELTA, .udot = state->udot + body->u,
+        .delta = block + MSTMM_FLAT_DELTA);
     for (int r = looped->first_row + looped->n_rows - 1; r >= looped->first_row; r--) {
         code = mstmm_at_row_found_in_plane(state, r);
         if (code) return code;
@@ -2120,24 +2090,17 @@ static int mstmm_at_answered_in_plane(mstmm_state *state, int index)
 static int mstmm_at_closures_answered_in_plane(mstmm_state *state, int index)
 {
     real along[1];
-    const mstmm_body *body = &state->model->bodies[index];
-    real *block = state->workspace + body->block;
-    real *parent = mstmm_block(state->model, state->workspace, body->parent);
-    const int nu = body->nu;
-    const mstmm_looped *looped = &state->model->looped[index];
-    const mstmm_closure *closure = looped->closure;
-    real *outboard = closure ? mstmm_block(state->model, state->workspace, closure->outboard) : NULL;
-    real *loops = state->workspace + state->model->loops;
-    real *closed = closure ? loops + closure->numbers : NULL;
-    if (!looped->closure) return 0;
-    mstmm_set(state->udot + body->u, mstmm_of_speeds(block, nu, MSTMM_SPEED_S), nu);
-    for (int k = 0; k < body->nu; k++) {
-        mstmm_planar_told(
-            .J_A = closed + MSTMM_CLOSURE_J_A + 6 * k, .J_B = closed + MSTMM_CLOSURE_J_B + 6 * k,
-            .l = closed + MSTMM_CLOSURE_L + k, .delta_A = parent + MSTMM_BLOCK_DELTA,
-            .delta_B = outboard + MSTMM_BLOCK_DELTA, .c = along);
-        (state->udot + body->u + k)[0] += along[0];
-    }
+    const mstmm_closure *closure = &state->model->closures[index];
+    const mstmm_flat_body *body = &state->model->flat[closure->frame];
+    real *block = mstmm_flat_block(state, closure->frame);
+    real *parent = mstmm_flat_block(state, body->parent);
+    const int nu = 1;
+    real *outboard = mstmm_flat_block(state, closure->outboard);
+    mstmm_set_zero(state->udot + body->u, nu);
+    mstmm_planar_told(
+        .J_A = block + MSTMM_FLAT_S, .J_B = block + MSTMM_FLAT_S + 3, .l = block + MSTMM_FLAT_E,
+        .delta_A = parent + MSTMM_FLAT_DELTA, .delta_B = outboard + MSTMM_FLAT_DELTA, .c = along);
+    (state->udot + body->u + 0)[0] += along[0];
     return 0;
 }
 
@@ -6037,95 +6000,6 @@ static int mstmm_pass_couplings_answered(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_prescribed_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
-}
-static int mstmm_pass_prescribed_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_prescribed_in_plane(state, i, MSTMM_TILE);
-        const int code = mstmm_at_prescribed_in_plane(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-MSTMM_AT_ONCE void mstmm_fetch_forward_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_S, mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
-    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
-}
-static int mstmm_pass_forward_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_forward_in_plane(state, i, MSTMM_TILE);
-        const int code = mstmm_at_forward_in_plane(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
-        if (code) return code;
-    }
-    return 0;
-}
-
-MSTMM_AT_ONCE void mstmm_fetch_efforts_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
-}
-static int mstmm_pass_efforts_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_efforts_in_plane(state, i, MSTMM_TILE);
-        const int code = mstmm_at_efforts_in_plane(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-static int mstmm_pass_laws_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_laws; i++) {
-        const int code = mstmm_at_laws_in_plane(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-MSTMM_AT_ONCE void mstmm_fetch_poses_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-}
-static int mstmm_pass_poses_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_poses_in_plane(state, i, MSTMM_TILE);
-        const int code = mstmm_at_poses_in_plane(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
 static int mstmm_pass_loads_in_plane(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
@@ -6146,44 +6020,10 @@ static int mstmm_pass_forces_in_plane(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_closures_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_V + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_MOTION, mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
-}
-static int mstmm_pass_closures_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_closures_in_plane(state, i, MSTMM_TILE);
-        const int code = mstmm_at_closures_in_plane(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-MSTMM_AT_ONCE void mstmm_fetch_carried_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_FLOOR, block + MSTMM_BLOCK_FLOOR + 2);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_S, block + MSTMM_BLOCK_E + 6);
-    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU), mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
-    mstmm_fetch(body->rotor, body->hinge_p);
-}
 static int mstmm_pass_carried_in_plane(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     for (int i = model->n_bodies - 1; i >= 0; i--) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_carried_in_plane(state, i, -MSTMM_TILE);
         const int code = mstmm_at_carried_in_plane(state, i);
         if (code) return code;
     }
@@ -6205,46 +6045,6 @@ static int mstmm_pass_row_found_in_plane(mstmm_state *state)
     const mstmm_model *model = state->model;
     for (int i = model->n_rows - 1; i >= model->first_ground_row; i--) {
         const int code = mstmm_at_row_found_in_plane(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-MSTMM_AT_ONCE void mstmm_fetch_answered_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_DELTA, block + MSTMM_BLOCK_DELTA + 6);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_H), mstmm_of_speeds(block, nu, MSTMM_SPEED_GAIN) + 6 * nu);
-}
-static int mstmm_pass_answered_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_answered_in_plane(state, i, MSTMM_TILE);
-        const int code = mstmm_at_answered_in_plane(state, i);
-        if (code) return code;
-    }
-    return 0;
-}
-
-MSTMM_AT_ONCE void mstmm_fetch_closures_answered_in_plane(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(mstmm_of_speeds(block, nu, MSTMM_SPEED_S), mstmm_of_speeds(block, nu, MSTMM_SPEED_S) + nu);
-}
-static int mstmm_pass_closures_answered_in_plane(mstmm_state *state)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        if (mstmm_beyond_cache(model)) mstmm_fetch_closures_answered_in_plane(state, i, MSTMM_TILE);
-        const int code = mstmm_at_closures_answered_in_plane(state, i);
         if (code) return code;
     }
     return 0;
@@ -6850,30 +6650,14 @@ static int mstmm_pass_composed(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_accelerations_in_plane_chain(const mstmm_state *state, int index, int ahead)
-{
-    const mstmm_body *body = mstmm_coming(state->model, index, ahead);
-    if (!body) return;
-    real *block = state->workspace + body->block;
-    const int nu = body->nu;
-    mstmm_fetch(block + MSTMM_BLOCK_A, block + MSTMM_BLOCK_FLOOR + 2);
-    mstmm_fetch(block + MSTMM_BLOCK_R, block + MSTMM_BLOCK_SHIFT + 3);
-    mstmm_fetch(block + MSTMM_BLOCK_S, mstmm_of_speeds(block, nu, MSTMM_SPEED_TAU) + nu);
-    mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
-}
-static int mstmm_chain_accelerations_in_plane(mstmm_state *state)
+static int mstmm_chain_accelerations_in_plane_forward_in_plane(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
-    int code, law = 0;
+    int code, law = 0, loop = 0;
     for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
         const int end = mstmm_end_of_tile(model, first);
         for (int i = first; i < end; i++) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_accelerations_in_plane_chain(state, i, MSTMM_TILE);
-            code = mstmm_at_prescribed_in_plane(state, i);
-            if (code) return code;
-        }
-        for (int i = first; i < end; i++) {
-            code = mstmm_at_forward_in_plane(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
+            code = mstmm_at_forward_in_plane(state, i);
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
@@ -6890,11 +6674,35 @@ static int mstmm_chain_accelerations_in_plane(mstmm_state *state)
             code = mstmm_at_poses_in_plane(state, i);
             if (code) return code;
         }
+        for (; loop < model->n_closures && mstmm_last_of(model, loop) < end; loop++) {
+            const int i = loop;
+            code = mstmm_at_closures_in_plane(state, i);
+            if (code) return code;
+        }
     }
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_inverse_dynamics_chain(const mstmm_state *state, int index, int ahead)
+static int mstmm_chain_accelerations_in_plane_answered_in_plane(mstmm_state *state)
+{
+    const mstmm_model *model = state->model;
+    int code, loop = 0;
+    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
+        const int end = mstmm_end_of_tile(model, first);
+        for (int i = first; i < end; i++) {
+            code = mstmm_at_answered_in_plane(state, i);
+            if (code) return code;
+        }
+        for (; loop < model->n_closures && mstmm_last_of(model, loop) < end; loop++) {
+            const int i = loop;
+            code = mstmm_at_closures_answered_in_plane(state, i);
+            if (code) return code;
+        }
+    }
+    return 0;
+}
+
+MSTMM_AT_ONCE void mstmm_fetch_inverse_dynamics_forward_chain(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6903,7 +6711,7 @@ MSTMM_AT_ONCE void mstmm_fetch_inverse_dynamics_chain(const mstmm_state *state, 
     mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
-static int mstmm_chain_inverse_dynamics(mstmm_state *state)
+static int mstmm_chain_inverse_dynamics_forward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code, law = 0;
@@ -6914,7 +6722,7 @@ static int mstmm_chain_inverse_dynamics(mstmm_state *state)
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_inverse_dynamics_chain(state, i, MSTMM_TILE);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_inverse_dynamics_forward_chain(state, i, MSTMM_TILE);
             code = mstmm_at_forward(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
             if (code) return code;
         }
@@ -6932,7 +6740,7 @@ static int mstmm_chain_inverse_dynamics(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_correction_chain(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_correction_forward_chain(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6941,7 +6749,7 @@ MSTMM_AT_ONCE void mstmm_fetch_correction_chain(const mstmm_state *state, int in
     mstmm_fetch(block + MSTMM_BLOCK_A, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
-static int mstmm_chain_correction(mstmm_state *state)
+static int mstmm_chain_correction_forward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
@@ -6952,7 +6760,7 @@ static int mstmm_chain_correction(mstmm_state *state)
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_correction_chain(state, i, MSTMM_TILE);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_correction_forward_chain(state, i, MSTMM_TILE);
             code = mstmm_at_forward(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
             if (code) return code;
         }
@@ -6968,7 +6776,7 @@ static int mstmm_chain_correction(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_motion_chain(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_motion_forward_chain(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -6977,7 +6785,7 @@ MSTMM_AT_ONCE void mstmm_fetch_motion_chain(const mstmm_state *state, int index,
     mstmm_fetch(block + MSTMM_BLOCK_A, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
-static int mstmm_chain_motion(mstmm_state *state)
+static int mstmm_chain_motion_forward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
@@ -6988,7 +6796,7 @@ static int mstmm_chain_motion(mstmm_state *state)
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_motion_chain(state, i, MSTMM_TILE);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_motion_forward_chain(state, i, MSTMM_TILE);
             code = mstmm_at_forward(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
             if (code) return code;
         }
@@ -7000,7 +6808,7 @@ static int mstmm_chain_motion(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_factorisation_chain(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_factorisation_forward_chain(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -7009,7 +6817,7 @@ MSTMM_AT_ONCE void mstmm_fetch_factorisation_chain(const mstmm_state *state, int
     mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
-static int mstmm_chain_factorisation(mstmm_state *state)
+static int mstmm_chain_factorisation_forward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
@@ -7020,7 +6828,7 @@ static int mstmm_chain_factorisation(mstmm_state *state)
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_factorisation_chain(state, i, MSTMM_TILE);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_factorisation_forward_chain(state, i, MSTMM_TILE);
             code = mstmm_at_forward(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
             if (code) return code;
         }
@@ -7059,7 +6867,7 @@ static int mstmm_tiles_column_carried(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_required_slope_chain(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_required_slope_forward_slope_chain(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -7072,7 +6880,7 @@ MSTMM_AT_ONCE void mstmm_fetch_required_slope_chain(const mstmm_state *state, in
     mstmm_fetch(d_block + MSTMM_BLOCK_E, mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
-static int mstmm_chain_required_slope(mstmm_state *state)
+static int mstmm_chain_required_slope_forward_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
@@ -7083,7 +6891,7 @@ static int mstmm_chain_required_slope(mstmm_state *state)
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_required_slope_chain(state, i, MSTMM_TILE);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_required_slope_forward_slope_chain(state, i, MSTMM_TILE);
             code = mstmm_at_forward_slope(state, i);
             if (code) return code;
         }
@@ -7145,7 +6953,7 @@ static int mstmm_tiles_required_slope(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_applied_slope_chain(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_applied_slope_forward_slope_chain(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -7158,7 +6966,7 @@ MSTMM_AT_ONCE void mstmm_fetch_applied_slope_chain(const mstmm_state *state, int
     mstmm_fetch(d_block + MSTMM_BLOCK_E, mstmm_of_speeds(d_block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
-static int mstmm_chain_applied_slope(mstmm_state *state)
+static int mstmm_chain_applied_slope_forward_slope(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
@@ -7169,7 +6977,7 @@ static int mstmm_chain_applied_slope(mstmm_state *state)
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_applied_slope_chain(state, i, MSTMM_TILE);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_applied_slope_forward_slope_chain(state, i, MSTMM_TILE);
             code = mstmm_at_forward_slope(state, i);
             if (code) return code;
         }
@@ -7220,7 +7028,7 @@ static int mstmm_tiles_tangent_condense(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_tangent_brought_chain(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_tangent_brought_tangent_own_chain(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -7234,14 +7042,14 @@ MSTMM_AT_ONCE void mstmm_fetch_tangent_brought_chain(const mstmm_state *state, i
     mstmm_fetch(tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq), tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + nq * nu);
     mstmm_fetch(body->rotor, body->body_p + MSTMM_RIGID_NUMBERS);
 }
-static int mstmm_chain_tangent_brought(mstmm_state *state)
+static int mstmm_chain_tangent_brought_tangent_own(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code, law = 0;
     for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {
         const int end = mstmm_end_of_tile(model, first);
         for (int i = first; i < end; i++) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_brought_chain(state, i, MSTMM_TILE);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_tangent_brought_tangent_own_chain(state, i, MSTMM_TILE);
             code = mstmm_at_tangent_own(state, i);
             if (code) return code;
         }
@@ -7439,7 +7247,7 @@ static int mstmm_tiles_laws_column_carried(mstmm_state *state)
     return 0;
 }
 
-MSTMM_AT_ONCE void mstmm_fetch_composition_chain(const mstmm_state *state, int index, int ahead)
+MSTMM_AT_ONCE void mstmm_fetch_composition_forward_chain(const mstmm_state *state, int index, int ahead)
 {
     const mstmm_body *body = mstmm_coming(state->model, index, ahead);
     if (!body) return;
@@ -7448,7 +7256,7 @@ MSTMM_AT_ONCE void mstmm_fetch_composition_chain(const mstmm_state *state, int i
     mstmm_fetch(block + MSTMM_BLOCK_FLOOR, mstmm_of_speeds(block, nu, MSTMM_SPEED_H) + 6 * nu);
     mstmm_fetch(body->connection, body->body_p + MSTMM_RIGID_NUMBERS);
 }
-static int mstmm_chain_composition(mstmm_state *state)
+static int mstmm_chain_composition_forward(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
@@ -7459,7 +7267,7 @@ static int mstmm_chain_composition(mstmm_state *state)
             if (code) return code;
         }
         for (int i = first; i < end; i++) {
-            if (mstmm_beyond_cache(model)) mstmm_fetch_composition_chain(state, i, MSTMM_TILE);
+            if (mstmm_beyond_cache(model)) mstmm_fetch_composition_forward_chain(state, i, MSTMM_TILE);
             code = mstmm_at_forward(state, i, mstmm_block(model, state->workspace, model->bodies[i].parent) + MSTMM_BLOCK_MOTION);
             if (code) return code;
         }
@@ -7636,34 +7444,17 @@ int mstmm_run_accelerations_in_plane(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     int code;
+    code = mstmm_hook_rows_begun(state);
+    if (code) return code;
     if (model->n_values) {
-        code = mstmm_pass_prescribed_in_plane(state);
-        if (code) return code;
-        if (model->n_values) {
-            code = mstmm_hook_expression_values(state);
-            if (code) return code;
-        }
-        code = mstmm_pass_forward_in_plane(state);
-        if (code) return code;
-        code = mstmm_pass_efforts_in_plane(state);
-        if (code) return code;
-        code = mstmm_pass_laws_in_plane(state);
-        if (code) return code;
-        code = mstmm_pass_poses_in_plane(state);
-        if (code) return code;
-    } else {
-        code = mstmm_chain_accelerations_in_plane(state);
+        code = mstmm_hook_expression_values(state);
         if (code) return code;
     }
+    code = mstmm_chain_accelerations_in_plane_forward_in_plane(state);
+    if (code) return code;
     code = mstmm_pass_loads_in_plane(state);
     if (code) return code;
     code = mstmm_pass_forces_in_plane(state);
-    if (code) return code;
-    code = mstmm_hook_rows_begun(state);
-    if (code) return code;
-    code = mstmm_pass_closures_in_plane(state);
-    if (code) return code;
-    code = mstmm_hook_rows_asked(state);
     if (code) return code;
     code = mstmm_pass_carried_in_plane(state);
     if (code) return code;
@@ -7671,9 +7462,7 @@ int mstmm_run_accelerations_in_plane(mstmm_state *state)
     if (code) return code;
     code = mstmm_pass_row_found_in_plane(state);
     if (code) return code;
-    code = mstmm_pass_answered_in_plane(state);
-    if (code) return code;
-    code = mstmm_pass_closures_answered_in_plane(state);
+    code = mstmm_chain_accelerations_in_plane_answered_in_plane(state);
     if (code) return code;
     return 0;
 }
@@ -7705,7 +7494,7 @@ int mstmm_run_inverse_dynamics(mstmm_state *state)
         code = mstmm_pass_laws(state);
         if (code) return code;
     } else {
-        code = mstmm_chain_inverse_dynamics(state);
+        code = mstmm_chain_inverse_dynamics_forward(state);
         if (code) return code;
     }
     if (state->balance && model->n_flexible) {
@@ -7768,7 +7557,7 @@ int mstmm_run_correction(mstmm_state *state)
         code = mstmm_pass_unloaded(state);
         if (code) return code;
     } else {
-        code = mstmm_chain_correction(state);
+        code = mstmm_chain_correction_forward(state);
         if (code) return code;
     }
     code = mstmm_hook_struck(state);
@@ -7841,7 +7630,7 @@ int mstmm_run_motion(mstmm_state *state)
         code = mstmm_pass_poses(state);
         if (code) return code;
     } else {
-        code = mstmm_chain_motion(state);
+        code = mstmm_chain_motion_forward(state);
         if (code) return code;
     }
     return 0;
@@ -7860,7 +7649,7 @@ int mstmm_run_posed(mstmm_state *state)
 int mstmm_run_factorisation(mstmm_state *state)
 {
     int code;
-    code = mstmm_chain_factorisation(state);
+    code = mstmm_chain_factorisation_forward(state);
     if (code) return code;
     code = mstmm_pass_factorise(state);
     if (code) return code;
@@ -7901,7 +7690,7 @@ int mstmm_run_required_slope(mstmm_state *state)
         code = mstmm_pass_forward_slope(state);
         if (code) return code;
     } else {
-        code = mstmm_chain_required_slope(state);
+        code = mstmm_chain_required_slope_forward_slope(state);
         if (code) return code;
     }
     if (model->n_couplings || (model->needs_pose || model->product) || model->looped) {
@@ -7969,7 +7758,7 @@ int mstmm_run_applied_slope(mstmm_state *state)
         code = mstmm_pass_forward_slope(state);
         if (code) return code;
     } else {
-        code = mstmm_chain_applied_slope(state);
+        code = mstmm_chain_applied_slope_forward_slope(state);
         if (code) return code;
     }
     if ((model->needs_pose || model->product)) {
@@ -8059,7 +7848,7 @@ int mstmm_run_tangent_brought(mstmm_state *state)
         code = mstmm_pass_tangent_brought(state);
         if (code) return code;
     } else {
-        code = mstmm_chain_tangent_brought(state);
+        code = mstmm_chain_tangent_brought_tangent_own(state);
         if (code) return code;
     }
     return 0;
@@ -8122,7 +7911,7 @@ int mstmm_run_laws_solution(mstmm_state *state)
 int mstmm_run_composition(mstmm_state *state)
 {
     int code;
-    code = mstmm_chain_composition(state);
+    code = mstmm_chain_composition_forward(state);
     if (code) return code;
     code = mstmm_pass_composed(state);
     if (code) return code;

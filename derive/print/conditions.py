@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .storage import VARIABLES, reads
+from .storage import reads, variables
 
 #: C conditions of the traits.
 _TRAITS = {
@@ -45,11 +45,15 @@ _TRAITS = {
 }  # fmt: skip
 
 
-def condition(when: str) -> str:
+#: Those that are others in a plane.
+_FLAT = {"aside": "body->aside", "idle": "body->idle"}
+
+
+def condition(when: str, flat: bool = False) -> str:
     """C expression of a condition.  ValueError for one that the looped engine does not know."""
     words = []
     for word in when.split():
-        text = _trait(word)
+        text = _trait(word, flat)
         simple = "&&" not in text and "==" not in text
         if word.startswith("!"):
             opposite = text[1:] if text.startswith("!") else f"!{text}"
@@ -58,14 +62,15 @@ def condition(when: str) -> str:
     return " && ".join(words)
 
 
-def condition_needs(when: str) -> set[str]:
+def condition_needs(when: str, flat: bool = False) -> set[str]:
     """Variables that it reads."""
-    texts = [_trait(word) for word in when.split()]
-    return {name for name in VARIABLES for text in texts if reads(text, name)}
+    texts = [_trait(word, flat) for word in when.split()]
+    return {name for name in variables(flat) for text in texts if reads(text, name)}
 
 
-def _trait(word: str) -> str:
-    found = _TRAITS.get(word.lstrip("!"))
+def _trait(word: str, flat: bool) -> str:
+    trait = word.lstrip("!")
+    found = (_FLAT.get(trait) if flat else None) or _TRAITS.get(trait)
     if found is None:
         raise ValueError(f"no condition {word!r}; there are {', '.join(_TRAITS)}")
     return found

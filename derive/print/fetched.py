@@ -41,7 +41,9 @@ class _Stretch:
 
 
 def fetching(name: str, passes: Iterable[Pass]) -> str:
-    """C of a function that asks for what the passes need of body `index`; "" for nothing."""
+    """C of a function that asks for what the passes need of body `index`; "" for nothing, and in a
+    plane, where little enough is kept of a body that it comes by itself."""
+    passes = [whole for whole in passes if not whole.flat]
     slots = {slot for whole in passes if whole.subject == "body" for slot in _slots(whole)}
     stretches = _merged(stretch for slot in slots if (stretch := _stretch(slot)))
     if not stretches:

@@ -14,10 +14,16 @@ from .tiles import Chained, Tiled, tiled
 _COUNTS = {
     "body": "n_bodies", "law": "n_laws", "load": "n_loads", "force": "n_forces",
     "drive": "n_drives", "speed": "nu", "row": "n_rows",
-    "coupling": "n_couplings",
+    "coupling": "n_couplings", "closure": "n_closures",
 }  # fmt: skip
 #: The first that a loop meets, where others are met on their way: rows that close on bodies.
 _FIRSTS = {"row": "model->first_ground_row"}
+#: Subjects that stand in the order of bodies: what counts them, how many there are, the last body
+#: that one is about.
+_BEHIND = {
+    "law": ("law", "n_laws", "model->laws[law].body"),
+    "closure": ("loop", "n_closures", "mstmm_last_of(model, loop)"),
+}
 #: Laws of the bodies that a tile begins: they stand in the order of bodies.
 _LAWS = """\
         const int behind = law;
@@ -120,30 +126,39 @@ def _tiles(group: Tiled) -> str:
 
 def _chained(group: Chained) -> str:
     """Tiles of bodies met by one pass after the other, root to tips."""
-    of_laws = any(whole.subject == "law" for whole in group.passes)
-    name = f"{group.sweep}_chain"
+    subjects = {whole.subject for whole in group.passes}
+    counters = "".join(f", {one[0]} = 0" for name, one in _BEHIND.items() if name in subjects)
+    name = f"{group.name}_chain"
+    fetches = fetching(name, group.passes)
     lines = []
     for whole in group.passes:
         at = _at(whole, "").format(indent=" " * 12)
-        if whole.subject == "law":
-            lines.append(
-                "        for (; law < model->n_laws && model->laws[law].body < end; law++) {\n"
-                "            const int i = law;\n"
-                f"            {_fetched_law('MSTMM_TILE')}            {at}        }}\n"
-            )
+        if whole.subject in _BEHIND:
+            lines.append(_behind(whole, at))
             continue
-        fetched = f"            {_fetched(name, 'MSTMM_TILE')}" if whole is group.main else ""
+        asked = whole is group.main and fetches
+        fetched = f"            {_fetched(name, 'MSTMM_TILE')}" if asked else ""
         lines.append(
             f"        for (int i = first; i < end; i++) {{\n{fetched}            {at}        }}\n"
         )
     return (
-        f"{fetching(name, group.passes)}"
+        f"{fetches}"
         f"static int {group.function}(mstmm_state *state)\n{{\n"
         "    const mstmm_model *model = state->model;\n"
-        f"    int code{', law = 0' if of_laws else ''};\n"
+        f"    int code{counters};\n"
         "    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {\n"
         "        const int end = mstmm_end_of_tile(model, first);\n"
         f"{''.join(lines)}    }}\n    return 0;\n}}\n"
+    )
+
+
+def _behind(whole: Pass, at: str) -> str:
+    """A pass over those subjects of a tile that stand in the order of its bodies."""
+    counter, count, last = _BEHIND[whole.subject]
+    fetched = f"            {_fetched_law('MSTMM_TILE')}" if whole.subject == "law" else ""
+    return (
+        f"        for (; {counter} < model->{count} && {last} < end; {counter}++) {{\n"
+        f"            const int i = {counter};\n{fetched}            {at}        }}\n"
     )
 
 

@@ -120,14 +120,14 @@ class StepText:
 
     def __init__(self, kernels: dict[str, Callee], whole: Pass) -> None:
         self.kernels, self.name, self.subject = kernels, whole.name, whole.subject
-        self.given = {slot: word_of(slot) for slot in whole.given}
+        self.flat, self.given = whole.flat, {slot: word_of(slot) for slot in whole.given}
         self.at = "index"
         self.locals = self._local_sizes(whole)
 
     def _place(self, slot: str) -> Place:
         if slot in self.given:
             return Place(self.given[slot])
-        found = place(slot)
+        found = place(slot, self.flat)
         if found is not None:
             return found
         name, _, picked = slot.partition("[")
@@ -143,7 +143,7 @@ class StepText:
             for part in () if never(step) else _printed_here(step):
                 for slot, size in self._used(part):
                     name, _, entry = slot.partition("[")
-                    if slot not in self.given and place(name) is None:
+                    if slot not in self.given and place(name, self.flat) is None:
                         size = MOST_SPEEDS if entry == "k]" else size
                         if word_of(name) in VARIABLES:
                             raise ValueError(f"pass {self.name}: {name!r} hides a variable")
@@ -180,7 +180,9 @@ class StepText:
         elif isinstance(step, Move):
             slots, more = [step.to, step.source], {step.count} & VARIABLES.keys()
         elif isinstance(step, (Along, Each)):
-            parts = [self.needs(part) | condition_needs(part.when) for part in step.steps]
+            parts = [
+                self.needs(part) | condition_needs(part.when, self.flat) for part in step.steps
+            ]
             table = _ALONG if isinstance(step, Along) else _EACH
             return set(table[step.of][2]).union(*parts)
         elif isinstance(step, Pick):
@@ -352,7 +354,11 @@ class StepText:
         for part in steps:
             if part.when:
                 inside = self.lines(part, indent + "    ")
-                lines += [f"{indent}if ({condition(part.when)}) {{", *inside, f"{indent}}}"]
+                lines += [
+                    f"{indent}if ({condition(part.when, self.flat)}) {{",
+                    *inside,
+                    f"{indent}}}",
+                ]
             else:
                 lines += self.lines(part, indent)
         return lines

@@ -10,6 +10,7 @@ from mstmm.ir import structure
 
 from ..schedule.slope import D
 from ..schedule.words import ROLES, SLOTS
+from .flat import FLAT_VARIABLES, flat_layout, flat_place
 
 #: Numbers of a body's block in the workspace, in their order: slot -> name in C.  What the same
 #: passes read and write stands together, as memory comes in lines; e stands behind S (links.c).
@@ -138,7 +139,7 @@ _PLACES = {
     "step.q": "&state->tangents->sq", "step.kappa": "&state->tangents->kappa",
     "body.rho": "state->tangents->rho + body->q",
     "body.change": "state->tangents->change + body->q",
-"closure.turn": "closure->turn", "closure.end": "closure->end", "closure.p": "closure->p",
+    "closure.turn": "closure->turn", "closure.end": "closure->end", "closure.p": "closure->p",
     "row.floor": "&row->floor",
     "line.softness": "&state->model->rows[closure->rows[c]].softness",
     "side.inner": "loops + closure->inner[c]", "side.outer": "loops + closure->outer[c]",
@@ -156,7 +157,7 @@ _PLACES = {
     "second.L": "loops + row->others[b].pair", "both.L": "loops + other->pairs[b]",
     "scene.t": "&state->t", "sums.power": "&state->balance->power",
     "sums.potential": "&state->balance->potential", "identity": "mstmm_identity",
-    "zero": "mstmm_zeros", "none": "mstmm_zeros", "plane": "mstmm_plane",
+    "zero": "mstmm_zeros", "none": "mstmm_zeros", "plane": "mstmm_directions",
     "link.b": "at.numbers", "link.p": "at.numbers + 11", "link.numbers": "at.numbers + 12",
     "link.q": "at.q", "link.u": "at.u", "link.qdot": "at.qdot", "link.udot": "at.udot",
     "link.tau": "at.tau", "link.turn": "at.link + MSTMM_LINK_TURN(at.nu)",
@@ -240,10 +241,19 @@ VARIABLES |= {
     )
     for name in _DOUBLED
 }  # fmt: skip
+# The body of a closure is told by it.
+_IN_A_PLANE = {"closure": FLAT_VARIABLES["closure"], **VARIABLES, **FLAT_VARIABLES}
+
+
+def variables(flat: bool) -> dict[str, tuple[str, tuple[str, ...]]]:
+    """Variables of the functions of passes, of those of scenes in a plane."""
+    return _IN_A_PLANE if flat else VARIABLES
+
+
 #: Which body the subject of a pass is about.
 BODY_OF = {
     "body": "index", "law": "law->body", "drive": "drive->body", "load": "load->body",
-    "force": "mstmm_held(force)",
+    "force": "mstmm_held(force)", "closure": "closure->frame",
 }  # fmt: skip
 
 
@@ -255,13 +265,13 @@ class Place:
     needs: set[str] = field(default_factory=set)
 
 
-def place(slot: str) -> Place | None:
-    """Where a slot lies; None for one that is local to a function."""
+def place(slot: str, flat: bool = False) -> Place | None:
+    """Where a slot lies, in a plane where `flat`; None for one that is local to a function."""
     if slot.startswith(D):
         return _place_of_derivative(slot.removeprefix(D))
     name, _, picked = slot.partition("[")
     slot = SHARED.get(name, name)
-    found = _PLACES.get(slot) or _stored(slot)
+    found = (flat_place(name) if flat else None) or _PLACES.get(slot) or _stored(slot)
     if found is None:
         return None
     text = f"{found} + {picked.rstrip(']')}" if picked else found
@@ -413,6 +423,8 @@ def layout_header() -> str:
                 *_listed(ROW, "MSTMM_ROW"),
             ]
         )
+        + "\n/* A body in a plane, and what its record gives. */\n"
+        + "\n".join(flat_layout())
         + "\n/* cdef end */\n\n"
         + "/* Arrays of a flexible body of n modes, and of one of its sections. */\n"
         + "\n".join([*_offsets(MODES, _PAIRS), *_offsets(SECTION, "")])

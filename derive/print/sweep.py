@@ -13,13 +13,14 @@ from itertools import groupby
 
 from mstmm.ir.replay import evaluate_floats
 
+from ..schedule.planar import LOAD
 from ..schedule.steps import Call, Do, Evaluate, Pass, Step, inner
 from ..schedule.sweeps import SINGLY, SWEEPS
 from .callers import Callee, Specs, callees, tables
 from .conditions import condition, condition_needs
 from .loops import loops
 from .steps import NEVER, StepText, never, word_of
-from .storage import BEND, BODY_OF, MODES, PORT, SECTION, VARIABLES
+from .storage import BEND, BODY_OF, MODES, PORT, SECTION, variables
 
 Kernels = dict[str, Callee]
 
@@ -64,7 +65,7 @@ def sweep_files(specs: Specs) -> dict[str, str]:
         " from the schedule. */\n#include <math.h>\n#include <stdint.h>\n#include <string.h>\n\n"
         '#include "aim.h"\n#include "hinge.h"\n#include "kernel_calls.h"\n'
         '#include "sweep_steps.h"\n#include "tiles.h"\n\n'
-        + "\n".join([tables(specs), _plane(specs), _numbers(), *texts]),
+        + "\n".join([tables(specs), _directions(specs), _numbers(), *texts]),
         "link_steps.h": _header(
             "link_steps", "Passes over links, printed from the schedule.",
             ["kernel_calls", "links"], links,
@@ -81,13 +82,13 @@ def _header(name: str, said: str, included: list[str], lines: Iterable[str]) -> 
     )
 
 
-def _plane(specs: Specs) -> str:
-    """The directions of a pin about z, which are the same in every position."""
+def _directions(specs: Specs) -> str:
+    """The directions of a pin about z in its plane, which are the same in every position."""
     kernel = next(k for k in specs["sweep", "generic1"].kernels if k.name == "complement")
     (numbers,) = evaluate_floats(kernel, {"H": [0, 0, 0, 0, 0, 1]}).values()
-    rows = (numbers[k : k + 6] for k in range(0, len(numbers), 6))
+    rows = [[numbers[k + entry] for entry in LOAD] for k in range(0, len(numbers), 6)]
     lines = ",\n".join("    " + ", ".join(f"{entry + 0.0:g}" for entry in row) for row in rows)
-    return f"static const real mstmm_plane[{len(numbers)}] = {{\n{lines},\n}};\n"
+    return f"static const real mstmm_directions[{3 * len(rows)}] = {{\n{lines},\n}};\n"
 
 
 def _numbers() -> str:
@@ -122,24 +123,27 @@ def function_text(whole: Pass, kernels: Kernels) -> str:
     """
     text = StepText(kernels, whole)
     steps = [_plainly(step) for step in whole.steps if not never(step)]
-    known = {whole.subject} & VARIABLES.keys()
+    known = {whole.subject} & variables(whole.flat).keys()
     known |= {name for step in steps if not step.when for name in text.needs(step)}
-    known |= condition_needs(whole.skip).union(*(condition_needs(step.when) for step in steps))
-    known = _closed(known)
+    conditions = (whole.skip, *(step.when for step in steps))
+    known = _closed(known.union(*(condition_needs(c, whole.flat) for c in conditions)), whole)
     lines = [f"    real {name}[{size}];" for name, size in text.locals.items()]
     lines += _declared(whole, known, "    ")
     if any(_may_fail(part) for step in steps for part in _printed_parts(step)):
         lines.append("    int code;")
     if whole.skip:
-        lines.append(f"    if ({condition(whole.skip)}) return 0;")
+        lines.append(f"    if ({condition(whole.skip, whole.flat)}) return 0;")
     before = ""
     for when, together in groupby(steps, key=lambda step: step.when):
         group = list(together)
         inside = [line for step in group for line in text.lines(step, " " * (8 if when else 4))]
         if when:
             opposite = " " not in when and when in (f"!{before}", before.removeprefix("!"))
-            needed = _closed({name for step in group for name in text.needs(step)}) - known
-            lines[-1:] = _opened(lines[-1], when, bool(before) and opposite)
+            needed = _closed({name for step in group for name in text.needs(step)}, whole) - known
+            lines[-1:] = (
+                ["    } else {"] if before and opposite
+                else [lines[-1], f"    if ({condition(when, whole.flat)}) {{"]
+            )  # fmt: skip
             inside = [*_declared(whole, needed, "        "), *inside, "    }"]
         lines += inside
         before = when
@@ -147,15 +151,12 @@ def function_text(whole: Pass, kernels: Kernels) -> str:
     return f"/* {whole.purpose} */\n{signature(whole)}\n{{\n{body}\n}}\n"
 
 
-def _opened(last: str, when: str, opposite: bool) -> list[str]:
-    """The line before a block, and the one that opens it: "else" behind its opposite."""
-    return ["    } else {"] if opposite else [last, f"    if ({condition(when)}) {{"]
-
-
 def _declared(whole: Pass, names: set[str], indent: str) -> list[str]:
     body = BODY_OF.get(whole.subject, "index")
     return [
-        indent + text.format(body=body) for name, (text, _) in VARIABLES.items() if name in names
+        indent + text.format(body=body)
+        for name, (text, _) in variables(whole.flat).items()
+        if name in names
     ]
 
 
@@ -176,11 +177,11 @@ def _constant(slot: str) -> str:
     return "" if slot.startswith("given.") else "const "
 
 
-def _closed(names: set[str]) -> set[str]:
+def _closed(names: set[str], whole: Pass) -> set[str]:
     """With the variables that their declarations need."""
-    found = set(names)
+    found, known = set(names), variables(whole.flat)
     while True:
-        more = {other for name in found for other in VARIABLES[name][1]} - found
+        more = {other for name in found for other in known[name][1]} - found
         if not more:
             return found
         found |= more

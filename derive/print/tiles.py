@@ -20,8 +20,9 @@ from .conditions import condition
 
 #: Owners of numbers that belong to other bodies, to expressions or to the whole scene.
 _OTHERS = (*ROLES, "inboard", "sums", "outer", "inner")
-#: Those that stand already where bodies are met from root to tips; sums keep their order.
-_KNOWN = ("parent", "inboard", "sums")
+#: Those that stand already where bodies are met from root to tips; sums keep their order, and rows
+#: are met with the body that they close on.
+_KNOWN = ("parent", "inboard", "sums", "meeting")
 
 
 @dataclass(frozen=True)
@@ -53,16 +54,21 @@ class Tiled(_Together):
 
 @dataclass(frozen=True)
 class Chained(_Together):
-    """`passes` of bodies and laws, one after the other for a tile, root to tips; while `main` goes
-    over a tile the next is asked for."""
+    """`passes` of bodies, laws and loops, one after the other for a tile, root to tips; while
+    `main` goes over a tile the next is asked for."""
 
     sweep: str
     passes: tuple[Pass, ...]
     main: Pass
 
     @property
+    def name(self) -> str:
+        """Of the passes together."""
+        return f"{self.sweep}_{self.main.name}"
+
+    @property
     def function(self) -> str:
-        return f"mstmm_chain_{self.sweep}"
+        return f"mstmm_chain_{self.name}"
 
 
 def tiled(sweep: Sweep) -> list[Run | Tiled | Chained]:
@@ -81,6 +87,8 @@ def tiled(sweep: Sweep) -> list[Run | Tiled | Chained]:
 def _follows(run: Run) -> bool:
     """Whether a pass reads of others what is known where bodies are met from root to tips."""
     whole = run.whole
+    if whole is not None and whole.subject == "closure":
+        return True  # each is met behind the bodies that it reads
     return (
         whole is not None and whole.subject in ("body", "law") and whole.order == ROOT_TO_TIPS
         and not any(_of_others(step, _KNOWN) for top in whole.steps for step in inner(top))

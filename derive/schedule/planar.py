@@ -10,8 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from .steps import Call, Do, Each, EachSpeed, Move, Pass, Pick, Run, Spread, Step, Sweep
+from .steps import Add, Call, Copy, Do, Each, EachSpeed, Move, Pass, Pick, Run, Spread, Step, Sweep
 
+#: Entries of a load or a direction that lie in the plane.
+LOAD = (0, 1, 5)
 #: What holds of such a scene, and of evaluations of accelerations that nobody observes.
 _HOLDS = {
     **dict.fromkeys(("own", "free", "moving", "hinged", "known", "posed", "looped"), True),
@@ -26,7 +28,10 @@ _HOLDS = {
 _NONE = ("own", "bent")
 #: Kernels that there are in a plane.
 _KERNELS = {
-    *("hinge.forward", "body.inertia", "body.bias_load", "frames.pose", "frames.velocity"),
+    "hinge.forward", "body.inertia", "body.bias_load",
+    *(f"frames.{name}" for name in (
+        "pose", "velocity", "point", "turning", "end_frame", "applied_load",
+    )),
     *(f"generic{{free}}.{name}" for name in (
         "factor", "push", "push_on_ground", "answer", "divide", "couple", "answered", "pull",
     )),
@@ -35,31 +40,58 @@ _KERNELS = {
     )),
 }  # fmt: skip
 #: What nobody asks of the frame of a hinge that closes a loop.
-_OF_MASS = {"body.inertia", "body.bias_load", "frames.pivot_floor"}
-#: Slots of the free speeds -> those of all speeds; rows of a hinge -> where they are carried from.
+_OF_MASS = {"body.inertia", "body.bias_load"}
+#: Slots of the free speeds -> those of all speeds; rows of a hinge -> where they are carried from;
+#: what is the same in every position -> where it is given.
 _SLOTS = {
     "hinge.J_free": "body.rotor", "hinge.tau_free": "body.tau", "hinge.rates": "body.udot",
     "closure.J_A[6 * c]": "side.inner", "closure.J_B[6 * c]": "side.outer",
+    "closure.W": "plane", "closure.W[6 * k]": "plane", "closure.W[6 * c]": "plane[3 * c]",
+    "body.r": "connection.r", "hinge.p": "none",
 }  # fmt: skip
-#: What is the same in every position, and stands in a table.
-_TABLES = {"closure.W": "plane"}
-#: Ports of what is the same for all pins.
-_SAME = {("H", "hinge.H_free"), ("H", "hinge.H"), ("v_rel", "hinge.v"), ("W", "zero")}
-#: The kernel that would fill the table.
-_TABULATED = "generic{nu}.complement"
+#: What no later pass reads.
+_PASSING = {f"closure.{name}": f"local.{name}" for name in ("R_C", "lever", "d", "slip")}
+#: Ports of what is the same for all pins, or zero.
+_SAME = {
+    ("H", "hinge.H_free"), ("H", "hinge.H"), ("v_rel", "hinge.v"), ("W", "zero"),
+    ("s", "body.s"), ("delta", "zero"), ("gravity", "zero"),
+}  # fmt: skip
+#: What a plane has no need to write: it stands in its records.
+_WRITTEN = {"generic{nu}.complement", "frames.pivot_floor"}
+#: Nobody asks rows for more than the bodies' own motions do.
+_UNASKED = {"rows_asked"}
+#: A pin prescribes nothing.
+_NOTHING = "body.s"
 
 
 def sweep_in_plane(whole: Sweep) -> Sweep:
-    """The sweep for scenes in a plane."""
-    runs = (run for run in _steps(whole.runs) if isinstance(run, Run))
-    return replace(whole, name=f"{whole.name}_in_plane", runs=tuple(runs))
+    """The sweep for scenes in a plane.  Loops are closed as soon as the bodies are known that they
+    close on, before anything else acts on these."""
+    runs = [run for run in _steps(whole.runs) if isinstance(run, Run) and _has_part(run)]
+    begun, closed = _taken(runs, "rows_begun"), _taken(runs, "closures_in_plane")
+    acting = next(k for k, run in enumerate(runs) if run.whole and run.whole.subject == "load")
+    found = (begun, *runs[:acting], closed, *runs[acting:])
+    return replace(whole, name=f"{whole.name}_in_plane", runs=found)
+
+
+def _has_part(run: Run) -> bool:
+    return bool(run.whole.steps) if run.whole else run.hook not in _UNASKED
+
+
+def _taken(runs: list[Run], name: str) -> Run:
+    """The run of this name, which is none of the others from now on."""
+    at = [run.whole.name if run.whole else run.hook for run in runs].index(name)
+    return runs.pop(at)
 
 
 def _in_plane(whole: Pass) -> Pass:
-    """The pass for scenes in a plane, where it is another one."""
+    """The pass for scenes in a plane, whose closed loops are met one by one."""
     spares = "" if "linked" in whole.spares_links.split() else whole.spares_links
-    found = replace(whole, steps=tuple(_steps(whole.steps)), spares_links=spares)
-    return whole if found == whole else replace(found, name=f"{whole.name}_in_plane")
+    subject, skip = ("closure", "") if whole.skip == "!cut" else (whole.subject, whole.skip)
+    return replace(
+        whole, name=f"{whole.name}_in_plane", subject=subject, skip=skip, given=(), flat=True,
+        steps=tuple(_steps(whole.steps)), spares_links=spares,
+    )  # fmt: skip
 
 
 def _steps(steps: tuple[Step, ...]) -> Iterator[Step]:
@@ -68,9 +100,14 @@ def _steps(steps: tuple[Step, ...]) -> Iterator[Step]:
             continue
         if isinstance(step, (Pick, Spread)) or (isinstance(step, Each) and step.of in _NONE):
             continue
-        if isinstance(step, Call) and step.kernel == _TABULATED:
+        if isinstance(step, Call) and step.kernel in _WRITTEN:
+            continue
+        if isinstance(step, Copy) and step.to == _NOTHING:
             continue
         if isinstance(step, Move) and _SLOTS.get(step.source) == step.to:
+            continue
+        if isinstance(step, EachSpeed):
+            yield from map(_of_the_speed, _steps(step.steps))
             continue
         left = [word for word in step.when.split() if word.lstrip("!") not in _HOLDS]
         if isinstance(step, Call) and step.kernel in _OF_MASS:
@@ -81,14 +118,29 @@ def _steps(steps: tuple[Step, ...]) -> Iterator[Step]:
 def _replaced(step: Step) -> Step:
     if isinstance(step, (Do, Run)) and step.whole is not None:
         return replace(step, whole=_in_plane(step.whole))
-    if isinstance(step, (Each, EachSpeed)):
+    if isinstance(step, Each):
         return replace(step, steps=tuple(_steps(step.steps)))
+    if isinstance(step, Copy) and step.source == _NOTHING:
+        return replace(step, source="")
     if isinstance(step, Call) and step.kernel in _KERNELS:
-        ports = [(port, _slot(slot)) for port, slot in step.ports if (port, slot) not in _SAME]
-        return replace(step, kernel=f"planar.{step.kernel.partition('.')[2]}", ports=tuple(ports))
+        return _in_plane_called(step)
     return step
 
 
-def _slot(slot: str) -> str:
-    name, picked, entry = slot.partition("[")
-    return _SLOTS.get(slot, f"{_TABLES.get(name, name)}{picked}{entry}")
+def _of_the_speed(step: Step) -> Step:
+    """A step for every speed, of which a pin has one."""
+    if isinstance(step, Add):
+        return replace(step, to=step.to.replace("[k]", "[0]"))
+    assert isinstance(step, Call)
+    ports = tuple((port, slot.partition("[")[0]) for port, slot in step.ports)
+    return replace(step, ports=ports)
+
+
+def _in_plane_called(step: Call) -> Call:
+    kernel = step.kernel.partition(".")[2]
+    ports = tuple(
+        (port, _SLOTS.get(slot, _PASSING.get(slot, slot)))
+        for port, slot in step.ports
+        if (port, slot) not in _SAME and (kernel, port) != ("forward", "r")
+    )
+    return replace(step, kernel=f"planar.{kernel}", ports=ports)

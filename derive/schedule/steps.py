@@ -188,7 +188,8 @@ class Pass:
 
     `subject` names what is met, `order` how; `skip` is the condition under which one is passed by.
     `given` are slots that the caller hands over instead of reading them where they usually lie;
-    where `spares_links` holds, bodies that are swept as links have no part in it.
+    where `spares_links` holds, bodies that are swept as links have no part in it.  A `flat` one is
+    of a scene in a plane, and of the little that the looped engine keeps of its bodies.
     """
 
     name: str
@@ -199,6 +200,7 @@ class Pass:
     skip: str = ""
     given: tuple[str, ...] = ()
     spares_links: str = ""
+    flat: bool = False
 
 
 @dataclass(frozen=True)

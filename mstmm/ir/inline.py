@@ -70,14 +70,16 @@ def elements(graph: Graph, port: Port) -> Nodes:
 def instance(
     kernel: KernelIR,
     given: Callable[[Graph, Port], Nodes],
-    kept: Callable[[Port, Nodes], Sequence[Node | None]],
+    kept: Callable[[Port, Nodes], Sequence[Node] | None],
     n: int = 0,
+    laid: Callable[[Port], Port] = lambda port: port,
 ) -> KernelIR:
     """The kernel of what is known of its arguments, for one value of a run-time size.
 
     `given` tells the numbers of an input, flat; inputs all of whose numbers are known are none of
-    the instance.  `kept` tells what is written of an output, None of what is not.  Guards and
-    failure codes are those of `kernel`; a guard behind a store stands before it.
+    the instance.  `kept` tells what is written of an output, None for an output that nobody wants.
+    `laid` tells how an array is laid out in the instance, which `given` reads and `kept` writes.
+    Guards and failure codes are those of `kernel`; a guard behind a store stands before it.
     """
 
     def fixed(port: Port) -> Port:
@@ -91,13 +93,17 @@ def instance(
         graph.guard(condition, judged.code, judged.message)
 
     found = _Replay(graph, kernel, numbers, judge, n).run()
-    values = {port.name: _nested(port.shape, kept(port, found[port.name])) for port in outputs}
+    written = {laid(port): kept(port, found[port.name]) for port in outputs}
+    values = {
+        port.name: _nested(port.shape, row) for port, row in written.items() if row is not None
+    }
     inputs = [
-        port for port in taken
+        laid(port) for port in taken
         if not numbers[port.name] or any(node.value is None for node in numbers[port.name])
     ]  # fmt: skip
+    wanted = [port for port in written if port.name in values]
     return graph.kernel(
-        kernel.name, inputs, outputs, values, purpose=kernel.purpose, sources=kernel.sources
+        kernel.name, inputs, wanted, values, purpose=kernel.purpose, sources=kernel.sources
     )
 
 
@@ -141,7 +147,7 @@ class _Replay(Counted):
         self.results[solve.port][:] = [node for row in found for node in row]
 
 
-def _nested(shape: tuple[int | str, ...], row: Sequence[Node | None]) -> object:
+def _nested(shape: tuple[int | str, ...], row: Sequence[Node]) -> object:
     """Nested lists in a port's shape of its numbers, row-major."""
     if not shape:
         return row[0]

@@ -81,9 +81,11 @@ int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const
                          .observed = 0,
                          .hinges_known = 0, .level = 0, .give = 0, .closing = 0, .refined = 0, .asked = NULL, .strike = NULL};
     if (balance) balance->power = balance->potential = 0;
-    mstmm_ground(&state);
-    if (model->planar && !balance && !(model->refines || model->product || model->qr))
+    if (model->flat && !balance && !(model->refines || model->product || model->qr)) {
+        mstmm_flat_ground(&state);
         return mstmm_run_accelerations_in_plane(&state);
+    }
+    mstmm_ground(&state);
     const int code = mstmm_run_accelerations(&state);
     return code || !model->refines ? code : mstmm_refine(&state, q, u);
 }

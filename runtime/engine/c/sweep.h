@@ -136,17 +136,17 @@ typedef struct {
 /* A row whose column goes across the inboard hinge of a body; places behind `loops`. */
 typedef struct {
     int row;
-    int64_t column, onward, y; /* of its column here and on the parent, of -H^T K - C */
-    int64_t tau;               /* of -C; -1: it is no coupling of this hinge's speeds */
-    int64_t modes;             /* of its column on the modes of the body that this is an end of */
-    const int64_t *pairs;      /* of the entries of L with those up to this one */
+    int column, onward, y; /* of its column here and on the parent, of -H^T K - C */
+    int tau;               /* of -C; -1: it is no coupling of this hinge's speeds */
+    int modes;             /* of its column on the modes of the body that this is an end of */
+    const int *pairs;      /* of the entries of L with those up to this one */
 } mstmm_pending;
 
 /* A row that stays when another is closed. */
 typedef struct {
     int row;
-    int64_t column, pair; /* of its column on the body, of its entry of L with the other */
-    const int64_t *pairs; /* of those with the ones that stay, up to this one */
+    int column, pair; /* of its column on the body, of its entry of L with the other */
+    const int *pairs; /* of those with the ones that stay, up to this one */
 } mstmm_other;
 
 /* A row of a closed loop, in the order in which they are closed. */
@@ -170,13 +170,13 @@ typedef struct {
 /* What closes a loop: the frame C of a hinge, a body without mass, is to be where an end of B is, or
  * a constraint asks less of the two. */
 typedef struct {
-    int outboard; /* B */
+    int frame, outboard; /* C, B */
     int kind;
-    real p[5];    /* of a constraint */
-    int rows[6];  /* of its directions, -1: none, it repeats others; -2: nothing is asked */
-    int64_t inner[6], outer[6]; /* their columns on A and on B */
-    real turn[9], end[3];       /* axes of C and its origin in B */
-    int64_t numbers;            /* of its own */
+    int numbers; /* of its own */
+    int rows[6]; /* of its directions, -1: none, it repeats others; -2: nothing is asked */
+    int inner[6], outer[6]; /* their columns on A and on B */
+    real end[3], turn[9];   /* origin of C in B, and its axes */
+    real p[5];              /* of a constraint */
 } mstmm_closure;
 
 /* A coupling of own speeds of a hinge that closes a loop: its row, and places of its columns on
@@ -206,6 +206,17 @@ typedef struct {
     const mstmm_closure *closure; /* the body is the frame C of what closes a loop */
 } mstmm_looped;
 
+/* A body of a scene in a plane, and what it has to do with closed loops: there hinges alone close
+ * them, free pins, all of them parallel.  See mstmm_looped; `given` begins with MSTMM_GIVEN_TURN. */
+typedef struct {
+    int parent, q, u;
+    int first_row, n_rows;
+    int n_pending;
+    const mstmm_pending *pending;
+    const real *given;
+    int aside, idle; /* nothing is swept to the root, or in any pass */
+} mstmm_flat_body;
+
 /* What is corrected of closed loops, instead of what accelerates. */
 #define MSTMM_GAP 1
 #define MSTMM_SLIP 2
@@ -230,7 +241,6 @@ typedef struct {
     int n_imposed;  /* bodies with speeds that are driven or held */
     const mstmm_product *product; /* accelerations by the plain product; NULL: by a sweep */
     int qr; /* the sweep is that of least squares */
-    int planar; /* closed loops of free pins, all of them parallel */
     mstmm_body *bodies;
     int n_runs;
     const mstmm_branch *runs; /* all bodies in order, see mstmm_fill_runs */
@@ -251,6 +261,10 @@ typedef struct {
     int n_forces;
     mstmm_force *forces;
     const mstmm_looped *looped; /* for every body; NULL: no loop is closed */
+    int n_closures;
+    const mstmm_closure *closures;
+    const mstmm_flat_body *flat; /* NULL: the scene is in no plane */
+    int64_t flat_numbers; /* first of those of the ground, and of all bodies, in the workspace */
     int n_rows, first_ground_row; /* rows from the latter on close at the ground */
     const mstmm_loop_row *rows;
     int64_t loops;        /* first number of closed loops in the workspace */
@@ -437,6 +451,22 @@ static inline void mstmm_ground(const mstmm_state *state)
         ground[MSTMM_BLOCK_MOTION + 6 + i] = -state->model->gravity[i];
         ground[MSTMM_BLOCK_A + 4 * i] = 1;
     }
+}
+
+/* Numbers of a body or (-1) of the ground of a scene in a plane. */
+static inline real *mstmm_flat_block(const mstmm_state *state, int body)
+{
+    return state->workspace + state->model->flat_numbers + (int64_t)MSTMM_FLAT * (body + 1);
+}
+
+/* The ground in a plane. */
+static inline void mstmm_flat_ground(const mstmm_state *state)
+{
+    real *ground = mstmm_flat_block(state, -1);
+    memset(ground, 0, MSTMM_FLAT * sizeof(real));
+    ground[MSTMM_FLAT_A] = 1;
+    for (int i = 0; i < 2; i++)
+        ground[MSTMM_FLAT_MOTION + 2 + i] = -state->model->gravity[i];
 }
 
 int mstmm_fail(mstmm_state *state, int reason, int element, int code);

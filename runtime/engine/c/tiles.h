@@ -24,6 +24,13 @@ static inline int mstmm_end_of_tile(const mstmm_model *model, int first)
     return first + MSTMM_TILE < model->n_bodies ? first + MSTMM_TILE : model->n_bodies;
 }
 
+/* The last body that a closed loop is told by. */
+static inline int mstmm_last_of(const mstmm_model *model, int loop)
+{
+    const mstmm_closure *closure = &model->closures[loop];
+    return closure->frame > closure->outboard ? closure->frame : closure->outboard;
+}
+
 /* So many bodies are some 10 MB; numbers of fewer are not asked for, which would only take time. */
 static inline int mstmm_beyond_cache(const mstmm_model *model) { return model->n_bodies >= 4000; }
 

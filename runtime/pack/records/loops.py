@@ -7,6 +7,7 @@ from typing import Any
 
 from mstmm.graph.mechanism import GROUND
 
+from ...kernels.records import Records
 from ..loops.bent import BentPlan
 from ..loops.rows import row_groups
 from ..loops.variants import LOCKED, length_of
@@ -30,7 +31,8 @@ class WrittenClosure:
 
 
 class LoopRecords:
-    """Closed loops in the memory of C; `place` is where their numbers begin in the workspace."""
+    """Closed loops in the memory of C; `place` is where their numbers begin in the workspace,
+    `of_bodies` what bodies have to do with them."""
 
     def __init__(
         self,
@@ -39,8 +41,10 @@ class LoopRecords:
         rows: Any,
         closures: tuple[WrittenClosure, ...],
         couplings: tuple[WrittenCoupling, ...],
+        of_bodies: Records,
     ) -> None:
         self.place, self.closures, self.couplings, self._rows = place, closures, couplings, rows
+        self.of_bodies = of_bodies
         self.count = len(plan.rows)
         self.width = max(map(len, plan.pending.values()), default=0)
 
@@ -131,14 +135,16 @@ class _Loops:
         self.shelves = {
             kind: _Shelf(memory, kind, needed)
             for kind, needed in (
-                ("mstmm_pending", sum(passing)), ("mstmm_other", sum(staying)), ("int64_t", pairs),
+                ("mstmm_pending", sum(passing)), ("mstmm_other", sum(staying)), ("int", pairs),
                 ("mstmm_closure", len(system.closures)),
             )
         }  # fmt: skip
 
     def write(self, place: int) -> tuple[int, LoopRecords]:
         model, memory = self.model, self.memory
-        looped = memory.new("mstmm_looped[]", self.system.count)
+        records_of_bodies = Records(memory.ffi, "mstmm_looped", self.system.count)
+        memory.kept.append(records_of_bodies)
+        looped = records_of_bodies.array
         behind = self.plan.of[len(self.system.closures) :]
         couplings = placed(model, self.system, [rows[0] for rows in behind], self._take)
         self.coupled = {
@@ -165,17 +171,25 @@ class _Loops:
                 at = looped[row.body]
                 at.first_row = number if not at.n_rows else at.first_row
                 at.n_rows += 1
-        written = []
-        for group, closure in enumerate(self.system.closures):
-            looped[closure.frame].closure, told = self._closure(group, closure, records)
-            written.append(told)
+        written: dict[int, WrittenClosure] = {}
+        for group, closure in self._in_order():
+            looped[closure.frame].closure, written[group] = self._closure(group, closure, records)
         attach_couplings(model, self.system, memory, couplings, records, looped, self._side)
         model.looped, model.rows, model.n_rows = looped, records, len(self.plan.rows)
+        model.closures = self.shelves["mstmm_closure"].records
+        model.n_closures = len(self.system.closures)
         model.loops, model.loops_summed = place, self.summed
         model.answer = place + self._take(self.system.nu)
         model.loops_apart = LOCKED * length_of(self.system)
-        return place + self.end, LoopRecords(
-            place, self.plan, records, tuple(written), tuple(c for c in couplings if c.row >= 0)
+        closures = tuple(written[group] for group in sorted(written))
+        coupled = tuple(one for one in couplings if one.row >= 0)
+        made = LoopRecords(place, self.plan, records, closures, coupled, records_of_bodies)
+        return place + self.end, made
+
+    def _in_order(self) -> list[tuple[int, ClosureNumbers]]:
+        """Closures with their numbers, as a sweep from the root meets the bodies of each."""
+        return sorted(
+            enumerate(self.system.closures), key=lambda one: max(one[1].frame, one[1].outboard)
         )
 
     def _take(self, count: int) -> int:
@@ -194,7 +208,7 @@ class _Loops:
         return self.entries[min(one, other), max(one, other)]
 
     def _places(self, places: list[int]) -> Any:
-        found = self.shelves["int64_t"].take(len(places))
+        found = self.shelves["int"].take(len(places))
         found[0 : len(places)] = places
         return found
 
@@ -238,7 +252,7 @@ class _Loops:
         self, group: int, closure: ClosureNumbers, rows: Any
     ) -> tuple[Any, WrittenClosure]:
         record = self.shelves["mstmm_closure"].take(1)
-        record.outboard = closure.outboard
+        record.frame, record.outboard = closure.frame, closure.outboard
         record.turn, record.end = list(closure.turn), list(closure.end)
         record.kind = getattr(self.lib, f"MSTMM_{closure.kind.upper()}")
         for k, number in enumerate(closure.p):

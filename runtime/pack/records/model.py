@@ -15,6 +15,7 @@ from ..loops.plane import moves_in_a_plane
 from ..reach import Reach, reach_of
 from ..system import ForceNumbers, LoadNumbers, System
 from .bodies import BodyRecords
+from .flat import attach_flat
 from .laws import LawRecords
 from .links import attach_runs
 from .loops import LoopRecords, attach_loops
@@ -74,11 +75,12 @@ def write(system: System, elements: Elements) -> Written:
         record.own = int(own)
     model.forces, model.n_forces = forces, len(system.forces)
     model.needs_pose = int(bool(system.forces or system.loads or system.dragged or system.closes))
-    model.planar = int(moves_in_a_plane(system, elements))
     model.inputs = write_inputs(system.inputs, system.held.places, memory)
     model.n_inputs = len(system.inputs)
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
     behind, loops = attach_loops(model, system, memory, lib, bodies.end)
+    if loops and moves_in_a_plane(system, elements):
+        behind = attach_flat(model, system, elements, memory, lib, loops.of_bodies, behind)
     scratch = attach_runs(model, system, memory, lib, behind)
     modal = bodies.modal
     return Written(
