@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reference.jets import Array
+from scipy.spatial.transform import Rotation
 
 import mstmm
 
@@ -66,6 +68,43 @@ def test_accelerations_are_those_in_space(count: int, base: str) -> None:
     model.packed.model.flat = model.packed.ffi.NULL
     for state, found in zip(states, flat, strict=True):
         assert found == pytest.approx(model.accelerations(*state), rel=1e-11, abs=1e-11)
+
+
+def turned(scene: dict[str, Any], rotation: Array) -> dict[str, Any]:
+    """The scene with everything in it turned, but for what acts in inertial axes."""
+
+    def vector(of: list[float]) -> list[float]:
+        return (rotation @ of).tolist()
+
+    body = [one | {"center_of_mass": vector(one["center_of_mass"]), "inertia": [0.1, 0.1, 0.1],
+                   "ends": {name: vector(end) for name, end in one["ends"].items()}}
+            for one in scene["body"]]  # fmt: skip
+    hinge = [one | {"axis": vector([0, 0, 1])}
+             | ({"position": vector(one["position"])} if "position" in one else {})
+             for one in scene["hinge"]]  # fmt: skip
+    return scene | {"gravity": vector(scene["gravity"]), "body": body, "hinge": hinge, "load": []}
+
+
+@pytest.mark.parametrize("axis", [[0, 1, 0], [-1, 0, 0], [0, 0, -1], [0.3, 0.8, -0.5]])
+def test_the_plane_may_lie_anywhere(axis: list[float]) -> None:
+    upright, z = windows(2, "ground"), [0.0, 0.0, 1.0]
+    lying = turned(upright, np.eye(3))
+    rotation = Rotation.align_vectors([axis], [z])[0].as_matrix()
+    models = [mstmm.compile(mstmm.Scene(**scene), engine="looped")
+              for scene in (lying, turned(upright, rotation))]  # fmt: skip
+    assert all(model.packed.model.flat for model in models)
+    found, expected = (model.accelerations(*model.initial_state()) for model in models)
+    assert found == pytest.approx(expected, rel=1e-10, abs=1e-10)
+
+
+def test_what_acts_in_inertial_axes_keeps_others_in_space() -> None:
+    """A plane has axes of its own, in which nobody tells such a load."""
+    aside = Rotation.from_euler("x", 90, degrees=True).as_matrix()
+    lying = turned(windows(2, "ground"), aside)
+    load = {"on": "coupler0.coupler", "force": [1.0, 2.0, 3.0]}
+    for more, in_a_plane in (({}, True), ({"load": [load]}, False)):
+        model = mstmm.compile(mstmm.Scene(**(lying | more)), engine="looped")
+        assert bool(model.packed.model.flat) == in_a_plane
 
 
 def test_a_ring_in_space_is_swept_there() -> None:

@@ -265,6 +265,7 @@ typedef struct {
     const mstmm_closure *closures;
     const mstmm_flat_body *flat; /* NULL: the scene is in no plane */
     int64_t flat_numbers; /* first of those of the ground, and of all bodies, in the workspace */
+    real flat_gravity[2]; /* in the plane's own axes, which stand for inertial ones */
     int n_rows, first_ground_row; /* rows from the latter on close at the ground */
     const mstmm_loop_row *rows;
     int64_t loops;        /* first number of closed loops in the workspace */
@@ -466,7 +467,7 @@ static inline void mstmm_flat_ground(const mstmm_state *state)
     memset(ground, 0, MSTMM_FLAT * sizeof(real));
     ground[MSTMM_FLAT_A] = 1;
     for (int i = 0; i < 2; i++)
-        ground[MSTMM_FLAT_MOTION + 2 + i] = -state->model->gravity[i];
+        ground[MSTMM_FLAT_MOTION + 2 + i] = -state->model->flat_gravity[i];
 }
 
 int mstmm_fail(mstmm_state *state, int reason, int element, int code);

@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.graph.mechanism import GROUND
 
 from ...kernels.records import Records
 from ..bodies import RIGID
@@ -20,11 +27,13 @@ def attach_flat(
     memory: Memory,
     lib: Any,
     looped: Records,
+    axes: Array,
     place: int,
 ) -> int:
-    """Give the model the bodies of a plane and a place for their numbers in the workspace; returns
-    the place behind them.  `looped` are the records of their closed loops."""
-    distinct, shared = list(system.distinct), dict[Numbers, Any]()
+    """Give the model the bodies of a plane with these axes (3, 3) and a place for their numbers in
+    the workspace; returns the place behind them.  `looped` are the records of their closed loops.
+    """
+    distinct, shared = list(_in_axes(system, axes)), dict[Numbers, Any]()
     floors = _Floors(elements, memory.ffi)
     prototypes = Records(memory.ffi, "mstmm_flat_body", len(distinct))
     for record, body in zip(prototypes.array, distinct, strict=False):
@@ -43,7 +52,21 @@ def attach_flat(
     records.column("aside")[[closure.frame for closure in system.closures]] = 1
     memory.kept.append(records)
     model.flat, model.flat_numbers = records.array, place
+    model.flat_gravity = (axes.T @ system.gravity)[:2].tolist()
     return place + int(lib.MSTMM_FLAT) * (1 + system.count)
+
+
+def _in_axes(system: System, axes: Array) -> Iterator[BodyNumbers]:
+    """Every body that differs from others, told in the axes of the plane where it stands on the
+    ground."""
+    for run in system.bodies:
+        for k, body in enumerate(run.alike):
+            if k or run.parent != GROUND:
+                yield body
+                continue
+            turned = axes.T @ np.reshape(body.connection[:9], (3, 3))
+            shift = axes.T @ body.connection[9:12]
+            yield replace(body, connection=(*turned.ravel().tolist(), *shift.tolist()))
 
 
 def _given(body: BodyNumbers, floor: float) -> Numbers:

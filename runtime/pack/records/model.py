@@ -11,7 +11,7 @@ from mstmm.numbers.pieces import Pieces
 
 from ...kernels import prebuilt
 from ..elements import Elements
-from ..loops.plane import moves_in_a_plane
+from ..loops.plane import plane_of
 from ..reach import Reach, reach_of
 from ..system import ForceNumbers, LoadNumbers, System
 from .bodies import BodyRecords
@@ -79,8 +79,9 @@ def write(system: System, elements: Elements) -> Written:
     model.n_inputs = len(system.inputs)
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
     behind, loops = attach_loops(model, system, memory, lib, bodies.end)
-    if loops and moves_in_a_plane(system, elements):
-        behind = attach_flat(model, system, elements, memory, lib, loops.of_bodies, behind)
+    axes = plane_of(system, elements)
+    if loops is not None and axes is not None:
+        behind = attach_flat(model, system, elements, memory, lib, loops.of_bodies, axes, behind)
     scratch = attach_runs(model, system, memory, lib, behind)
     modal = bodies.modal
     return Written(
