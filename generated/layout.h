@@ -69,10 +69,10 @@
 #define MSTMM_FLAT_X 2
 #define MSTMM_FLAT_V 5
 #define MSTMM_FLAT_MOTION 7
-#define MSTMM_FLAT_R 11
-#define MSTMM_FLAT_TAU 13
-#define MSTMM_FLAT_S 14
-#define MSTMM_FLAT_E 20
+#define MSTMM_FLAT_S 11
+#define MSTMM_FLAT_E 17
+#define MSTMM_FLAT_R 20
+#define MSTMM_FLAT_TAU 22
 #define MSTMM_FLAT_DELTA 23
 #define MSTMM_FLAT_F 26
 #define MSTMM_FLAT_OFFSET 27

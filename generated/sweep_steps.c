@@ -1839,7 +1839,7 @@ static int mstmm_at_closures_in_plane(mstmm_state *state, int index)
         .motion_C = block + MSTMM_FLAT_MOTION, .motion_B = outboard + MSTMM_FLAT_MOTION,
         .drift = drift);
     mstmm_planar_known(
-        .W = mstmm_directions, .relative = drift, .l = block + MSTMM_FLAT_E);
+        .W = mstmm_directions, .relative = drift, .l = block + MSTMM_FLAT_DELTA);
     mstmm_planar_row(
         .w = mstmm_directions, .R_C = R_C, .r_e = closure->end, .Rc = block + MSTMM_FLAT_R,
         .r_A = lever, .J_A = block + MSTMM_FLAT_S, .J_B = block + MSTMM_FLAT_S + 3);
@@ -1854,7 +1854,7 @@ static int mstmm_at_closures_in_plane(mstmm_state *state, int index)
             .w = mstmm_directions + 3 * c, .R_C = R_C, .r_e = closure->end,
             .Rc = block + MSTMM_FLAT_R, .r_A = lever, .J_A = loops + closure->inner[c],
             .J_B = loops + closure->outer[c]);
-        memcpy(loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN, block + MSTMM_FLAT_E + c, (size_t)(1) * sizeof(real));
+        memcpy(loops + MSTMM_ROW * (int64_t)closure->rows[c] + MSTMM_ROW_KNOWN, block + MSTMM_FLAT_DELTA + c, (size_t)(1) * sizeof(real));
     }
     return 0;
 }
@@ -2098,8 +2098,9 @@ static int mstmm_at_closures_answered_in_plane(mstmm_state *state, int index)
     real *outboard = mstmm_flat_block(state, closure->outboard);
     mstmm_set_zero(state->udot + body->u, nu);
     mstmm_planar_told(
-        .J_A = block + MSTMM_FLAT_S, .J_B = block + MSTMM_FLAT_S + 3, .l = block + MSTMM_FLAT_E,
-        .delta_A = parent + MSTMM_FLAT_DELTA, .delta_B = outboard + MSTMM_FLAT_DELTA, .c = along);
+        .J_A = block + MSTMM_FLAT_S, .J_B = block + MSTMM_FLAT_S + 3,
+        .l = block + MSTMM_FLAT_DELTA, .delta_A = parent + MSTMM_FLAT_DELTA,
+        .delta_B = outboard + MSTMM_FLAT_DELTA, .c = along);
     (state->udot + body->u + 0)[0] += along[0];
     return 0;
 }

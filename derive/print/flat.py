@@ -8,12 +8,12 @@ from ..schedule.words import ROLES
 #: read of the frame of a hinge that closes a loop comes first.
 _BLOCK = {
     "body.A": ("A", 2), "body.x": ("X", 3), "body.v": ("V", 2), "body.motion": ("MOTION", 4),
-    "body.R": ("R", 2), "body.tau": ("TAU", 1), "body.S": ("S", 6), "body.e": ("E", 3),
+    "body.S": ("S", 6), "body.e": ("E", 3), "body.R": ("R", 2), "body.tau": ("TAU", 1),
     "body.delta": ("DELTA", 3), "hinge.F": ("F", 1), "hinge.g": ("OFFSET", 1),
     "hinge.G": ("GAIN", 3),
 }  # fmt: skip
 #: What closes a loop has its numbers where its frame, without mass, has none: slot -> where.
-_OF_CLOSURE = {"closure.J_A": "S", "closure.J_B": "S + 3", "closure.l": "E"}
+_OF_CLOSURE = {"closure.J_A": "S", "closure.J_B": "S + 3", "closure.l": "DELTA"}
 #: And what its record gives of it.
 _GIVEN = {
     "connection.R": ("TURN", 2), "connection.r": ("SHIFT", 3), "body.rotor": ("ROTOR", 1),
