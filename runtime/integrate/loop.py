@@ -53,6 +53,7 @@ class Status(IntEnum):
     BAD_ARGUMENT = -9
     TANGENT_FAILED = -10
     NOT_CONVERGED = -11
+    LET_THROUGH = -12
 
 
 _STATUS = {int(status): status for status in Status}
@@ -537,6 +538,9 @@ def failure_text(
         "motion; take a shorter step, or see whether a stiffness or damping is far too large",
         Status.NOT_CONVERGED: f"Newton's iteration does not converge {at}: {what} still changes; "
         + (cause or "a smaller step, or a Rosenbrock method such as rodas4p2, may help"),
+        Status.LET_THROUGH: f"{event} holds, and the motion goes on into it {at}: it throws back "
+        "what comes to it, not what lies on it; what lies still needs a stop that carries it "
+        "(law.limits with a stiffness)",
         Status.EVENT_CHATTER: f"{event} fires without end {at}",
         Status.BAD_ARGUMENT: f"check {_ARGUMENTS.get(fail.code, 'the arguments')}",
     }

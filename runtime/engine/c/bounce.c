@@ -15,6 +15,10 @@
 /* Least answer of the event, in parts of what its terms could give. */
 #define MOVED 1e-12
 
+/* Places and speeds in parts of those that the event reads, or of 1 rad or m and a second, that are
+ * still on it, and do not move against it; as runtime/run/behind.py has it. */
+#define CLOSE 1e-9
+
 /* Numbers of a bounce: slopes of its event, efforts, and three columns of speeds. */
 typedef struct {
     real *slopes, *efforts, *speeds, *before, *answer;
@@ -177,4 +181,12 @@ int mstmm_bounce(mstmm_scene_run *run, int event, real t, real *y)
     *fastest = fmax(*fastest, before.rate);
     const int rests = action->restitution * before.rate < AT_REST * *fastest;
     return rests ? MSTMM_FIRE_STOP : MSTMM_FIRE_RESTART;
+}
+
+int mstmm_lets_through(mstmm_scene_run *run, int event, real t, const real *y, real g)
+{
+    mstmm_meeting at;
+    if (!run->events[event].slopes) return 0;
+    if (mstmm_meeting_of(run, event, t, y, y + run->model->nq, &at)) return 0;
+    return g > CLOSE * at.reach && at.rate > CLOSE * (at.size + at.steepness);
 }

@@ -13,5 +13,7 @@ typedef struct mstmm_strike {
 
 /* Throws the state back from an event that has come to hold; MSTMM_FIRE_*, or < 0: a reason. */
 int mstmm_bounce(mstmm_scene_run *run, int event, real t, real *y);
+/* Is the state behind an event that throws back, whose value there is g, and moves on into it? */
+int mstmm_lets_through(mstmm_scene_run *run, int event, real t, const real *y, real g);
 
 #endif

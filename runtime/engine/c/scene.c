@@ -349,6 +349,11 @@ static int scene_fire(void *context, int event, double t, double *y)
     return action->action;
 }
 
+static int scene_lets_through(void *context, int event, double t, const double *y, double g)
+{
+    return seen_inside(context, t, &y) ? 0 : mstmm_lets_through(context, event, t, y, g);
+}
+
 /* Is there anything to do behind a step? */
 static int needs_settling(const mstmm_scene_run *run)
 {
@@ -372,6 +377,7 @@ void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system)
     system->n_switches = run->n_switches;
     system->events = scene_events;
     system->fire = scene_fire;
+    system->lets_through = scene_lets_through;
     system->n_memory = model->n_memory;
     system->memory = run->memory;
 }

@@ -229,6 +229,21 @@ int mstmm_find_switch(const mstmm_work *work) {
   return work->system->n_switches ? find_switch(work) : 0;
 }
 
+/* What an event throws back comes to it; what lay on it as the step began does not. */
+static int nothing_let_through(const mstmm_work *work) {
+  mstmm_run *run = work->run;
+  const mstmm_system *system = work->system;
+  const double t = run->real.t_stop;
+  for (int i = 0; system->lets_through && i < system->n_events; i++) {
+    if (work->truth[i] != HOLDS || !(work->g_left[i] > 0.0)) continue;
+    mstmm_dense(work, t, work->y_stage);
+    if (!system->lets_through(system->context, i, t, work->y_stage, work->g_left[i])) continue;
+    run->count.event = i;
+    return mstmm_note(run, MSTMM_LET_THROUGH, 0, -1, t);
+  }
+  return 0;
+}
+
 int mstmm_scan(const mstmm_work *work) {
   mstmm_run *run = work->run;
   int status = 0;
@@ -239,6 +254,7 @@ int mstmm_scan(const mstmm_work *work) {
     if (!status && run->count.event < 0)
       status = look(work, 0, work->system->n_events, run->real.t_scan, run->real.t_stop,
                     learn_events);
+    if (!status && run->count.event < 0) status = nothing_let_through(work);
   }
   if (!status && run->count.event < 0 && run->real.t_switch <= run->real.t_new)
     run->count.event = run->count.next_switch;

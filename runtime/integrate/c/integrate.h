@@ -30,6 +30,9 @@ typedef struct mstmm_system {
   int n_switches;
   /* Called with the accepted state at the located time.  MSTMM_FIRE_*; < 0 = failure code */
   int (*fire)(void *context, int event, double t, double *y);
+  /* Whether (t, y) moves on into event i, which held before the step and has value g there, though
+   * the event throws back what comes to it.  NULL: none does. */
+  int (*lets_through)(void *context, int event, double t, const double *y, double g);
   int n_memory;
   double *memory; /* constant within a step; changed by accept and fire alone */
   /* The right-hand side at `lanes` states side by side (2, 4 or 8; 0: there is none):
@@ -110,7 +113,8 @@ enum {
   MSTMM_EVENT_CHATTER = -8, /* `event` fires without end at one time */
   MSTMM_BAD_ARGUMENT = -9,  /* `code` says which, see mstmm_run_start */
   MSTMM_TANGENT_FAILED = -10, /* with `code`, at `fail_time` */
-  MSTMM_NOT_CONVERGED = -11   /* Newton's iteration, at `fail_time`, least of all in `component` */
+  MSTMM_NOT_CONVERGED = -11,  /* Newton's iteration, at `fail_time`, least of all in `component` */
+  MSTMM_LET_THROUGH = -12     /* what `event` should have thrown back, see lets_through */
 };
 
 /* Which tangent implicit methods take: each what suits it, the exact one, or that of laws alone. */

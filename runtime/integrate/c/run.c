@@ -187,6 +187,7 @@ static void clear(mstmm_run *run) {
   run->count.component = -1;
   run->count.event = -1;
   run->count.chatter = -1;
+  run->count.restarted = 1; /* an event that holds may come to hold again in no time */
   run->real.t = run->t_start;
   run->real.contraction = -1.0;
   run->real.smallest_step = INFINITY;
