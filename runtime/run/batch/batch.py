@@ -219,7 +219,8 @@ def _side_by_side(
     code = _scalar(model, settings) if model.packed.system.closes else None
     systems = [SceneSystem(engine, code, with_power=False) for _ in range(threads)]
     start = np.ascontiguousarray(np.concatenate([q[which], u[which]], axis=1))
-    start, _ = settled(systems[0], np.zeros(len(start)), start, np.zeros((len(start), 1)))
+    begun = np.full(len(start), settings.t_start)
+    start, _ = settled(systems[0], begun, start, np.zeros((len(start), 1)))
     numbers = np.ascontiguousarray([models[i].fusion.numbers for i in which])
     channels = [list((models[i].packed.channels | given.rows[i]).values()) for i in which]
     live = LaneInputs(engine, model.fusion.inputs, channels, numbers)
@@ -232,7 +233,8 @@ def _side_by_side(
         rows.success[i] = status is Status.FINISHED
         rows.messages[i] = _lanes_message(models[i], library, systems[0], outcome)
     flat = rows.samples[which].reshape(-1, model.nq + model.nu)
-    flat, _ = settled(systems[0], np.zeros(len(flat)), flat, np.zeros((len(flat), 1)))
+    times = np.tile(np.asarray(settings.output_times), len(which))
+    flat, _ = settled(systems[0], times, flat, np.zeros((len(flat), 1)))
     rows.samples[which] = flat.reshape(len(which), -1, model.nq + model.nu)
 
 

@@ -10,7 +10,7 @@ from reference.random_couplings import random_coupled
 
 import mstmm
 
-from .gears import Scene, coupled, inertia, pin, planetary, wheel
+from .gears import Scene, coupled, inertia, pair, pin, planetary, wheel
 
 
 def _fused(model: mstmm.Model) -> mstmm.Model:
@@ -44,6 +44,21 @@ def test_trajectories_side_by_side() -> None:
     for k, start in enumerate(starts):
         alone = model.simulate(0.1, "dop853", rtol=1e-9, initial=start, output_times=[0.0, 0.1])
         assert np.abs(batch.q[k, -1] - alone.q[-1]).max() < 1e-7
+
+
+def test_trajectories_side_by_side_go_by_time() -> None:
+    """What a coupling asks for at each time, shared out by the moments of inertia: closed form."""
+    model = _fused(pair({"name": "gear", "expression": "A.q + 3*B.q", "equals": "0.2*sin(3*t)"}))
+    times = np.linspace(0.25, 1.0, 4)
+    asked, rate = 0.2 * np.sin(3 * times), 0.6 * np.cos(3 * times)
+    q, u = np.array([0.0, asked[0] / 3]), np.array([0.1, (rate[0] - 0.1) / 3])
+    batch = model.simulate_batch((q[None], u), t_start=0.25, t_end=1.0, output_times=times)
+    assert "side by side" in batch.engine, batch.engine
+    mobilities = np.array([1 / 0.02, 3 / 0.3])
+    shares = mobilities / (mobilities @ [1, 3])
+    coasting = np.outer(times - 0.25, u - rate[0] * shares)
+    assert np.abs(batch.q[0] - q - coasting - np.outer(asked - asked[0], shares)).max() < 1e-8
+    assert np.abs(batch.u[0] - u - np.outer(rate - rate[0], shares)).max() < 1e-8
 
 
 def test_what_parts_is_named() -> None:
