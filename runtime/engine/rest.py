@@ -271,7 +271,9 @@ def leaving(problem: Rest, q: Array) -> tuple[int, ...]:
     """Coordinates that leave a rest once it is disturbed, as their stiffness is negative; none
     where efforts have no potential, whose stiffness does not tell.
 
-    Raises Undetermined for directions whose stiffness is rounding beside that of their coordinates.
+    Raises Undetermined for directions whose stiffness is rounding beside that of their coordinates,
+    Unsettled where efforts are left that no small motion takes away: beside a coordinate without
+    stiffness of its own another one may count as so stiff that steps get short far from rest.
     """
     slope, noise = _noise(problem, q)
     nothing = _NOTHING * float(np.abs(slope).max(initial=0.0))
@@ -289,4 +291,7 @@ def leaving(problem: Rest, q: Array) -> tuple[int, ...]:
     loose = np.abs(values) <= unsure
     if loose.any():
         raise Undetermined(moving(loose), problem)
+    residual = problem.efforts(q)
+    if np.abs(residual).max(initial=0.0) > len(slope) * _COARSE * np.abs(slope).max(initial=0.0):
+        raise Unsettled("steps get short far from rest", residual / problem.sizes, problem)
     return () if _is_skew(slope, scale) else moving(values < 0)

@@ -110,6 +110,20 @@ def test_a_disc_that_stands() -> None:
     assert sorted(np.abs(found))[:-1] == pytest.approx([0, 0], abs=1e-6)
 
 
+def test_a_disc_that_leans() -> None:
+    """No rest is near: its weight pulls it over with m g r sin(lean), 0.2 rad off, or 0.8 N m."""
+    free = {"name": "at", "type": "free", "inboard": "ground", "outboard": "disc",
+            "initial": {"q": [0, 0, 0.2, 1, 0.1, 0, 0]}}  # fmt: skip
+    leaning = compiled({
+        "gravity": [0, 0, -GRAVITY], "hinge": [free],
+        "body": [{"name": "disc", "mass": 2.0, "inertia": [0.02, 0.04, 0.02]}],
+        "constraint": [{"name": "road", "type": "rolling", "from": "ground", "to": "disc",
+                        "normal": [0, 0, 1], "radius": 0.2, "axis": [0, 1, 0]}],
+    })  # fmt: skip
+    with pytest.raises(mstmm.NumericalFailure, match="no equilibrium found near the start"):
+        leaning.equilibrium()
+
+
 def test_slopes_of_accelerations() -> None:
     """K and C of rods that are distances, by central differences between closed states."""
     scene = governor("constraint")
