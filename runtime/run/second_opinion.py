@@ -56,7 +56,7 @@ _STUCK = 20
 #: LSODA before SciPy 1.17 keeps its state in one place for the whole process: one run at a time.
 _ONE_LSODA = RLock()
 
-#: Two breaks so near to each other, as part of the time or the run, are one.
+#: Two times so near to each other, as part of the time or the run, are one.
 _GAP = 2.0**-39
 
 #: An integrator that keeps its history to itself begins anew where its state is so many tolerances
@@ -174,6 +174,8 @@ class _Loop:
         self.thrown = min((bounce.restitution for bounce in bounces), default=1.0)
         self.bounces = {bounce.event for bounce in bounces}
         self.aloft: int | None = None
+        #: What is met at the end of the last step, though closing loops may have drawn it back.
+        self.due: int | None = None
         self.sizes: list[float] = []
         self.t, self.last = settings.t_start, np.zeros(0)
         self.interrupted = Interrupt()
@@ -214,8 +216,7 @@ class _Loop:
 
         Between two breaks that are one but for rounding nothing changes.
         """
-        span = self.settings.t_end - self.settings.t_start
-        if stop - self.t <= _GAP * max(abs(self.t), span):
+        if self.is_now(stop):
             self.t = stop
             return y
         self.system.bounds = (np.nextafter(self.t, np.inf), np.nextafter(stop, -np.inf))
@@ -225,6 +226,11 @@ class _Loop:
             y = self.stretch(y, stop)
         self.fire_here(y)
         return y
+
+    def is_now(self, t: float) -> bool:
+        """Whether a time is this one, but for rounding."""
+        span = self.settings.t_end - self.settings.t_start
+        return abs(t - self.t) <= _GAP * max(abs(self.t), span)
 
     def stretch(self, y: Array, stop: float) -> Array:
         """Steps of one integrator, up to `stop`, an event or a switch.
@@ -258,7 +264,6 @@ class _Loop:
             self.t, self.last = float(end), self.system.remember(end, y)
             self.tell(end)
             if event is not None:
-                self.met, self.apart = self.t, self.t - self.met
                 self.crossed(event)
                 return np.array(self.last)
             self.sample(end, solver.y)
@@ -320,7 +325,9 @@ class _Loop:
         return _Ended(Status.TOO_MANY_STEPS, text)
 
     def crossed(self, event: tuple[int, float]) -> None:
-        """The step ended where a switch crosses."""
+        """The step ended where a switch crosses, or what an event strikes is met."""
+        if event[0] in self.bounces:
+            self.due = event[0]
         if event[0] >= self.n_events:
             self.crossings.note(event[0] - self.n_events, self.t)
             if self.outputs is None:
@@ -390,7 +397,11 @@ class _Loop:
         values = self.events(self.t, y)
         self.truth &= values >= 0
         self.last = np.array(y)
-        for i in np.flatnonzero((values >= 0) & ~self.truth):
+        rising = (values >= 0) & ~self.truth
+        due, self.due = self.due, None
+        if due is not None:
+            rising[due] = True
+        for i in np.flatnonzero(rising):
             return self.fire(int(i), y)
         return False
 
@@ -400,6 +411,8 @@ class _Loop:
         answer = self.system.fire(event, t, y)
         self.last = np.array(y)
         self.truth[event], self.fired = True, self.fired + 1
+        if not self.is_now(self.met):
+            self.met, self.apart = t, t - self.met
         if self.rows and self.rows[-1][0] == t and np.array_equal(self.rows[-1][1], y):
             self.rows.pop()
         if answer != lib.MSTMM_FIRE_STOP:
