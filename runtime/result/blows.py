@@ -44,6 +44,12 @@ def kept_by_blows(
     return kept
 
 
+def is_struck(result: Record) -> bool:
+    """Whether something was thrown back in a run; True also where output times hide its events."""
+    blows = _blows(result)
+    return blows is None or bool(blows)
+
+
 def _blows(result: Record) -> list[tuple[int, int]] | None:
     """(sample, event) of each of them; None where there may be some that no sample shows."""
     thrown = {bounce.event for bounce in result.model.packed.watched.bounces}

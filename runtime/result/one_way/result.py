@@ -15,6 +15,7 @@ from ...engine.compiled import Compiled
 from ...pack.flexible.rigidified import with_level
 from ...pack.letting_go import releasable
 from ...run.start import initial_state
+from ..blows import is_struck
 from ..flexible.bodies import FlexibleBodies
 from ..flexible.coupling import couplings
 from ..flexible.motion import Motion
@@ -60,6 +61,14 @@ def _let_go(model: Compiled) -> tuple[Risk, ...]:
     )  # fmt: skip
 
 
+def _not_struck(name: str) -> Risk:
+    return Risk(
+        "one-way-blow", f'"{name}"',
+        f'the run has blows, of which the response of "{name}" knows nothing: it follows the loads '
+        "between them alone", 'take flexibility = "coupled"',
+    )  # fmt: skip
+
+
 class OneWayResult(Result):
     """What a run gave whose one-way bodies were rigid in it, and their elastic response.
 
@@ -99,6 +108,8 @@ class OneWayResult(Result):
     def _outside(self) -> tuple[Risk, ...]:
         """As of any result, and where the response is not to be trusted."""
         found = (*super()._outside(), *self._one_way.risks, *_let_go(self.model))
+        if is_struck(self):
+            found = (*found, *map(_not_struck, rigidity(self.model).one_way))
         return (*found, *map(_too_coupled, self.couplings.items()))
 
     @cached_property
