@@ -86,6 +86,7 @@ def seeded(scene: Scene, known: Known, names: Sequence[str], seed: Seed) -> tupl
     """
     changed, moving = _with_seeds(scene, names, seed)
     plain, frames = system_of(scene, known, align=False)
+    _refuse_first_rotors(scene, names, frames)
     system, found = system_of(changed, known, align=False, flexible=frames.modal, moving=moving)
     numbers = [value_of(x) for x in structure_and_numbers(system, known)[1]]
     _check(structure_of(plain, known)[1].tolist(), numbers)
@@ -106,6 +107,24 @@ def refuse_folded(scene: Scene, names: Sequence[str], lacking: str) -> None:
             f'parameter "{name}": numbers of flexible bodies, and of loads along them, and those '
             f"that turn a constraint or begin it have no {lacking} (with_parameters)"
         )
+
+
+def _refuse_first_rotors(scene: Scene, names: Sequence[str], frames: Frames) -> None:
+    """A rotor on a hinge that closes a loop holds the loop by what is one over its inertia."""
+    cuts = {cut.hinge for cut in frames.expanded.cuts}
+    rotors = {
+        f"{hinge.name}.law.inertia[{k}]": value
+        for hinge in scene.hinge if hinge.name in cuts
+        for k, value in enumerate(hinge.law.inertia)
+    }  # fmt: skip
+    for name in parameters.resolved(scene, names):
+        if rotors.get(name, 1.0) == 0:
+            hinge = name.partition(".")[0]
+            raise SceneError(
+                f'parameter "{name}": hinge "{hinge}" closes a loop without a rotor, and has no '
+                "exact derivative by the first one there; give it cut = false, or take a "
+                "difference of two models (with_parameters)"
+            )
 
 
 def folded(scene: Scene, names: Iterable[str]) -> list[str]:

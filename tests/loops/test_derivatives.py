@@ -65,6 +65,33 @@ def test_by_numbers_of_the_scene() -> None:
         assert worst(found[name], (sides[0] - sides[1]) / (2 * STEP)) < 1e-7
 
 
+def test_by_rotors() -> None:
+    """Of hinges that stay in the tree, and of one that is cut and has a rotor: by differences.  The
+    first rotor on a cut hinge has none, whether somebody chose the cut or not."""
+    cut = compiled(four_bar(speed=1.0, cut="tip"))
+    q, u = cut.initial_state()
+    for model in (cut, compiled(four_bar(speed=1.0, cut="tip", laws={"tip": {"inertia": 0.02}}))):
+        for name in (f"{hinge}.law.inertia[0]" for hinge in ("foot", "knee", "end", "tip")):
+            value = model.parameters[name]
+            if name.startswith("tip") and not value:
+                with pytest.raises(mstmm.errors.SceneError, match="closes a loop without a rotor"):
+                    model.derivatives(q, u, parameters=[name])
+                continue
+            found = model.derivatives(q, u, parameters=[name]).parameters[name]
+            after, much = (
+                model.with_parameters({name: value + k * STEP}).accelerations(q, u) for k in (1, 2)
+            )
+            slope = (4 * after - much - 3 * model.accelerations(q, u)) / (2 * STEP)
+            assert worst(found, slope) < 1e-6
+    scene = four_bar(speed=1.0)
+    for hinge in scene["hinge"]:
+        del hinge["cut"]
+    model = compiled(scene)
+    (chosen,) = model.loops.cut
+    with pytest.raises(mstmm.errors.SceneError, match=f'hinge "{chosen}" closes a loop'):
+        model.derivatives(q, u, parameters=[f"{chosen}.law.inertia[0]"])
+
+
 def test_those_of_linear_models() -> None:
     """At rest, along the independent motion: -M^-1 K and -M^-1 C."""
     model = compiled(four_bar(laws=SPRINGS, tilt=OBLIQUE))
