@@ -168,3 +168,34 @@ def test_what_a_file_switches_off_is_off(off: str, tmp_path: Path) -> None:
     mujoco.mj_forward(peer, data)
     found = mstmm.compile(mstmm.load_scene(path)).accelerations([0.3], [0.7])
     assert found == pytest.approx(data.qacc, rel=1e-12)
+
+
+COUPLED = """<mujoco><option><flag {flag}/></option><worldbody><body>
+  <joint name="swing" axis="0 1 0" frictionloss="0.4"/>
+  <geom type="box" size="0.1 0.2 0.3" mass="2" pos="0.2 0 0.1"/><body pos="0.4 0 0">
+  <joint name="elbow" axis="0 1 0"/><geom type="box" size="0.1 0.1 0.3" pos="0.2 0 0" mass="1"/>
+  </body></body></worldbody>
+  <equality><joint joint1="elbow" joint2="swing" {active} polycoef="0 2 0 0 0"/></equality>
+</mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("flag", "active"),
+    [
+        ('constraint="disable"', ""),
+        ('equality="disable" frictionloss="disable" contact="disable"', ""),
+        ('frictionloss="disable" contact="disable"', 'active="false"'),
+    ],
+)
+def test_equalities_that_are_off(flag: str, active: str, tmp_path: Path) -> None:
+    """They couple nothing, and a note tells of them."""
+    path = tmp_path / "robot.xml"
+    path.write_text(COUPLED.format(flag=flag, active=active))
+    peer = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(peer)
+    data.qpos[:], data.qvel[:] = [0.3, 0.1], [0.7, -0.2]
+    mujoco.mj_forward(peer, data)
+    robot = mstmm.import_robot(path)
+    assert any(note.text == "left out, as it is off" for note in robot.notes)
+    found = mstmm.compile(robot.scene).accelerations(data.qpos, data.qvel)
+    assert found == pytest.approx(data.qacc, rel=1e-12)

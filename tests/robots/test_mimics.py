@@ -56,6 +56,16 @@ def test_a_joint_starts_where_the_other_one_is() -> None:
     np.testing.assert_allclose(q, [0.5, 1.25], rtol=0, atol=1e-14)
 
 
+def test_what_goes_with_none_of_it_is_held() -> None:
+    """q = 0 q_other + 0.25, which MJCF and URDF may say."""
+    robot = chain(pin(0, 0.5), pin(1), mimics=(Mimic("j1", "j0", 0.0, 0.25),))
+    found = converted(robot, Choices())
+    assert not found.scene.coupling
+    assert "held at 0.25; it mimics another" in [note.text for note in found.notes]
+    run = mstmm.compile(found.scene, engine="looped").simulate(0.2)
+    assert run.success and (run.coordinate("j1") == 0.25).all()
+
+
 @pytest.mark.parametrize("merge", [True, False])
 def test_what_goes_with_a_joint_that_does_not_move_is_held(merge: bool) -> None:
     robot = chain(

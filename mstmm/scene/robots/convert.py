@@ -317,7 +317,9 @@ class _Writer:
 
     def _is_coupled(self, name: str) -> bool:
         """Whether a joint that mimics another one goes with it; else it is held."""
-        return self.choices.mimics == COUPLED and self._moves(self.mimics[name].other)
+        mimic = self.mimics[name]
+        follows = mimic.multiplier != 0 and self._moves(mimic.other)
+        return self.choices.mimics == COUPLED and follows
 
     def _starts(self) -> dict[str, float]:
         """Start values of the joints that go with others."""

@@ -47,6 +47,8 @@ _NAMED = {
     "exclude": ("nexclude", "contact"),
 }  # fmt: skip
 _JOINT_EQUALITY = 2
+#: What the flag "constraint" switches off too.
+_CONSTRAINTS = ("limit", "frictionloss", "equality")
 #: So much of what MuJoCo says is told, in characters.
 _LONGEST = 400
 #: Groups of shapes that are there to be seen.
@@ -97,8 +99,9 @@ class _Reader:
 
     def _off(self, what: str) -> bool:
         """Whether a <flag> of the file switches it off."""
-        bit = getattr(self._mujoco.mjtDisableBit, f"mjDSBL_{what.upper()}")
-        return bool(self._m.opt.disableflags & int(bit))
+        flags = (what, "constraint") if what in _CONSTRAINTS else (what,)
+        bits = (getattr(self._mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}") for flag in flags)
+        return any(self._m.opt.disableflags & int(bit) for bit in bits)
 
     def _tell(self, element: str, text: str, where: str = "") -> None:
         self._notes.append(Note(where or self._where, element, text))
@@ -218,9 +221,12 @@ class _Reader:
         return keys | ({"initial": {"q": start}} if any(start) else {})
 
     def _mimics(self) -> Iterator[Mimic]:
-        """Equalities of joints that are straight lines."""
-        m = self._m
+        """Equalities of joints that are straight lines, but for those that are off."""
+        m, off = self._m, self._off("equality")
         for number in range(m.neq):
+            if off or not m.eq_active0[number]:
+                self._leave_equality(number, "left out, as it is off")
+                continue
             line = [float(x) for x in m.eq_data[number][:5]]
             one, other = int(m.eq_obj1id[number]), int(m.eq_obj2id[number])
             if m.eq_type[number] != _JOINT_EQUALITY or other < 0 or any(line[2:]):
@@ -230,10 +236,10 @@ class _Reader:
             offset = first + line[0] - line[1] * second
             yield Mimic(self._name("joint", one), self._name("joint", other), line[1], offset)
 
-    def _leave_equality(self, number: int) -> None:
+    def _leave_equality(self, number: int, what: str = "left out") -> None:
         name, kinds = self._name("equality", number), self._mujoco.mjtEq
         kind = kinds(int(self._m.eq_type[number])).name.removeprefix("mjEQ_").lower()
-        self._tell(f"equality {name!r} ({kind})", "left out", self._at("equality", name))
+        self._tell(f"equality {name!r} ({kind})", what, self._at("equality", name))
 
     def _looks(self) -> Iterator[Look]:
         m, kinds, unseen = self._m, self._mujoco.mjtGeom, 0
