@@ -199,3 +199,24 @@ def test_equalities_that_are_off(flag: str, active: str, tmp_path: Path) -> None
     assert any(note.text == "left out, as it is off" for note in robot.notes)
     found = mstmm.compile(robot.scene).accelerations(data.qpos, data.qvel)
     assert found == pytest.approx(data.qacc, rel=1e-12)
+
+
+CURVED = """<mujoco><worldbody><body><joint name="swing" axis="0 1 0" stiffness="{}" damping="{}"/>
+  <geom type="box" size="0.1 0.2 0.3" mass="2" pos="0.2 0 0.1"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.skipif(
+    not hasattr(mujoco.MjModel, "jnt_stiffnesspoly"), reason="this MuJoCo has straight lines alone"
+)
+@pytest.mark.parametrize(
+    ("stiffness", "damping", "told"), [("2 0.3", "1", "spring"), ("2", "1 0 0.1", "damper")]
+)
+def test_curves_of_springs_and_dampers_are_told(
+    stiffness: str, damping: str, told: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "robot.xml"
+    path.write_text(CURVED.format(stiffness, damping))
+    notes = [
+        note.text for note in mstmm.import_robot(path).notes if "beyond the first" in note.text
+    ]
+    assert notes == [f"of its {told} the terms beyond the first are left out"]

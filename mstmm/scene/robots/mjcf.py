@@ -193,6 +193,7 @@ class _Reader:
                 continue
             if (found := [float(x) for x in numbers[dof:stop]]) and any(found):
                 law[key] = found
+        self._tell_of_curves(number, dof, joint, where)
         losses = [float(x) for x in m.dof_frictionloss[dof:stop]]
         if any(losses) and not self._off("frictionloss"):
             law["friction"] = [{"coulomb": x} for x in losses]
@@ -219,6 +220,17 @@ class _Reader:
             self._tell(f"joint {joint!r}", text, where)
         start = [float(x) for x in m.qpos0[at:values]]
         return keys | ({"initial": {"q": start}} if any(start) else {})
+
+    def _tell_of_curves(self, number: int, dof: int, joint: str, where: str) -> None:
+        """What springs and dampers have besides the straight line, where MuJoCo knows it."""
+        for what, key, place in (
+            ("spring", "jnt_stiffness", number),
+            ("damper", "dof_damping", dof),
+        ):
+            terms = getattr(self._m, f"{key}poly", None)
+            if terms is not None and terms[place].any() and not self._off(what):
+                text = f"of its {what} the terms beyond the first are left out"
+                self._tell(f"joint {joint!r}", text, where)
 
     def _mimics(self) -> Iterator[Mimic]:
         """Equalities of joints that are straight lines, but for those that are off."""
