@@ -520,7 +520,8 @@ def failure_text(
         Status.NOT_FINITE: f"not finite {at}: {what}; "
         + (cause or "a smaller step or tolerance may help"),
         Status.RHS_FAILED: f"the equations of motion cannot be evaluated {at} (code {fail.code})",
-        Status.ACCEPT_FAILED: f"the state cannot be accepted {at} (code {fail.code})",
+        Status.ACCEPT_FAILED: f"the state cannot be accepted {at} (code {fail.code})"
+        + (f"; {cause}" if cause else ""),
         Status.EVENT_FAILED: f"an event condition cannot be evaluated {at} (code {fail.code})"
         if fail.code
         else f"the condition of {event} is not a number {at}",

@@ -251,7 +251,8 @@ def _lanes_message(
         return model.looped.failure_text(failure, outcome.fail_time) + last
     component = None if outcome.component < 0 else int(outcome.component)
     failure = Failure(status, float(outcome.fail_time), component, None, int(outcome.code))
-    way_out = "simulate this one alone to learn the cause" if status is Status.NOT_FINITE else ""
+    untold = status in (Status.NOT_FINITE, Status.ACCEPT_FAILED)
+    way_out = "simulate this one alone to learn the cause" if untold else ""
     return failure_text(failure, system.components(), cause=way_out) + last
 
 

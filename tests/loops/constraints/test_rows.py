@@ -144,6 +144,11 @@ def test_a_disc_that_falls_flat() -> None:
     result = model.simulate(2.0, "dop853", rtol=1e-6, initial=(q, 0 * u))
     assert not result.success
     assert 'constraint "road"' in result.message and "lies flat" in result.message
+    batch = mstmm.compile(model.scene, engine="fused").simulate_batch((q[None], 0 * u), t_end=2.0)
+    assert not batch.success[0] and batch.messages[0].startswith(
+        "the state cannot be accepted at t"
+    )
+    assert "simulate this one alone to learn the cause" in batch.messages[0]
 
 
 # --- a bead on a wire, a governor -----------------------------------------------------------------
