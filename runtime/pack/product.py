@@ -81,7 +81,7 @@ def _refuse(packed: Packed) -> None:
     if packed.flexible:
         name = next(iter(packed.flexible))
         raise SceneError(f'"{name}" is flexible; the product runs rigid chains only; {way_out}')
-    refuse_beyond_hinges(packed, 'sweep = "product"')
+    refuse_beyond_hinges(packed, 'sweep = "product"', way_out)
     hinges = _along_chain(packed)
     for hinge in hinges:
         if _kind(hinge) is None:

@@ -108,3 +108,9 @@ def test_what_is_refused() -> None:
     rotor = four_bar(cut="end", laws={"end": {"inertia": 0.1}})
     with pytest.raises(mstmm.SceneError, match=r'hinge "end": drives and rotor inertia.*riccati'):
         mstmm.compile(mstmm.Scene(**rotor), sweep="product")
+    geared = four_bar(cut="tip") | {
+        "coupling": [{"name": "mesh", "expression": "foot.q - 2*end.q"}]
+    }
+    del geared["hinge"][2]
+    with pytest.raises(mstmm.SceneError, match=r'coupling "mesh" closes a loop.*use .*riccati'):
+        mstmm.compile(mstmm.Scene(**geared), sweep="product")

@@ -8,14 +8,11 @@ from mstmm.errors import SceneError
 from mstmm.scene.checks.topology import build
 from mstmm.scene.tables.closures import ROLLING
 
-from ...integrate.steppers import EXPLICIT_METHODS, ON_POSITIONS
+from ...integrate.steppers import ON_POSITIONS
 from .may_close import named_loop
 
 if TYPE_CHECKING:
     from ..packed import Packed
-
-#: What does follow closed loops.
-INSTEAD = f"accelerations and simulate with {EXPLICIT_METHODS} do"
 
 
 def refuse(packed: Packed, what: str, instead: str) -> None:
@@ -42,17 +39,15 @@ def refuse_of_speeds(packed: Packed, method: str) -> None:
         )
 
 
-def refuse_beyond_hinges(packed: Packed, what: str) -> None:
-    """SceneError where more than hinges of rigid bodies closes loops, which `what` cannot follow
-    yet."""
-    if packed.flexible:
-        refuse(packed, f"{what} with flexible bodies", INSTEAD)
+def refuse_beyond_hinges(packed: Packed, what: str, instead: str) -> None:
+    """SceneError where more than hinges closes loops, which `what` cannot follow yet; `instead`
+    does."""
     scene = packed.described
     names = [f'coupling "{one.name}"' for one in scene.coupling]
     names += [f'constraint "{one.name}"' for one in scene.constraint]
     if names:
         raise SceneError(
-            f"scene: {names[0]} closes a loop, and {what} cannot follow that yet; {INSTEAD}"
+            f"scene: {names[0]} closes a loop, and {what} cannot follow that yet; {instead}"
         )
 
 
