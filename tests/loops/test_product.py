@@ -101,6 +101,17 @@ def test_digits_go_along_a_closed_chain_as_along_an_open_one() -> None:
         mstmm.compile(mstmm.Scene(**scene), sweep="product", accuracy=1e-14).accelerations(q, u)
 
 
+def test_a_mechanism_at_rest() -> None:
+    """Where nothing accelerates, what deviates is rounding of what the open chain would do; the
+    natural motion is that by the sweep."""
+    scene = mstmm.Scene(**four_bar(cut="end", laws={"tip": {"damping": 0.05}}))
+    model = mstmm.compile(scene, sweep="product")
+    rest = np.asarray(model.equilibrium())
+    assert np.abs(model.accelerations(rest, np.zeros(4))).max() < 1e-11
+    found, wanted = (one.modes().omega for one in (model, mstmm.compile(scene)))
+    assert worst(found, wanted) < 1e-9
+
+
 def test_what_is_refused() -> None:
     branches = four_bar(cut="tip")
     with pytest.raises(mstmm.SceneError, match=r"unbranched chain, the hinges .* cut .*riccati"):

@@ -62,7 +62,8 @@ void mstmm_product_offset(const mstmm_state *state, int index, real *offset);
 int mstmm_product_root(const mstmm_state *state, const real *overall, int alone, real *root);
 /* Accelerations and deviations of the chain under a load.  Nonzero = failure code. */
 int mstmm_product_chain(mstmm_state *state, int load);
-/* The same with the loops closed that end on it, behind a sweep. */
-int mstmm_product_closed(mstmm_state *state);
+/* The same with the loops closed that end on it, behind a sweep; `open` is raised to the largest
+ * acceleration of the open chain, of which closing leaves the difference. */
+int mstmm_product_closed(mstmm_state *state, real *open);
 
 #endif

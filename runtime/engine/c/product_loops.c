@@ -86,7 +86,7 @@ static int solved(int n, real *system, real *x)
     return 0;
 }
 
-int mstmm_product_closed(mstmm_state *state)
+int mstmm_product_closed(mstmm_state *state, real *open)
 {
     const mstmm_model *model = state->model;
     const int rows = model->n_rows;
@@ -98,6 +98,8 @@ int mstmm_product_closed(mstmm_state *state)
     }
     for (int which = -1; which < rows && !code; which++) {
         code = mstmm_product_chain(state, which < 0 ? ACTING : which);
+        for (int k = 0; k < model->nu && which < 0; k++)
+            *open = fmax(*open, fabs(mstmm_product_accelerations(state)[k]));
         if (!code) column(state, which, system, which < 0 ? rows : which, rows + 1);
     }
     if (!code && solved(rows, system, x))
