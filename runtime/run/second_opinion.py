@@ -118,6 +118,11 @@ class Equations:
             raise _Ended(Status.EVENT_FAILED, text)
         return values
 
+    def lets_through(self, event: int, t: float, y: Array, value: float) -> bool:
+        """Whether a state moves on into an event that throws back, whose value there is given."""
+        state = self._c(np.ascontiguousarray(y, dtype=np.float64))
+        return bool(self.calls.lets_through(self.calls.context, event, t, state, value))
+
     def remember(self, t: float, y: Array) -> Array:
         """After a step: memory of turns brought up to date; the settled state."""
         state = np.array(y)
@@ -267,8 +272,10 @@ class _Loop:
                 self.crossed(event)
                 return np.array(self.last)
             self.sample(end, solver.y)
-            self.truth &= self.events(end, solver.y) >= 0
+            values = self.events(end, solver.y)
+            self.truth &= values >= 0
             self.refuse_unseen_flight()
+            self.refuse_let_through(solver.y, values)
             if self.closes and not _goes_on(solver, self.last, self.atol, self.settings.rtol):
                 break
         return np.array(self.last)
@@ -278,6 +285,14 @@ class _Loop:
         thrown, self.aloft = self.aloft, None
         if thrown is not None and self.truth[thrown]:
             raise self.stopped(thrown)
+
+    def refuse_let_through(self, y: Array, values: Array) -> None:
+        """What lies on an event that throws back is not thrown back by it."""
+        for event in self.bounces:
+            if self.truth[event] and self.system.lets_through(event, self.t, y, values[event]):
+                found = Failure(Status.LET_THROUGH, self.t, None, event, 0)
+                text = failure_text(found, events=self.system.scene.event_names)
+                raise _Ended(Status.LET_THROUGH, text)
 
     def stopped(self, event: int) -> _Ended:
         """The end of a run that an event stops, or what comes to rest there."""

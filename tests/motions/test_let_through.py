@@ -54,6 +54,18 @@ def test_flights_that_are_too_short_for_a_fixed_step(method: str) -> None:
     assert result.q.min() > -1e-12
 
 
+@pytest.mark.parametrize(
+    ("method", "speed"),
+    [("dop853", 1e-5), ("rodas4p2", 1e-5), ("scipy-DOP853", 1e-5), ("scipy-LSODA", 2e-9)],
+)
+def test_what_hardly_leaves_the_floor_stays_above_it(method: str, speed: float) -> None:
+    """By what is seen of its flights it comes to rest, or is told to lie there."""
+    model = mstmm.compile(mstmm.Scene(**block(speed=speed, gravity=-20.0)))
+    result = model.simulate(1.0, method)
+    assert "what lies still needs a stop" in result.message
+    assert result.q.min() > -1e-6
+
+
 def test_the_first_flight_is_seen() -> None:
     """It takes 2 u / a = 1e-6 s of a first step of 1e-3 s."""
     model = mstmm.compile(mstmm.Scene(**block(speed=9.5e-6, gravity=-20.0)))
