@@ -117,7 +117,8 @@ def _sweep() -> Section:
 
 def _methods() -> Section:
     from mstmm.runtime.integrate.steppers import AUTO, AUTO_EXPLICIT, get, names
-    from mstmm.runtime.run import classical, sundials
+    from mstmm.runtime.run import classical
+    from mstmm.runtime.run.second_opinion import sundials
 
     rows, data = [], []
     for name in names():

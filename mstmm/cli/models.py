@@ -68,7 +68,8 @@ def load_method(name: str) -> None:
     SceneError for a method that does not exist, EnvironmentFailure for one whose package is not
     installed.
     """
-    from mstmm.runtime.run import classical, sundials
+    from mstmm.runtime.run import classical
+    from mstmm.runtime.run.second_opinion import sundials
 
     if name in classical.METHODS:
         return

@@ -9,7 +9,8 @@ from mstmm.scene.rules.messages import near
 
 from ..integrate.steppers import AUTO, ON_POSITIONS, get, names
 from ..integrate.steppers.implicit import ALPHA, DIRK, EXPONENTIAL, ROSENBROCK
-from ..run import classical, second_opinion, sundials
+from ..run import classical, second_opinion
+from ..run.second_opinion import sundials
 from .point import Setting
 
 #: Relative tolerances, loose to tight.

@@ -146,7 +146,7 @@ def test_a_trial_that_failed_and_recovered_is_not_blamed_for_the_end(
                 self.failure = 'spring "band" at t = 0.05 s'
             return super().rates(t, y)
 
-    monkeypatch.setattr(second_opinion, "Equations", Stumbling)
+    monkeypatch.setattr(second_opinion.integration, "Equations", Stumbling)
     model = mstmm.compile(motor("1/max(0.5 - t, 0)^2", speed=1.0))
     run = model.simulate(1.0, method="scipy-RK45", rtol=1e-6)
     assert not run.success and "band" not in run.message and "0.5" in run.message

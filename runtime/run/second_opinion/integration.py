@@ -1,4 +1,4 @@
-"""Integrators of others on the very same compiled call-backs: a second opinion on every run.
+"""Runs by integrators of others, step by step.
 
 The classes behind `scipy.integrate.solve_ivp`, and CVODE of SUNDIALS, are driven step by step, so
 that breaks, events, releases, output times and Ctrl-C mean what they mean in the C loop.
@@ -10,7 +10,6 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
-from functools import cache
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
@@ -19,20 +18,19 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 
-from ..engine.jacobian import Jacobian
-from ..host.interruptible import Interrupt, interruptible
-from ..integrate.loop import Failure, Samples, Statistics, Status, failure_text
-from ..integrate.settings import Settings
+from ...host.interruptible import Interrupt, interruptible
+from ...integrate.loop import Failure, Samples, Statistics, Status, failure_text
+from ...integrate.settings import Settings
+from ..crossings import Crossings, Sight, dip, just_before
+from ..endings import busiest, cause_of, end_of_curve, rest_of
+from ..notes import endless
+from ..simulate import split, tolerances
+from ..trajectory import Trajectory
 from . import sundials
-from .crossings import Crossings, Sight, dip, just_before
-from .endings import busiest, cause_of, end_of_curve, rest_of
-from .notes import endless
-from .simulate import split, tolerances
-from .system import SceneSystem
-from .trajectory import Trajectory
+from .call_backs import Ended, Equations
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
+    from ...engine.compiled import Compiled
 
 
 #: Method of `simulate` -> name of SciPy's class, or of CVODE's method.
@@ -62,80 +60,6 @@ _GAP = 2.0**-39
 #: An integrator that keeps its history to itself begins anew where its state is so many tolerances
 #: beside the closed one: its errors are as large anyway, and it begins with steps of order 1.
 _BESIDE = 100.0
-
-
-class _Ended(Exception):
-    """The run is over before its end: why, and a sentence."""
-
-    def __init__(self, status: Status, message: str) -> None:
-        super().__init__(message)
-        self.status, self.message = status, message
-
-
-class Equations:
-    """The call-backs of a model, taken from the C structure and called from Python."""
-
-    def __init__(self, model: Compiled) -> None:
-        self.engine = model.looped
-        self.scene = SceneSystem(self.engine)
-        self.calls = self.scene.system
-        self.ffi = self.engine.ffi
-        self.bounds = (-np.inf, np.inf)
-        self.failure, self.evaluations = "", 0
-        memory = self.scene.memory
-        self._jacobian = cache(lambda: Jacobian(model, self.scene.with_power, memory, self.rates))
-
-    def rates(self, t: float, y: Array) -> Array:
-        """dy/dt; nan where it cannot be evaluated, which makes SciPy try a smaller step."""
-        state, rates = np.ascontiguousarray(y, dtype=np.float64), np.empty(len(y))
-        code = self.calls.rhs(self.calls.context, self._inside(t), self._c(state), self._c(rates))
-        self.evaluations += 1
-        if code:
-            self.failure = self.engine.failure_text(self.scene.run.failure, t)
-            rates[:] = np.nan
-        return rates
-
-    def jacobian(self, t: float, y: Array) -> Array:
-        """d(dy/dt)/dy, (n, n)."""
-        return self._jacobian()(self._inside(t), np.ascontiguousarray(y, dtype=np.float64))
-
-    def _inside(self, t: float) -> float:
-        """A break is never seen itself."""
-        return min(max(t, self.bounds[0]), self.bounds[1])
-
-    def _c(self, array: Array) -> Any:
-        return self.ffi.from_buffer("double[]", array)
-
-    def events(self, t: float, y: Array) -> Array:
-        """Values of the events; negative where they are not true."""
-        return self.watched(t, y)[: self.calls.n_events]
-
-    def watched(self, t: float, y: Array) -> Array:
-        """Values of the events, and behind them the margins of switches."""
-        values = self.scene.watched(t, y)
-        if values is None:
-            text = self.engine.failure_text(self.scene.run.failure, t)
-            raise _Ended(Status.EVENT_FAILED, text)
-        return values
-
-    def lets_through(self, event: int, t: float, y: Array, value: float) -> bool:
-        """Whether a state moves on into an event that throws back, whose value there is given."""
-        state = self._c(np.ascontiguousarray(y, dtype=np.float64))
-        return bool(self.calls.lets_through(self.calls.context, event, t, state, value))
-
-    def remember(self, t: float, y: Array) -> Array:
-        """After a step: memory of turns brought up to date; the settled state."""
-        state = np.array(y)
-        if self.calls.accept == self.ffi.NULL:
-            return state  # there is nothing to settle
-        if self.calls.accept(self.calls.context, t, self._c(state)) > 0:  # below 0: rates change
-            text = self.engine.failure_text(self.scene.run.failure, t)
-            raise _Ended(Status.ACCEPT_FAILED, text)
-        return state
-
-    def fire(self, event: int, t: float, y: Array) -> int:
-        """What it answers; a bounce changes y in place."""
-        return int(self.calls.fire(self.calls.context, event, t, self._c(y)))
 
 
 def integrate(
@@ -205,7 +129,7 @@ class _Loop:
                 for stop in [*inner, settings.t_end]:
                     y = self.piece(y, stop)
                 status, message = Status.FINISHED, f"finished at t = {self.t:.9g} s"
-            except _Ended as ended:
+            except Ended as ended:
                 status, message = ended.status, ended.message
             except KeyboardInterrupt:
                 status, message = None, f"interrupted at t = {self.t:.9g} s"
@@ -292,13 +216,13 @@ class _Loop:
             if self.truth[event] and self.system.lets_through(event, self.t, y, values[event]):
                 found = Failure(Status.LET_THROUGH, self.t, None, event, 0)
                 text = failure_text(found, events=self.system.scene.event_names)
-                raise _Ended(Status.LET_THROUGH, text)
+                raise Ended(Status.LET_THROUGH, text)
 
-    def stopped(self, event: int) -> _Ended:
+    def stopped(self, event: int) -> Ended:
         """The end of a run that an event stops, or what comes to rest there."""
         scene = self.system.scene
         said = f"stopped by {scene.event_names[event]} at t = {self.t:.9g} s"
-        return _Ended(Status.STOPPED, said + rest_of(scene, event))
+        return Ended(Status.STOPPED, said + rest_of(scene, event))
 
     def refuse_start(self, y: Array) -> None:
         """SciPy chooses its first step from the rates: from nan a step that never ends."""
@@ -318,7 +242,7 @@ class _Loop:
         if limit and self.steps >= limit:
             at = f"t = {self.t:.9g} s"
             text = f"more steps than allowed at {at}; last good state at {at}"
-            raise _Ended(Status.TOO_MANY_STEPS, text)
+            raise Ended(Status.TOO_MANY_STEPS, text)
         self.system.failure = ""
         try:
             with np.errstate(all="ignore"):  # nan is how a bad trial step shows
@@ -327,17 +251,17 @@ class _Loop:
             found, solver.status = str(error), "failed"
         return found
 
-    def endless(self) -> _Ended:
+    def endless(self) -> Ended:
         """At the pace of the last steps the run would never end."""
         end = end_of_curve(self.system.scene, self.t, self.last, self.t)
         if end:
             text = f"{end}; last good state at t = {self.t:.9g} s"
-            return _Ended(Status.TOO_MANY_STEPS, text)
+            return Ended(Status.TOO_MANY_STEPS, text)
         sticks = Failure(Status.TOO_MANY_STEPS, self.t, None, None, 1)
         text = failure_text(sticks, implicit=self.implicit)
         if self.crossings.chatter is not None:
             text += f"; {endless(self.system.scene, self.crossings.chatter)}"
-        return _Ended(Status.TOO_MANY_STEPS, text)
+        return Ended(Status.TOO_MANY_STEPS, text)
 
     def crossed(self, event: tuple[int, float]) -> None:
         """The step ended where a switch crosses, or what an event strikes is met."""
@@ -382,18 +306,18 @@ class _Loop:
             self.look()
         return self.system.rates(t, y)
 
-    def failed(self, y: Array, text: str | None) -> _Ended:
+    def failed(self, y: Array, text: str | None) -> Ended:
         at = f"last good state at t = {self.t:.9g} s"
         status = Status.RHS_FAILED if self.system.failure else Status.STEP_TOO_SMALL
         cause = cause_of(self.system.scene, status, self.t, self.last, self.t, self.implicit)
         if cause or self.system.failure:
-            return _Ended(status, f"{cause or self.system.failure}; {at}")
+            return Ended(status, f"{cause or self.system.failure}; {at}")
         if not np.isfinite(y).all():
             name = self.system.scene.components()[int(np.argmin(np.isfinite(y)))]
-            return _Ended(Status.NOT_FINITE, f"not finite: {name}; {at}")
+            return Ended(Status.NOT_FINITE, f"not finite: {name}; {at}")
         text = (text or "the integrator failed").strip(". ")
         where = busiest(self.system.scene, self.t, self.last)
-        return _Ended(status, f"{text}; {at}{where}")
+        return Ended(status, f"{text}; {at}{where}")
 
     # --- events ---------------------------------------------------------------------------------
 
@@ -404,7 +328,7 @@ class _Loop:
             name = self.system.scene.event_names[int(np.argmax(np.isnan(found)))]
             text = f"the condition of {name} is not a number at t = {t:.9g} s"
             at = f"last good state at t = {self.t:.9g} s"
-            raise _Ended(Status.EVENT_FAILED, f"{text}; {at}")
+            raise Ended(Status.EVENT_FAILED, f"{text}; {at}")
         return found
 
     def fire_here(self, y: Array) -> bool:
