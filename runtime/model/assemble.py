@@ -13,7 +13,12 @@ from ..engine.loops.calls import LoopCalls
 
 
 def assemble(
-    compiled: Compiled, q: Array, u: Array, hold: Sequence[str], fast: Collection[str] | None
+    compiled: Compiled,
+    q: Array,
+    u: Array,
+    hold: Sequence[str],
+    fast: Collection[str] | None,
+    t: float,
 ) -> tuple[Array, Array]:
     """See `Model.assemble`; speeds of the hinges `fast` stay, of all that have some if None."""
     hinges, modal = compiled.layout.hinges, compiled.layout.modal
@@ -27,11 +32,11 @@ def assemble(
     hold = [hinges[name].name for name in hold]
     if compiled.closed is None:
         return q.copy(), u.copy()
-    q, u = LoopCalls(compiled.looped, q).driven(q, u)
+    q, u = LoopCalls(compiled.looped, q, t=t).driven(q, u)
     moving = [
         hinge.name for hinge in compiled.packed.described.hinge
         if not hinge.is_weld and hinge.drive is None and u[hinges[hinge.name].u_slice].any()
     ]  # fmt: skip
     if sum(hinges[name].nu for name in moving) > compiled.closed.loops.mobility:
         moving = []  # a whole state: no more than its freedoms can be kept
-    return compiled.closed.assembled(q, u, hold, moving if fast is None else fast)
+    return compiled.closed.assembled(q, u, hold, moving if fast is None else fast, t)

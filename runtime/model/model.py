@@ -79,13 +79,15 @@ class Model(Linearised, Displayed):
         q: ArrayLike | None = None,
         u: ArrayLike | None = None,
         hold: Sequence[str] = (),
+        t: float = 0.0,
     ) -> tuple[Array, Array]:
-        """The nearest (q, u) at which all loops are closed; near the start where nothing is given.
+        """The nearest (q, u) at which all loops are closed at t (s), near the start where nothing
+        is given.
 
         q (nq,) and u (nu,) are wishes, but for the coordinates of the hinges named in `hold`, and
         for the speeds of hinges that have some, which stay what they are where these are no more
-        than the mechanism has freedoms; driven coordinates are those at t = 0.  What changes
-        changes least, by inertia.  Without loops the state itself.
+        than the mechanism has freedoms; driven coordinates and couplings that go by time are those
+        at t.  What changes changes least, by inertia.  Without loops the state itself.
 
         Raises SceneError for a hinge that there is not, for loops that do not close near the
         state, and for speeds that contradict each other.
@@ -96,7 +98,7 @@ class Model(Linearised, Displayed):
         wish_q = start[0] if q is None else one("q", q, self.nq, only)
         wish_u = start[1] if u is None else one("u", u, self.nu, only)
         fast = self.closed.fast if u is None and self.closed is not None else None
-        return assemble(self, wish_q, wish_u, hold, fast)
+        return assemble(self, wish_q, wish_u, hold, fast, real("t", t, "a time in s"))
 
     def refuse_undetermined_start(self) -> None:
         """SceneError naming the hinges if the masses leave a motion of the start undetermined."""

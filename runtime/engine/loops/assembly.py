@@ -53,17 +53,18 @@ def with_held(engine: Engine, hinges: Collection[str]) -> Engine:
 
 
 class Assembly:
-    """Assembly of one packed scene with some hinges held; `q` (nq,) is near what is asked.
+    """Assembly of one packed scene at `t` (s) with some hinges held; `q` (nq,) is near what is
+    asked.
 
     `behind` says, as words that end a message, what is behind loops that do not close near a q.
     """
 
     def __init__(
         self, engine: Engine, q: Array, hinges: Collection[str] = (),
-        behind: Callable[[Array], str] = lambda q: "",
+        behind: Callable[[Array], str] = lambda q: "", t: float = 0.0,
     ) -> None:  # fmt: skip
         self.held, self._behind = tuple(hinges), behind
-        self.calls = LoopCalls(with_held(engine, hinges), q)
+        self.calls = LoopCalls(with_held(engine, hinges), q, t=t)
         if self.calls.engine is not engine:
             self.calls.judge_by([q])
         self._weights = self._weighted()

@@ -23,11 +23,15 @@ class LoopCalls(LoopNumbers):
     """Gaps and slips of the loops of one packed scene, and what corrects them.
 
     Every row is given the mobility of its ends at `q` (nq,), if they were free: the scale by which
-    a pivot is judged.  `mobility` (rows,) is given where these ends have no mass.
+    a pivot is judged.  `mobility` (rows,) is given where these ends have no mass.  What drives and
+    couplings ask is that at `t` (s), where no other time is named.
     """
 
-    def __init__(self, engine: Engine, q: Array, mobility: Array | None = None) -> None:
+    def __init__(
+        self, engine: Engine, q: Array, mobility: Array | None = None, t: float = 0.0
+    ) -> None:
         super().__init__(engine)
+        self.t = t
         records, self.model = self.records, engine.packed.model
         self.memory = engine.start_memory()
         quaternions = np.append(engine.packed.layout.quaternions, 0).astype(np.int32)
@@ -48,10 +52,10 @@ class LoopCalls(LoopNumbers):
         return int(self.engine.lib.MSTMM_SLIP)
 
     def correction(
-        self, level: int, q: Array, u: Array, give: float = 0.0, t: float = 0.0
+        self, level: int, q: Array, u: Array, give: float = 0.0, t: float | None = None
     ) -> tuple[Array, Array]:
         """(change along the speeds (nu,), what the rows lack (rows,)); see sweep.h."""
-        engine = self.engine
+        engine, t = self.engine, self.t if t is None else t
         change, missing = np.zeros(engine.nu), np.zeros(max(1, self.count))
         failure = engine.ffi.new("mstmm_failure *")
         code = engine.lib.mstmm_correction(
@@ -79,9 +83,9 @@ class LoopCalls(LoopNumbers):
             raise engine.failed(failure, 0.0, q, np.zeros(engine.nu))
         return found[: self.count]
 
-    def moved(self, q: Array, change: Array, t: float = 0.0) -> Array:
+    def moved(self, q: Array, change: Array) -> Array:
         """q (nq,) moved by a change along the speeds (nu,)."""
-        engine, result = self.engine, q.copy()
+        engine, result, t = self.engine, q.copy(), self.t
         failure = engine.ffi.new("mstmm_failure *")
         code = engine.lib.mstmm_moved(
             self.model, engine.workspace(), t, engine.pointer(result), engine.pointer(change),
@@ -92,9 +96,9 @@ class LoopCalls(LoopNumbers):
             raise engine.failed(failure, t, q, change)
         return result
 
-    def driven(self, q: Array, u: Array, t: float = 0.0) -> tuple[Array, Array]:
+    def driven(self, q: Array, u: Array) -> tuple[Array, Array]:
         """The state with driven coordinates filled in."""
-        engine, q, u = self.engine, q.copy(), u.copy()
+        engine, q, u, t = self.engine, q.copy(), u.copy(), self.t
         failure = engine.ffi.new("mstmm_failure *")
         code = engine.lib.mstmm_fill_driven(
             self.model, engine.workspace(), t, engine.pointer(q), engine.pointer(u),

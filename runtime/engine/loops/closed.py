@@ -154,17 +154,18 @@ class Closed:
             self.engine.packed.behind = partial(_behind, self._whole, self.start[0])
 
     def assembled(
-        self, q: Array, u: Array, holds: Collection[str], fast: Collection[str]
+        self, q: Array, u: Array, holds: Collection[str], fast: Collection[str], t: float = 0.0
     ) -> tuple[Array, Array]:
-        """The nearest (q, u) with loops closed; positions of `holds` and speeds of `fast` stay.
+        """The nearest (q, u) with loops closed at t (s); positions of `holds` and speeds of `fast`
+        stay.
 
         Raises SceneError where there is none.
         """
-        q = self._assembly(q, holds).positions(q)
-        return q, self._assembly(q, fast).speeds(q, u)
+        q = self._assembly(q, holds, t).positions(q)
+        return q, self._assembly(q, fast, t).speeds(q, u)
 
-    def _assembly(self, q: Array, hinges: Collection[str]) -> Assembly:
-        return Assembly(self.engine, q, hinges, self._sharing)
+    def _assembly(self, q: Array, hinges: Collection[str], t: float = 0.0) -> Assembly:
+        return Assembly(self.engine, q, hinges, self._sharing, t)
 
     def _sharing(self, q: Array) -> str:
         """Drives that move the same freedom near q, in words."""

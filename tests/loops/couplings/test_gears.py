@@ -111,6 +111,23 @@ def test_starts() -> None:
     assert np.abs(q - [1.3, 4.9]).max() < 1e-12
 
 
+def test_assembled_at_a_time() -> None:
+    """Places and speeds are those that a coupling asks at that time."""
+    model = pair(GEAR | {"equals": "0.2*sin(3*t)"})
+    for t in (0.0, 0.7):
+        q, u = model.assemble([0.4, 0.1], [1.0, 2.0], t=t)
+        assert abs(q[0] + 3 * q[1] - 0.2 * np.sin(3 * t)) < 1e-12
+        assert abs(u[0] + 3 * u[1] - 0.6 * np.cos(3 * t)) < 1e-12
+
+
+def test_a_drive_at_a_time() -> None:
+    model = pair(GEAR | {"equals": 0}, a={"drive": "0.5*sin(t)"})
+    q, u = model.assemble(t=1.2)
+    driven = np.array([0.5 * np.sin(1.2), 0.5 * np.cos(1.2)])
+    assert np.abs([q[0], u[0]] - driven).max() < 1e-12
+    assert np.abs(3 * np.array([q[1], u[1]]) + driven).max() < 1e-12
+
+
 def test_couplings_that_repeat_others() -> None:
     twice = {"expression": "2*A.q + 6*B.q"}
     model = pair(GEAR, twice)
