@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -80,10 +80,13 @@ def four_bar(
     return {"gravity": [float(x) for x in turn @ [0, -9.81, 0]], "body": bodies, "hinge": hinges}
 
 
-def cranks(tilt: tuple[float, float, float] = (0.0, 0.0, 0.0), angle: float = 0.8) -> Scene:
-    """Three cranks side by side that carry one coupler, which two of them would hold."""
+def cranks(
+    tilt: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    angle: float = 0.8,
+    places: Sequence[float] = (0.0, 0.7, 1.5),
+) -> Scene:
+    """Cranks side by side that carry one coupler, which two of them would hold."""
     turn = orientation(tilt)
-    places = [0.0, 0.7, 1.5]
     coupler = rod("coupler", places[-1])
     coupler["ends"] = {f"e{k}": [place, 0, 0] for k, place in enumerate(places)}
     hinges: list[Scene] = [
@@ -95,9 +98,9 @@ def cranks(tilt: tuple[float, float, float] = (0.0, 0.0, 0.0), angle: float = 0.
     hinges += [
         {"name": f"top{k}", "type": "pin", "inboard": f"crank{k}.tip",
          "outboard": "coupler" if k == 0 else f"coupler.e{k}", "initial": {"q": -angle}}
-        for k in range(3)
+        for k in range(len(places))
     ]  # fmt: skip
-    bodies = [rod(f"crank{k}", 0.6) for k in range(3)]
+    bodies = [rod(f"crank{k}", 0.6) for k in range(len(places))]
     return {"gravity": [0, -9.81, 0], "body": [*bodies, coupler], "hinge": hinges}
 
 

@@ -8,7 +8,7 @@ import pytest
 import mstmm
 from mstmm.runtime.engine.loops.closed import Loops
 
-from .linkages import bricard
+from .linkages import bricard, cranks
 from .scenes import Scene, four_bars, rod, scissors
 from .test_four_bar import linkage
 
@@ -168,8 +168,37 @@ def test_flat_windows_are_a_singular_start(count: int) -> None:
     assert model.loops.momentary == tuple((f"right{k}", "x") for k in range(count))
     assert set(model.loops.momentary) < set(model.loops.redundant)
     assert int(model.packed.model.n_rows) == 2 * count
+    assert set(model.loops.not_unique.values()) == {("fz", "mx", "my")}
     result = model.simulate(0.5, rtol=1e-8)
     assert result.success, result.message
+
+
+def test_many_flat_windows_leave_the_same_open() -> None:
+    """Off the pose a pin of a plane bears every load in it, however many windows there are."""
+    loops = loops_of(four_bars(12, 0.0))
+    assert (loops.rank, loops.nearby) == (12, 24)
+    assert set(loops.not_unique.values()) == {("fz", "mx", "my")}
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi])
+@pytest.mark.parametrize("count", [3, 4, 5, 6])
+def test_cranks_side_by_side_begin_flat(count: int, angle: float) -> None:
+    """With one freedom left off the pose, `count` + 1 coordinates of the tree take `count` rows."""
+    loops = loops_of(cranks(angle=angle, places=np.linspace(0.0, 1.5, count).tolist()))
+    assert (loops.rank, loops.nearby) == (count - 1, count)
+    assert len(loops.momentary) == 1
+
+
+def test_cranks_that_begin_flat_go_on_as_one() -> None:
+    """All turn alike, and energy is kept; a row too many had let it stick, 1.2 J off."""
+    scene = cranks(angle=0.0, places=np.linspace(0.0, 1.5, 4).tolist())
+    for hinge in scene["hinge"]:
+        hinge["initial"]["u"] = 2.0 if hinge["name"].startswith("foot") else -2.0
+    result = mstmm.compile(mstmm.Scene(**scene)).simulate(3.0, rtol=1e-9)
+    assert result.success, result.message
+    assert result.statistics.evaluations < 5000
+    assert np.ptp(result.q[:, :4], axis=1).max() < 1e-11
+    assert np.ptp(result.energy()) < 1e-6
 
 
 def test_masses_do_not_decide() -> None:

@@ -30,6 +30,9 @@ REPEATED = 1e-6
 _NEIGHBOURS, _AWAY, _FOLLOWING = 3, 3e-2, 10.0
 #: A closed state that is nearer than this part of the way asked for is the pose itself.
 _BACK = 0.1
+#: Around a singular pose so many are looked for at most.  One counts from which speeds without
+#: slips lead on, over this way (rad, m) and but for this part of it, and that is known to so much.
+_TRIES, _ON, _ASIDE, _SETTLED = 16, 3e-3, 0.2, 1e-8
 #: A row that repeats others here does so there too where its pivot is not this many times larger,
 #: or not larger than rounding, in parts of the mobility.
 _RAISED, _ROUNDING = 1e2, 1e-12
@@ -66,21 +69,43 @@ def rank_at(engine: Engine, q: Array) -> Rank:
         return Rank(here, here, here, (q,), Open(), 0)
     raised = _RAISED * np.abs(calls.pivots()) + _ROUNDING * calls.mobility
     level[list(here)] = np.minimum(level, raised)[list(here)]
-    always, draw, states, nearby = here, np.random.default_rng(0), [q], len(here)
-    ways = list[float]()
-    for _ in range(_NEIGHBOURS):
-        near = _neighbour(calls, q, draw.uniform(-1.0, 1.0, engine.nu))
-        if near is not None:
-            there = _repeating(calls, near, level)
-            always, nearby = always & there, min(nearby, len(there))
-            states.append(near)
-            ways.append(_way(calls, near - q))
-    stuck = max(ways, default=_AWAY) < _BACK * _AWAY
+    states, stuck = _around(calls, q, here, level)
+    there = [_repeating(calls, state, level) for state in states]
+    always, nearby = here.intersection(*there), min(map(len, (here, *there)))
     gaps = calls.correction(calls.gap, q, np.zeros(engine.nu))[1]
     closed = np.abs(gaps).max() <= _CLOSED
     going = always - _stand_ins(calls, q, always) if closed else always
-    loads = not_unique(calls, q if here == always else states[-1]) if always else Open()
-    return Rank(here, always, going, tuple(states), loads, nearby, stuck)
+    loads = not_unique(calls, q, here - always) if always else Open()
+    return Rank(here, always, going, (q, *states), loads, nearby, stuck)
+
+
+def _around(
+    calls: LoopCalls, q: Array, here: frozenset[int], level: Array
+) -> tuple[list[Array], bool]:
+    """Closed states nearby, and whether all ways to such states lead back; around a singular pose
+    those alone through which a motion goes, where there are some: others are closed by rounding,
+    or where motions branch."""
+    draw, ways, states = np.random.default_rng(0), list[float](), list[Array]()
+
+    def found(settled: float, least: float = -1.0) -> Array | None:
+        near = _neighbour(calls, q, draw.uniform(least, 1.0, calls.engine.nu), settled)
+        ways.extend([] if near is None else [_way(calls, near - q)])
+        return near
+
+    states = [near for _ in range(_NEIGHBOURS) if (near := found(np.inf)) is not None]
+    away = bool(ways) and min(ways) >= _BACK * _AWAY
+    if away and all(_repeating(calls, near, level) == here for near in states):
+        return states, False
+    smooth = list[Array]()
+    for k in range(_TRIES):
+        near = found(_SETTLED, 1.0 if k == 0 else -1.0)  # what stands in a row may move alike
+        if near is None or ways[-1] < _BACK * _AWAY:
+            continue
+        if _leads_on(calls, near, draw.uniform(-1.0, 1.0, calls.engine.nu), level):
+            smooth.append(near)
+        if len(smooth) == _NEIGHBOURS:
+            break
+    return smooth or states, max(ways, default=_AWAY) < _BACK * _AWAY
 
 
 def _way(calls: LoopCalls, change: Array) -> float:
@@ -131,29 +156,55 @@ def _repeating(calls: LoopCalls, q: Array, level: Array) -> frozenset[int]:
     return frozenset(np.flatnonzero(calls.inverses() == 0.0).tolist())
 
 
-def _neighbour(calls: LoopCalls, q: Array, speeds: Array) -> Array | None:
-    """A closed state on the way that speeds without slips lead; None where they lead nowhere.
+def _neighbour(calls: LoopCalls, q: Array, speeds: Array, settled: float) -> Array | None:
+    """A closed state on the way that speeds without any slips lead, known to `settled` (rad, m);
+    None where they lead nowhere."""
+    try:
+        ahead = _ahead(calls, q, speeds, _AWAY, np.zeros(calls.count))
+        return None if ahead is None else _closed(calls, ahead, settled)
+    except NumericalFailure:
+        return None
 
-    All rows are met there, those that repeat others here as well.
+
+def _leads_on(calls: LoopCalls, q: Array, speeds: Array, level: Array) -> bool:
+    """Whether speeds without slips, but for rows of small pivots, lead to closed states, as they do
+    where motions do not branch."""
+    try:
+        ahead = _ahead(calls, q, speeds, _ON, level)
+        near = None if ahead is None else _closed(calls, ahead, _SETTLED)
+    except NumericalFailure:
+        return False
+    if near is None or ahead is None:
+        return False
+    return _way(calls, near - ahead) < _ASIDE * _way(calls, ahead - q)
+
+
+def _ahead(calls: LoopCalls, q: Array, speeds: Array, way: float, level: Array) -> Array | None:
+    """q (nq,) moved by so much (rad, m) along speeds without slips in the rows whose pivots are
+    above their level; None where there are none."""
+    for row, floor in enumerate(level.tolist()):
+        calls.records.judge(row, floor)
+    tangent = speeds + calls.correction(calls.slip, q, speeds)[0]
+    length = float(np.abs(tangent).max(initial=0.0))
+    if not length > 1e-9:
+        return None
+    near = calls.moved(q, tangent * (way / length))
+    farther = min(way / max(_way(calls, near - q), _CLOSED), _FOLLOWING)
+    return calls.moved(q, tangent * (farther * way / length)) if farther > 1.0 else near
+
+
+def _closed(calls: LoopCalls, near: Array, settled: float) -> Array | None:
+    """The closed state (nq,) near another one, known to `settled` (rad, m); None: there is none.
+
+    All rows are met, those that repeat others here as well.
     """
+    still, give = np.zeros(calls.engine.nu), _GIVE
     for row in range(calls.count):
         calls.records.judge(row, 0.0)
-    try:
-        tangent = speeds + calls.correction(calls.slip, q, speeds)[0]
-        length = float(np.abs(tangent).max(initial=0.0))
-        if not length > 1e-9:
-            return None
-        near = calls.moved(q, tangent * (_AWAY / length))
-        farther = min(_AWAY / max(_way(calls, near - q), _CLOSED), _FOLLOWING)
-        if farther > 1.0:
-            near = calls.moved(q, tangent * (farther * _AWAY / length))
-        give = _GIVE
-        for _ in range(_STEPS):
-            change, missing = calls.correction(calls.gap, near, np.zeros_like(speeds), give)
-            rest = float(np.abs(missing).max(initial=0.0))
-            if rest < _CLOSED:
-                return near
-            near, give = calls.moved(near, change), min(_GIVE, _SHARE * rest)
-    except NumericalFailure:
-        pass
+    for _ in range(_STEPS):
+        change, missing = calls.correction(calls.gap, near, still, give)
+        rest = float(np.abs(missing).max(initial=0.0))
+        if rest < _CLOSED and float(np.abs(change).max(initial=0.0)) < settled:
+            return near
+        near, give = calls.moved(near, change), min(_GIVE, _SHARE * rest)
     return None

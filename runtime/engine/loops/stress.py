@@ -8,7 +8,7 @@ of them touches it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,11 +37,12 @@ class Open:
     rows: frozenset[int] = frozenset()
 
 
-def not_unique(calls: LoopCalls, q: Array) -> Open:
-    """At the closed q (nq,).  `calls` are those of a geometry in which all rows are met."""
+def not_unique(calls: LoopCalls, q: Array, silent: Collection[int] = ()) -> Open:
+    """At the closed q (nq,), rows that are `silent` there left out.  `calls` are those of a
+    geometry in which all rows are met."""
     gaps = np.abs(calls.correction(calls.gap, q, np.zeros(calls.engine.nu))[1])
     rounding = max(_ROUNDING, _OFF * float(gaps.max(initial=0.0)))
-    drawn = [_touched(calls, q, seed, rounding) for seed in range(_DRAWN)]
+    drawn = [_touched(calls, q, silent, seed, rounding) for seed in range(_DRAWN)]
     touched, rows = (np.any(marks, axis=0) for marks in zip(*drawn, strict=True))
     packed, found = calls.engine.packed, dict[str, tuple[str, ...]]()
     for number, hinge in enumerate(packed.scene.hinges):
@@ -59,12 +60,16 @@ def outboard_axes(calls: LoopCalls, place: int) -> Array:
     return np.reshape(packed.end(hinge.outboard)[1], (3, 3))
 
 
-def _touched(calls: LoopCalls, q: Array, seed: int, rounding: float) -> tuple[Array, Array]:
+def _touched(
+    calls: LoopCalls, q: Array, silent: Collection[int], seed: int, rounding: float
+) -> tuple[Array, Array]:
     """Whether a drawn self-stress state loads the component of the inboard hinge (bodies, 6), and
     the row (rows,)."""
     for row in range(calls.count):
-        calls.records.judge(row, 0.0)
-    met = np.array([not calls.records.yields(row) for row in range(calls.count)])
+        calls.records.judge(row, np.inf if row in silent else 0.0)
+    met = np.array(
+        [row not in silent and not calls.records.yields(row) for row in range(calls.count)]
+    )
     y = met * np.random.default_rng(seed).normal(size=calls.count) / np.sqrt(calls.mobility)
     for _ in range(_TIMES):
         y = met * calls.stressed(q, _GIVE * calls.mobility * y, _GIVE)
