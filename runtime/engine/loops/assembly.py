@@ -15,7 +15,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import OpenLoop, SceneError
 
-from ...pack.loops.variants import held, stiff
+from ...pack.loops.variants import held, length_of, stiff
 from ...pack.pack import packed_system
 from ..engine import Engine
 from .calls import LoopCalls
@@ -25,7 +25,8 @@ from .parallel import COUNTING, skewed, skewed_by_gap
 _LONGEST, _STEPS = 0.5, 300
 #: Compliance of the rows: the first, and where there is no use in more or in less.
 _FIRST, _MOST, _LEAST = 1e-2, 1e8, 1e-12
-#: Gap (m, rad) that is closed, and change (rad, m) at which nothing moves any more.
+#: Gap (m, rad) that is closed where hinges are up to 1 m apart, and change (rad, m) at which nothing
+#: moves any more.
 _CLOSED, _STILL = 1e-10, 1e-9
 #: Other starts where one leads to an open loop, and how far they are from it (rad, m).
 _TRIES, _SHAKEN = 4, 0.1
@@ -79,14 +80,14 @@ class Assembly:
         draw, start = np.random.default_rng(0), q
         nearest, missing = self._nearest(start)
         for _ in range(_TRIES):
-            if self._largest(missing) <= max(much, _CLOSED):
+            if self._closes(missing, much):
                 return nearest
             # Where all is in line nothing tells which way to bend.
             shaken = draw.uniform(-_SHAKEN, _SHAKEN, len(self._still)) * self.free
             trial, after = self._nearest(self.calls.moved(start, shaken))
             if self._largest(after) < self._largest(missing):
                 nearest, missing = trial, after
-        if self._largest(missing) <= max(much, _CLOSED):
+        if self._closes(missing, much):
             return nearest
         gap = self._largest(missing)
         raise OpenLoop(self._open(nearest, missing), gap, self._by_names(nearest))
@@ -97,7 +98,7 @@ class Assembly:
         rest = self._rest(q)
         for _ in range(_STEPS):
             change, missing = self._correction(q, give)
-            if self._largest(missing) < _CLOSED:
+            if self._closes(missing):
                 q = self.calls.moved(q, change)
                 break
             length = float(np.abs(change).max(initial=0.0))
@@ -149,7 +150,8 @@ class Assembly:
     def _slipping(self, u: Array, missing: Array) -> int | None:
         """The row that slips most, where that is more than rounding."""
         much = _SLIP * max(1.0, float(np.abs(u).max(initial=0.0)))
-        return int(np.abs(missing).argmax()) if self._largest(missing) > much else None
+        slips = np.abs(missing) / self._sizes
+        return int(slips.argmax()) if slips.max(initial=0.0) > much else None
 
     def _free_speeds(self) -> Array:
         engine, packed = self.calls.engine, self.calls.engine.packed
@@ -186,6 +188,10 @@ class Assembly:
         with np.errstate(over="ignore"):  # what is asked may be beyond all squares
             return float(np.sum(self._weights * missing**2))
 
+    def _closes(self, missing: Array, much: float = 0.0) -> bool:
+        """Whether gaps are none, for the size of what they are part of, or no more than `much`."""
+        return bool(np.all(np.abs(missing) <= np.maximum(much, _CLOSED * self._sizes)))
+
     def _largest(self, missing: Array) -> float:
         return float(np.abs(missing).max(initial=0.0))
 
@@ -202,6 +208,8 @@ class Assembly:
         coupling = np.zeros(calls.count, bool)
         coupling[[one.row for one in calls.records.couplings]] = True
         weights, self._turning = np.ones(calls.count), turning
+        length = max(1.0, length_of(calls.engine.packed.system))
+        self._sizes = np.where(turning | coupling, 1.0, length)
         for kind in (turning, coupling, ~(turning | coupling)):
             if kind.any():
                 weights[kind] = 1.0 / calls.mobility[kind].mean()

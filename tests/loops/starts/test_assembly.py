@@ -43,6 +43,21 @@ def test_forty_windows_and_a_squeezer(seed: int) -> None:
     assert abs(squeezer.initial_state()[0][0] + 0.0617138900142764) < 1e-15
 
 
+@pytest.mark.parametrize("size", [1e-6, 1e3, 1e7])
+def test_what_is_closed_stays_where_it_is(size: float) -> None:
+    """Whatever its size: rounding of large places is no gap."""
+    scene = four_bars(5, 0.7)
+    for body in scene["body"]:
+        body["center_of_mass"] = [size * x for x in body["center_of_mass"]]
+        body["ends"] = {name: [size * x for x in end] for name, end in body["ends"].items()}
+    for hinge in scene["hinge"]:
+        if "position" in hinge:
+            hinge["position"] = [size * x for x in hinge["position"]]
+    model = mstmm.compile(mstmm.Scene(**scene))
+    assert np.abs(np.abs(model.initial_state()[0]) - 0.7).max() < 1e-12
+    assert model.loops.rank == 10
+
+
 def test_what_cannot_close_is_told_with_the_least_gap() -> None:
     """Crank of 0.5 m at 0.7 rad, ground 1.2 m, rocker 0.8 m and a coupler of 0.1 m: in line the
     last two reach up to 0.9 m."""
