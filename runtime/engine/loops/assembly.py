@@ -25,8 +25,8 @@ from .parallel import COUNTING, skewed, skewed_by_gap
 _LONGEST, _STEPS = 0.5, 300
 #: Compliance of the rows: the first, and where there is no use in more or in less.
 _FIRST, _MOST, _LEAST = 1e-2, 1e8, 1e-12
-#: Gap (m, rad) that is closed where hinges are up to 1 m apart, and change (rad, m) at which nothing
-#: moves any more.
+#: Gap (m, rad) that is closed where hinges are up to 1 m apart, and change (rad, m) at which
+#: nothing moves any more.
 _CLOSED, _STILL = 1e-10, 1e-9
 #: Other starts where one leads to an open loop, and how far they are from it (rad, m).
 _TRIES, _SHAKEN = 4, 0.1
