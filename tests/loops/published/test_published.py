@@ -112,13 +112,35 @@ def test_andrews_squeezer_at_the_start() -> None:
     assert (model.loops.rank, model.loops.mobility) == (6, 1)
 
 
-def test_andrews_squeezer() -> None:
+@pytest.mark.parametrize(
+    ("rtol", "angle", "speed", "most"),
+    [(1e-6, 8e-6, 1e-4, 1000), (1e-9, 3e-9, 1e-6, 2000), (1e-10, 3e-9, 1e-6, 3000)],
+)
+def test_andrews_squeezer(rtol: float, angle: float, speed: float, most: int) -> None:
     """The printed beta and Theta are off by 1.1e-9 and 1.4e-9 themselves."""
     model = mstmm.compile(mstmm.Scene(**andrews()))
-    result = model.simulate(0.03, "dop853", rtol=1e-10, atol=1e-13, output_times=[0.0, 0.03])
+    result = model.simulate(0.03, "dop853", rtol=rtol, atol=1e-3 * rtol, output_times=[0.0, 0.03])
     assert result.success, result.message
+    assert result.statistics is not None and result.statistics.evaluations < most
     for name, wanted in PRINTED.items():
-        assert abs(result.q[-1, model.layout.hinges[name].q] - wanted) < 3e-9, name
+        assert abs(result.q[-1, model.layout.hinges[name].q] - wanted) < angle, name
     for name, wanted in PRINTED_SPEEDS.items():
         found = result.u[-1, model.layout.hinges[name].u]
-        assert abs(found - wanted) < 1e-6 * abs(wanted), name
+        assert abs(found - wanted) < speed * abs(wanted), name
+
+
+def test_two_trees_of_the_squeezer_agree() -> None:
+    """The pins in which three bodies meet are cut, or those that hold or carry these."""
+    first = mstmm.compile(mstmm.Scene(**andrews()))
+    start, ends = first.initial_state()[0], []
+    for cuts in (("E3", "E4", "E6"), ("gamma", "Phi", "Omega")):
+        scene = andrews()
+        for hinge in scene["hinge"]:
+            place = first.layout.hinges[hinge["name"]].q
+            hinge |= {"initial": {"q": float(start[place])}, "cut": hinge["name"] in cuts}
+        model = mstmm.compile(mstmm.Scene(**scene))
+        assert set(model.loops.cut) == set(cuts)
+        result = model.simulate(0.03, "dop853", rtol=1e-13, atol=1e-16, output_times=[0.0, 0.03])
+        assert result.success, result.message
+        ends.append([result.q[-1, model.layout.hinges[name].q] for name in ("beta", "Theta")])
+    assert np.abs(np.subtract(ends[0], ends[1])).max() < 2e-12
