@@ -150,6 +150,23 @@ def table(rows: list[Row]) -> str:
     return "\n".join(lines)
 
 
+def machines() -> str:
+    """On what the figures were taken, and when; the median of the loads of each."""
+    loads: dict[str, list[tuple[str, float]]] = {}
+    for folder in FOLDERS:
+        at = record(folder)["machine"]
+        words = (
+            f"{at['date']}, {at['cores']}-core {at['processor']} ({at['vectors']}), "
+            f"gcc {at['gcc']}, Python {at['python']}"
+        )
+        loads.setdefault(words, []).append((folder, float(at["load"])))
+    return "\n".join(
+        f"- {', '.join(folder for folder, _ in found)}: {words}, "
+        f"load {statistics.median([load for _, load in found]):.1f}."
+        for words, found in loads.items()
+    )
+
+
 def picture(path: Path) -> None:
     """Length, ratio to CasADi, and speed against accuracy, side by side."""
     import matplotlib.pyplot as plt
@@ -229,12 +246,7 @@ def main() -> None:
             subprocess.run([sys.executable, str(HERE / folder / "run.py")], check=True)
     rows = forward() + batches() + precision() + starts() + flexible() + loops()
     text = table(rows)
-    at = record("forward_dynamics")["machine"]
-    load = statistics.median([record(folder)["machine"]["load"] for folder in FOLDERS])
-    text += (
-        f"\n\n{at['date']}, {at['cores']}-core {at['processor']} ({at['vectors']}), "
-        f"gcc {at['gcc']}, Python {at['python']}, load {load:.1f}.\n"
-    )
+    text += f"\n\n{machines()}\n"
     print(text)
     (HERE / "summary.md").write_text(text)
     picture(HERE.parent / "docs" / "images" / "speed.png")

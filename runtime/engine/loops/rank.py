@@ -87,8 +87,8 @@ def _around(
     or where motions branch."""
     draw, ways, states = np.random.default_rng(0), list[float](), list[Array]()
 
-    def found(settled: float, least: float = -1.0) -> Array | None:
-        near = _neighbour(calls, q, draw.uniform(least, 1.0, calls.engine.nu), settled)
+    def found(settled: float) -> Array | None:
+        near = _neighbour(calls, q, draw.uniform(-1.0, 1.0, calls.engine.nu), settled)
         ways.extend([] if near is None else [_way(calls, near - q)])
         return near
 
@@ -97,8 +97,8 @@ def _around(
     if away and all(_repeating(calls, near, level) == here for near in states):
         return states, False
     smooth = list[Array]()
-    for k in range(_TRIES):
-        near = found(_SETTLED, 1.0 if k == 0 else -1.0)  # what stands in a row may move alike
+    for _ in range(_TRIES):
+        near = found(_SETTLED)
         if near is None or ways[-1] < _BACK * _AWAY:
             continue
         if _leads_on(calls, near, draw.uniform(-1.0, 1.0, calls.engine.nu), level):

@@ -31,12 +31,13 @@ def plane_of(system: System, elements: Elements) -> Array | None:
     if not all(_is_pinned(body, elements) for body in system.distinct):
         return None
     standing, hanging = _rotations(system)
-    axes = np.eye(3) if all(map(_turns_in_it, standing)) else standing[0]
-    if not all(_turns_in_it(axes.T @ rotation) for rotation in standing):
+    if not all(map(_turns_in_it, hanging)):
         return None
-    if not all(map(_turns_in_it, hanging)) or (axes is standing[0] and _acts_from_outside(system)):
-        return None
-    return axes
+    if all(map(_turns_in_it, standing)):
+        return np.eye(3)
+    axes = standing[0]
+    together = all(_turns_in_it(axes.T @ rotation) for rotation in standing)
+    return axes if together and not _acts_from_outside(system) else None
 
 
 def _is_pinned(body: BodyNumbers, elements: Elements) -> bool:
