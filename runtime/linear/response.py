@@ -21,6 +21,7 @@ from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.response import Response
+from ..engine.sizes import speed_sizes
 from . import files
 from .channels import Channel, channel, some_names
 from .harmonic.amplitudes import Amplitudes
@@ -50,10 +51,13 @@ Complex = NDArray[np.complex128]
 _BATCH = 2**20
 #: Growth of inertia in the elimination from which on digits are looked for elsewhere.
 _GROWN = 1e6
-#: Circles in parts of the frequency, and how many points they have.
-_CIRCLES, _POINTS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7), 8
+#: Radii of circles in parts of the frequency, how many points they have, and negative powers of
+#: the distance from the centre that these tell from positive ones.
+_CIRCLES, _POINTS, _POLES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7), 8, 3
 #: Parts of a response that may be unknown: good enough, and no answer any more.
 _GOOD, _LOST = 1e-11, 1e-3
+#: Responses below this part of what the amplitudes of all coordinates reach are rounding.
+_NOISE = 1e-11
 _ROUNDING = 2.0**-52
 #: Frequencies whose squares, times masses, are numbers.
 _FASTEST = 1e100
@@ -255,6 +259,7 @@ class _Sweep:
             damping[:, free] = self.modal.columns.T
             self.columns = np.concatenate([self.columns, damping])
         self.free, rows = free, rows_of(linear, outputs, pushes)
+        self.sizes = speed_sizes(linear.model)
         self.rows = {order: wide[:, free] for order, wide in rows.orders.items()}
         self.carried = {order: self.pushed.carried(wide) for order, wide in rows.orders.items()}
         self.through = rows.through
@@ -266,12 +271,14 @@ class _Sweep:
         return np.concatenate(parts)
 
     def _batch(self, omega: Array) -> Complex:
-        values, growth, grown = self._at(np.asarray(1j * omega, dtype=np.complex128))
+        values, growth, grown, _ = self._at(np.asarray(1j * omega, dtype=np.complex128))
         for k in np.flatnonzero(~(growth < _GROWN)):
             values[k] = self._around(float(omega[k]), values[k], growth[k], int(grown[k]))
         return values
 
-    def _at(self, s: Complex) -> tuple[Complex, Array, NDArray[np.int32]]:
+    def _at(self, s: Complex) -> tuple[Complex, Array, NDArray[np.int32], Complex]:
+        """Values (k, outputs, inputs), growth and grown bodies (k,) of the elimination, and the
+        amplitudes (k, columns, n)."""
         x, growth, grown = self.response.amplitudes(s, self.columns)
         moved = x[:, : self.count, self.free]
         if self.modal is not None:
@@ -284,7 +291,7 @@ class _Sweep:
             for j, (power, column) in self.carried[order].items():
                 found[:, :, j] += s[:, None] ** (order + power) * column
         growth[~np.isfinite(found).all(axis=(1, 2))] = np.inf
-        return found, growth, grown
+        return found, growth, grown, moved
 
     def _around(self, omega: float, straight: Complex, growth: float, body: int) -> Complex:
         """The response where the elimination lost digits: what is known best of it and its means
@@ -292,13 +299,14 @@ class _Sweep:
         best, unknown = straight, _ROUNDING * growth
         turns = np.exp(2j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
         for part in _CIRCLES:
-            values, growths, _ = self._at(np.asarray(omega * (1j + part * turns), np.complex128))
-            mean = values.mean(axis=0)
-            # Of what is analytic within, this is what the circle leaves out of a point less.
-            pole = np.abs((values * turns[:, None, None]).mean(axis=0))
-            lost = max(_share(pole, mean), _ROUNDING * float(growths.max()))
+            s = np.asarray(omega * (1j + part * turns), np.complex128)
+            values, growths, _, moved = self._at(s)
+            lost = max(
+                _pole_share(values, turns, _NOISE * self._reach(s, moved)),
+                _ROUNDING * float(growths.max()),
+            )
             if lost < unknown:
-                best, unknown = mean, lost
+                best, unknown = values.mean(axis=0), lost
             if unknown < _GOOD:
                 break
         if not unknown < _LOST:
@@ -309,6 +317,16 @@ class _Sweep:
                 "frequency out"
             )
         return best
+
+    def _reach(self, s: Complex, moved: Complex) -> Array:
+        """(outputs, inputs): bound of the response if every coordinate moved as far, beside its
+        size, as the one that moves most at s (k,)."""
+        sizes = self.sizes[self.free]
+        most = (np.abs(moved) / sizes).max(axis=(0, 2), initial=0.0)
+        size = float(np.abs(s).max())
+        inputs = self.pushed.summed(np.array([size]), most[None, None]).real[0, 0]
+        outputs = [size**order * (np.abs(rows) @ sizes) for order, rows in self.rows.items()]
+        return np.outer(np.sum(outputs, axis=0), inputs)
 
 
 def _response(
@@ -325,7 +343,14 @@ def _response(
     )  # fmt: skip
 
 
-def _share(part: Array, whole: Complex) -> float:
-    size = float(np.abs(whole).max(initial=0))
-    most = float(part.max(initial=0))
-    return most / size if size > 0 else float(most > 0)
+def _pole_share(values: Complex, turns: Complex, noise: Array) -> float:
+    """Largest part of the responses (k, outputs, inputs) on a circle that belongs to poles within.
+
+    An analytic function has no negative powers of the distance from the centre.  Its size is that
+    on the circle: at the centre it may be zero (an antiresonance).
+    """
+    powers = turns[None] ** np.arange(1, _POLES + 1)[:, None]
+    poles = np.abs(np.einsum("pk,kij->pij", powers, values) / len(turns)).max(axis=0)
+    sizes = np.abs(values).max(axis=0)
+    share = np.divide(poles, sizes, out=np.zeros_like(sizes), where=poles > noise)
+    return float(share.max(initial=0.0))

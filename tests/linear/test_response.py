@@ -181,6 +181,45 @@ def test_an_absorber_at_its_own_frequency(omega: float) -> None:
     assert abs(first + apart - -0.01) < 1e-9  # x2 = -F / k2
 
 
+@pytest.mark.parametrize("turned", [0.0, 0.7])
+@pytest.mark.parametrize("output", ["m0.x", "m0.vx", "m0.ax", "s0.displacement", "twice", "m0.z"])
+def test_a_response_that_is_zero_is_an_answer(output: str, turned: float) -> None:
+    """At omega^2 = k2/m2 the first mass stands still: x1 = 0, x2 = -F/k2 (an antiresonance)."""
+    scene = masses((2.0, 70.0, 0.0), (3.0, 50.0, 0.0))
+    along = [float(np.cos(turned)), float(np.sin(turned)), 0.0]
+    scene["hinge"] = [hinge | {"axis": along} for hinge in scene["hinge"]]
+    scene["output"] = [{"name": "twice", "of": "2*s0.displacement"}]
+    omega = float(np.sqrt(50 / 3))
+    linear = compiled(scene).linearize(inputs=["s0.effort"])
+    found = linear.frequency_response([omega], outputs=[output]).values[0, 0, 0]
+    assert abs(found) < 1e-12  # m, m/s, m/s2 a N
+
+
+def test_equal_masses_beside_each_other_do_not_move_apart() -> None:
+    """Two equal masses, each with an absorber, that one ground shakes: x1 - x2 = 0 at any
+    frequency, at that of the absorbers too."""
+    both = masses((2.0, 70.0, 0.0), (3.0, 50.0, 0.0))
+    scene: Scene = {"gravity": [0, 0, 0], "body": [], "hinge": []}
+    for side in "lr":
+        scene["body"] += [body | {"name": side + body["name"]} for body in both["body"]]
+        for hinge in both["hinge"]:
+            ends = {"inboard": hinge["inboard"], "outboard": side + hinge["outboard"]}
+            ends["inboard"] = "ground" if ends["inboard"] == "ground" else side + ends["inboard"]
+            scene["hinge"].append(hinge | ends | {"name": side + hinge["name"]})
+    scene["output"] = [{"name": "apart", "of": "ls0.displacement - rs0.displacement"}]
+    omega = float(np.sqrt(50 / 3))
+    found = compiled(scene).frequency_response([omega, 3.0], ["ground.acceleration.x"], ["apart"])
+    assert np.abs(found.values).max() < 1e-12
+
+
+@pytest.mark.parametrize("output", ["s0.displacement", "s1.displacement", "m1.ax"])
+def test_a_resonance_is_refused_whatever_is_read(output: str) -> None:
+    scene = masses((2.0, 70.0, 0.0), (3.0, 50.0, 0.0))
+    omega = float(compiled(scene).modes().omega[1])
+    with pytest.raises(NumericalFailure, match="is a resonance without damping"):
+        compiled(scene).frequency_response([omega], ["s0.effort"], [output])
+
+
 def test_a_long_run_under_a_sine() -> None:
     omega, push = 3.0, 1e-4
     scene = chain(3, damping=4.0)
