@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 Rates = Callable[[float, Array], Array]
 
+#: Numbers p of compiled code at a time (s) with the memory of a run.
+Numbers = Callable[[float, Array], Array]
+
 #: More bodies than this are differenced: writing the tangent kernel would take many seconds.
 MOST_BODIES = 64
 
@@ -45,6 +48,8 @@ class Jacobian:
         self._rates, self._memory, self._nq = rates, memory, model.nq
         self._outputs = ["qdot", "udot", *(["power"] if with_work else [])]
         self._tape, self._numbers = _tape(model, self._outputs)
+        #: Held inputs and states of controllers follow what the kernel reads.
+        self._n_memory = model.packed.system.held.first
 
     @property
     def exact(self) -> bool:
@@ -65,8 +70,8 @@ class Jacobian:
         found = np.zeros((n, n))
         units = np.eye(nq + nu)
         given = {
-            "p": self._numbers(t), "t": np.array([t]), "q": y[:nq], "u": y[nq : nq + nu],
-            "memory": self._memory,
+            "p": self._numbers(t, self._memory), "t": np.array([t]), "q": y[:nq],
+            "u": y[nq : nq + nu], "memory": self._memory[: self._n_memory],
         }  # fmt: skip
         for j, unit in enumerate(units):
             directions = {PREFIX + "q": unit[:nq], PREFIX + "u": unit[nq:]}
@@ -89,11 +94,9 @@ class Jacobian:
         return np.array(columns).T
 
 
-def _tape(
-    model: Compiled, outputs: list[str]
-) -> tuple[TapeKernel | None, Callable[[float], Array]]:
+def _tape(model: Compiled, outputs: list[str]) -> tuple[TapeKernel | None, Numbers]:
     """The tangent of the equations with respect to q and u, None where there is none; and the
-    numbers that it reads at a time."""
+    numbers that it reads."""
     packed, known = model.packed, model.known or {}
     if packed.releases or packed.system.count > MOST_BODIES:
         return None, _nothing
@@ -108,8 +111,8 @@ def _tape(
     there = [port.name for port in kernel.outputs if port.name in outputs]
     tape = TapeKernel(tangent(kernel, ["q", "u"], there, values=False, guards=False))
     live = LiveInputs(packed.system, structure.inputs)
-    return tape, lambda t: live.at(numbers, np.array([t])).ravel()
+    return tape, lambda t, memory: live.now(numbers, t, memory)
 
 
-def _nothing(_: float) -> Array:
+def _nothing(_t: float, _memory: Array) -> Array:
     return np.zeros(0)

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 Places = Sequence[tuple[int, int]]
 
+#: Place of its value among the numbers of a constant input; see `mstmm_input_now`.
+_VALUE = 1
+
 
 class LiveInputs:
     """The numbers of a system's inputs among those that code compiled for it reads.
@@ -33,14 +36,24 @@ class LiveInputs:
         self._moving = [
             i for i, one in enumerate(inputs) if one.varies and (self.places[i] >= 0).any()
         ]
-        self._held = any(
-            place >= 0 and (self.places[i] >= 0).any() for i, place in enumerate(system.held.places)
-        )
+        self._held = [
+            (i, place) for i, place in enumerate(system.held.places)
+            if place >= 0 and (self.places[i] >= 0).any()
+        ]  # fmt: skip
 
     @property
     def varies(self) -> bool:
         """Whether p is not the same at all times."""
-        return bool(self._moving) or self._held
+        return bool(self._moving or self._held)
+
+    def now(self, p: Array, t: float, memory: Array) -> Array:
+        """p (np,) at the time t (s) of a run, whose `memory` gives the values of held inputs."""
+        numbers = self.at(p, np.array([t])).reshape(-1).copy()
+        for i, place in self._held:
+            there = self.places[i] >= 0
+            pieces = np.where(np.arange(COUNT) == _VALUE, memory[place], 0.0)
+            numbers[self.places[i, there]] = pieces[there]
+        return numbers
 
     def at(self, p: Array, t: Array) -> Array:
         """p (np,) at the times t (n,): (n, np); p itself where it is always the same."""

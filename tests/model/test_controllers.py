@@ -14,6 +14,7 @@ from scipy.linalg import expm
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.model.model import Model
+from mstmm.runtime.run.second_opinion import Equations
 
 ENGINES = ["looped", "fused"]
 MASS, STIFFNESS, DAMPING, TS = 2.0, 30.0, 0.4, 0.05
@@ -94,6 +95,40 @@ def test_the_closed_loop_is_that_of_matrix_powers(engine: str, method: str) -> N
     np.testing.assert_allclose(run.quantity("push").values[:-1], held, rtol=0, atol=1e-8)
     found = np.stack([run.quantity(f"regulator.x[{k}]").values for k in (0, 1)], axis=1)
     np.testing.assert_allclose(found[:-1], own, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "method", ["scipy-Radau", "scipy-BDF", "scipy-LSODA", "sundials-BDF", "sundials-Adams"]
+)
+def test_methods_of_other_packages_with_a_jacobian_follow_the_closed_loop(method: str) -> None:
+    count = 6
+    times = np.arange(count + 1) * TS
+    run = model("looped").simulate(times[-1], method, output_times=times, rtol=1e-8, atol=1e-10)
+    states, held, own = closed_loop(count)
+    assert run.success, run.message
+    np.testing.assert_allclose(run.q[:, 0], states[:, 0], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(run.quantity("push").values[:-1], held, rtol=0, atol=1e-5)
+    found = np.stack([run.quantity(f"regulator.x[{k}]").values for k in (0, 1)], axis=1)
+    np.testing.assert_allclose(found[:-1], own, rtol=0, atol=1e-5)
+
+
+def test_the_jacobian_of_a_run_contains_what_a_controller_holds() -> None:
+    slide = {"name": "slide", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
+             "outboard": "block", "law": {"effort": "push*sin(q) - 3*u"}}  # fmt: skip
+    made = scene(regulator(), hinge=[slide])
+    equations = Equations(mstmm.compile(made, engine="looped"))
+    equations.scene.begin(0.0, [0.3], [-0.1])
+    e = np.array([0.3, -0.1]) - REFERENCE
+    push = (np.array(C) @ INITIAL + np.array(D) @ e + OFFSET)[0]
+    q, u = 0.3, -0.1
+    # d/dt of q, u and the work of the effort
+    expected = [
+        [0, 1, 0],
+        [push * np.cos(q) / MASS, -3 / MASS, 0],
+        [push * np.cos(q) * u, push * np.sin(q) - 6 * u, 0],
+    ]
+    found = equations.jacobian(0.0, np.array([q, u, 0.0]))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
 def test_samples_are_step_ends_and_values_are_held_between() -> None:
