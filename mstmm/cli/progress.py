@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 #: Seconds before a bar appears: short runs need none.
@@ -33,14 +33,16 @@ class Bar:
         self.share(t / t_end if t_end > 0 else 1.0, f"t = {t:.4g} of {t_end:.4g} s")
 
     def share(self, part: float, state: str) -> None:
-        """So much of all is done, 0 to 1, and what says so in words."""
-        if not self._shown:
+        """So much of all is done, 0 to 1, and what says so in words.  On a terminal that is gone
+        the bar ends, not the work."""
+        if not self._shown or (self._bar is None and time.monotonic() - self._begin < PATIENCE):
             return
-        if self._bar is None:
-            if time.monotonic() - self._begin < PATIENCE:
-                return
-            self._start()
-        self._bar.update(self._task, completed=part, state=state, refresh=not self._moves_alone)
+        try:
+            if self._bar is None:
+                self._start()
+            self._bar.update(self._task, completed=part, state=state, refresh=not self._moves_alone)
+        except OSError:
+            self._shown = False
 
     def _start(self) -> None:
         from rich.console import Console
@@ -58,7 +60,8 @@ class Bar:
     def stop(self) -> None:
         """Take the bar away."""
         if self._bar is not None:
-            self._bar.stop()
+            with suppress(OSError):
+                self._bar.stop()
             self._bar = None
 
 

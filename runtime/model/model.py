@@ -200,7 +200,8 @@ class Model(Linearised, Displayed):
             on_risk: where something speaks against the numbers (`Result.risks`): warn, in the
                 result; refuse, which raises RiskRefused, before the run where it is seen there,
                 else behind it with the result; ignore, which tells nothing in `warnings`.
-            progress: called with (t, t_end) about every 0.1 s.
+            progress: called with (t, t_end) about every 0.1 s.  An exception that it raises ends
+                the run and is raised here; a checkpoint is written before.
             checkpoint: file that keeps the run every 30 s, when it is interrupted, and when it has
                 ended, until the result is saved.
             resume: continue from that file, if it is there, bit for bit.

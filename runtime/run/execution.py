@@ -40,7 +40,7 @@ CHECKPOINT_EVERY = 30.0
 
 
 class Watch:
-    """What goes on beside a run: progress, checkpoints, and notes of what went wrong with those.
+    """What goes on beside a run: progress, checkpoints, and notes of what went wrong with these.
 
     With two runs, each counts for half of the time that progress tells.
     """
@@ -55,19 +55,20 @@ class Watch:
         self._begun = self._saved = time.monotonic()
 
     def tell(self, t: float) -> None:
-        """The run is at time t.  A callback that raises is not called again; the run goes on."""
+        """Report that the run is at time t (s).  What the callback raises ends the run."""
         if self.progress is None:
             return
         start, end = self.settings.t_start, self.settings.t_end
-        try:
-            self.progress(start + ((t - start) + self.run * (end - start)) / self.runs, end)
-        except Exception as error:
-            self.progress = None
-            self.notes.append(f"progress was switched off: {type(error).__name__}: {error}")
+        self.progress(start + ((t - start) + self.run * (end - start)) / self.runs, end)
 
     def look(self, run: Run, earlier: Samples | None) -> None:
-        """Between slices of a run: progress, and a checkpoint when one is due."""
-        self.tell(run.t)
+        """Between slices of a run: progress, and a checkpoint when one is due, or before what the
+        callback of progress raises."""
+        try:
+            self.tell(run.t)
+        except BaseException:
+            self.save(run, earlier)
+            raise
         if time.monotonic() - self._saved > CHECKPOINT_EVERY:
             self.save(run, earlier)
 

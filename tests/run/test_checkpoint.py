@@ -298,19 +298,60 @@ def test_progress_grows_to_the_end(monkeypatch: pytest.MonkeyPatch, certify: boo
     assert times == sorted(times) and times[-1] > 1.7 and times[0] < 0.5
 
 
-def test_a_progress_callback_that_raises_does_not_break_the_run(
-    monkeypatch: pytest.MonkeyPatch,
+class CallerError(Exception):
+    """What a callback of somebody else raises."""
+
+
+@pytest.mark.parametrize("method", ["dop853", "rodas5p", "scipy-LSODA", "dttmm-classical"])
+def test_an_exception_of_a_progress_callback_ends_the_run(
+    monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
     monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
+    model, step = mstmm.compile(pins(1, [0.3])), 0.01 if method == "dttmm-classical" else None
     calls = list[float]()
 
     def progress(t: float, t_end: float) -> None:
         calls.append(t)
-        raise ValueError("a defect of the caller")
+        raise CallerError("enough")
 
-    run = mstmm.compile(pins(1, [0.3])).simulate(1.0, progress=progress)
-    assert run.success and len(calls) == 1
-    assert any("a defect of the caller" in text for text in run.warnings)
+    with pytest.raises(CallerError, match="enough"):
+        model.simulate(1.0, method, step, progress=progress)
+    assert len(calls) == 1
+    assert model.simulate(1.0, method, step).success  # and leaves the model as it was
+
+
+@pytest.mark.parametrize("asked", [{"certify": True}, {"error": 1e-4}])
+def test_an_exception_of_a_progress_callback_ends_several_runs(
+    monkeypatch: pytest.MonkeyPatch, asked: dict[str, Any]
+) -> None:
+    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
+
+    def progress(t: float, t_end: float) -> None:
+        if t > 0.6 * t_end:  # not in the first run
+            raise CallerError("enough")
+
+    with pytest.raises(CallerError, match="enough"):
+        mstmm.compile(pins(1, [0.3])).simulate(1.0, progress=progress, **asked)
+
+
+def test_a_run_goes_on_from_where_a_progress_callback_ended_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
+    model, path = mstmm.compile(pins(1, [0.3])), tmp_path / "run.npz"
+
+    def progress(t: float, t_end: float) -> None:
+        if t > 0.5:
+            raise CallerError("enough")
+
+    with pytest.raises(CallerError):
+        model.simulate(1.0, checkpoint=path, progress=progress)
+    first = list[float]()
+    run = model.simulate(1.0, checkpoint=path, resume=True, progress=lambda t, end: first.append(t))
+    whole = model.simulate(1.0)
+    assert first[0] > 0.5
+    np.testing.assert_array_equal(run.t, whole.t)
+    np.testing.assert_array_equal(run.q, whole.q)
 
 
 def test_settings_of_a_result_are_plain_numbers(tmp_path: Path) -> None:
