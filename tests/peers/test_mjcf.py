@@ -220,3 +220,19 @@ def test_curves_of_springs_and_dampers_are_told(
         note.text for note in mstmm.import_robot(path).notes if "beyond the first" in note.text
     ]
     assert notes == [f"of its {told} the terms beyond the first are left out"]
+
+
+def test_armature_of_a_free_joint(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    path.write_text(
+        '<mujoco><worldbody><body name="a"><joint name="f" type="free" armature="0.3"/>'
+        '<inertial pos="0.1 0.2 -.3" mass="1" diaginertia=".02 .03 .01"/></body></worldbody>'
+        "</mujoco>"
+    )
+    peer = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(peer)
+    data.qvel[:] = [0.7, -1.1, 0.4, 1.3, 0.6, -0.9]
+    mujoco.mj_forward(peer, data)
+    found = mstmm.compile(mstmm.load_scene(path)).accelerations(data.qpos, data.qvel)
+    found[:3] += np.cross(data.qvel[3:], data.qvel[:3])  # of speeds in axes that turn
+    assert found == pytest.approx(data.qacc, rel=1e-12)

@@ -130,6 +130,35 @@ def test_limits_are_no_stops_unless_they_get_a_stiffness(tmp_path: Path) -> None
     )
 
 
+def test_what_is_there_twice_or_unknown_is_noted(tmp_path: Path) -> None:
+    """The first counts, as for urdfdom; nothing disappears without a note."""
+    twice = """<robot><link name="base"/>
+<link name="b"><inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1"/></inertial>
+<inertial><mass value="3" unit="kg"/><inertia ixx=".3" iyy=".3" izz=".3"/></inertial></link>
+<joint name="j" type="revolute"><parent link="base"/><child link="b"/>
+<axis xyz="0 1 0"/><axis xyz="1 0 0"/><origin xyz="0 0 1" quat_xyzw="0 0 1 0"/>
+<limit lower="-1" upper="1"/><limit lower="-2" upper="2"/>
+<dynamics damping="1" spring_stiffness="10" spring_reference="0.3"/>
+<joint_properties damping="0.2"/></joint></robot>"""
+    found = mstmm.import_robot(written(tmp_path, twice))
+    (body,), (hinge,) = found.scene.body, found.scene.hinge
+    assert body.mass == 1.0 and hinge.axis == (0.0, 1.0, 0.0) and hinge.law.damping == (1.0,)
+    notes = {str(note).split(": ", 1)[1] for note in found.notes}
+    is_twice = "is there 2 times; the first counts, the others are left out"
+    assert notes >= {
+        f"line 2: link 'b': <inertial> {is_twice}",
+        "line 3: link 'b': unknown attributes of <mass> left out: unit",
+        f"line 4: joint 'j': <axis> {is_twice}",
+        f"line 4: joint 'j': <limit> {is_twice}",
+        "line 5: joint 'j': unknown attributes of <origin> left out: quat_xyzw",
+        "line 7: joint 'j': unknown attributes of <dynamics> left out: "
+        "spring_stiffness, spring_reference",
+        "line 4: joint 'j': <joint_properties> in <joint> left out",
+    }
+    known = mstmm.import_robot(written(tmp_path, ARM))
+    assert not any("left out" in one.text for one in known.notes if "<transm" not in one.element)
+
+
 def test_a_free_base_falls(tmp_path: Path) -> None:
     found = mstmm.import_robot(written(tmp_path, ARM), base="free")
     assert found.names["base"] == "world.base" and found.scene.hinge[0].type == "free"

@@ -269,6 +269,8 @@ class _Writer:
     def _motion(self, joint: Joint, start: float | None) -> dict[str, Any]:
         keys = dict(joint.keys)
         law = dict(keys.pop("law", {}))
+        if mass := keys.pop("armature", 0.0):
+            law["effort"] = _turning_with_body(self.joints[joint.name], mass)
         if limits := law.pop("limits", None):
             if self.choices.stops is None:
                 self._tell(
@@ -356,6 +358,14 @@ class _Writer:
                 keys["file"] = found
             on = GROUND if owner == _STILL else self._bodies[owner]
             yield {"on": on, **_keys(pose), **keys}
+
+
+def _turning_with_body(hinge: str, mass: float) -> list[str | float]:
+    """Efforts of a free hinge whose `mass` (kg) beside the body's accelerates along inertial axes:
+    `inertia` of a law goes by udot, in axes that turn with the body, and lacks -m w x v."""
+    v, w = ([f"{hinge}.u[{k}]" for k in range(*of)] for of in ((0, 3), (3, 6)))
+    cross = [((k + 1) % 3, (k + 2) % 3) for k in range(3)]
+    return [*(f"{mass!r}*({w[j]}*{v[i]} - {w[i]}*{v[j]})" for i, j in cross), 0.0, 0.0, 0.0]
 
 
 def _keys(pose: Pose) -> dict[str, Any]:

@@ -197,6 +197,9 @@ class _Reader:
         losses = [float(x) for x in m.dof_frictionloss[dof:stop]]
         if any(losses) and not self._off("frictionloss"):
             law["friction"] = [{"coulomb": x} for x in losses]
+            if kind == _FREE:
+                text = "its friction acts along the axes of the body, of MuJoCo along the world's"
+                self._tell(f"joint {joint!r}", text, where)
         stiffness = 0.0 if self._off("spring") else float(m.jnt_stiffness[number].flat[0])
         if stiffness and kind in (_FREE, _BALL):
             text = "its spring is left out; give its hinge a law"
@@ -210,6 +213,8 @@ class _Reader:
                 lower, upper = map(float, m.jnt_range[number])
                 law["limits"] = {"lower": lower, "upper": upper}
         keys: dict[str, Any] = {"law": law} if law else {}
+        if kind == _FREE and "inertia" in law:
+            keys["armature"] = law["inertia"][0]
         if "limits" in law:
             keys["rated"] = dict(law["limits"])
         if kind not in (_FREE, _BALL):

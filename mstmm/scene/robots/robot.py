@@ -27,7 +27,8 @@ class Link:
 @dataclass(frozen=True)
 class Joint:
     """What joins two links, of a type of hinge: `pose` is the child's frame in the parent's at
-    q = 0; `keys` are more of its [[hinge]]."""
+    q = 0; `keys` are more of its [[hinge]], and "armature" (kg) of a free one the mass at its
+    origin that accelerates and weighs nothing, which its law's inertia has besides."""
 
     name: str
     type: str

@@ -44,6 +44,35 @@ NO_LIMIT = 1e9
 LIMITED = {_UNLIMITED: "revolute"}
 BY_HINGE = {kind.hinge: kind for kind in _KINDS.values()}
 _READ = ("link", "joint", "material")
+
+
+class _Known(NamedTuple):
+    """Attributes of an element, and the elements that are read in it: once, and any number of
+    times."""
+
+    attributes: tuple[str, ...]
+    once: tuple[str, ...] = ()
+    often: tuple[str, ...] = ()
+
+
+#: What is read of a robot; where a tag is not known, all inside it is somebody else's.
+_KNOWN = {
+    "link": _Known(("name", "type"), ("inertial",), ("visual", "collision")),
+    "inertial": _Known((), ("origin", "mass", "inertia")),
+    "mass": _Known(("value",)),
+    "inertia": _Known(("ixx", "ixy", "ixz", "iyy", "iyz", "izz")),
+    "visual": _Known(("name",), ("origin", "geometry", "material")),
+    "joint": _Known(
+        ("name", "type"), ("parent", "child", "origin", "axis", "dynamics", "limit", "mimic")
+    ),
+    "origin": _Known(("xyz", "rpy")),
+    "parent": _Known(("link",)),
+    "child": _Known(("link",)),
+    "axis": _Known(("xyz",)),
+    "dynamics": _Known(("damping", "friction")),
+    "limit": _Known(("lower", "upper", "effort", "velocity")),
+    "mimic": _Known(("joint", "multiplier", "offset")),
+}
 _MATERIAL = "material"
 
 
@@ -80,8 +109,29 @@ class _Reader:
         """Tell what became of something."""
         self.notes.append(Note(at.where, element, text))
 
+    def _note_unread(self, one: Element, owner: str) -> None:
+        """Tell of elements that are there twice, and of elements and attributes that are unknown,
+        in a link or joint."""
+        known = _KNOWN.get(one.tag)
+        if known is None:
+            return
+        unknown = [key[:40] for key in one.attributes if key not in known.attributes]
+        if unknown:
+            more = f" and {len(unknown) - 6} more" if len(unknown) > 6 else ""
+            what = f"unknown attributes of <{one.tag}> left out: {', '.join(unknown[:6])}{more}"
+            self.note(one, owner, what)
+        for tag, count in Counter(child.tag for child in one.children).items():
+            if tag not in (*known.once, *known.often):
+                self.note(one, owner, f"<{tag[:40]}> in <{one.tag}> left out")
+            elif count > 1 and tag in known.once:
+                what = f"<{tag}> is there {count} times; the first counts, the others are left out"
+                self.note(one, owner, what)
+        for child in one.children:
+            self._note_unread(child, owner)
+
     def link(self, one: Element) -> Link:
         name = one.text("name")
+        self._note_unread(one, f"link {name!r}")
         self._looks_of(one, name)
         inertial = one.first("inertial")
         if inertial is None:
@@ -108,6 +158,7 @@ class _Reader:
 
     def joint(self, one: Element) -> Joint:
         name, given = one.text("name"), one.text("type")
+        self._note_unread(one, f"joint {name!r}")
         kind = _KINDS.get(given)
         if kind is None:
             hint = near(given, _KINDS)
