@@ -21,6 +21,12 @@ __all__ = ["FUNCTIONS", "SWITCHES", "Expression", "Name", "number", "parse"]
 #: Operations that change branch where their argument, or the difference of the two, is zero.
 SWITCHES = frozenset({"sign", "abs", "lt", "le", "gt", "ge", "min", "max"})
 
+#: Operations that are numbers wherever their operands are, overflow aside.
+_NEVER_NAN = frozenset({
+    "number", "pi", "name", "neg", "add", "sub", "mul", "abs", "sign", "min", "max", "sin", "cos",
+    "tan", "atan", "atan2", "tanh", "lt", "le", "gt", "ge", "where",
+})  # fmt: skip
+
 _SYMBOLS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">="}
 _Line = tuple[Fraction, Fraction]
 
@@ -104,17 +110,24 @@ class Expression:
     def build(self, graph: Terms, resolve: Callable[[Name], Node]) -> Node:
         """The expression as a node of `graph`; `resolve` gives the node of each name.
 
-        A comparison becomes 1 where it holds and 0 elsewhere.
+        A comparison becomes 1 where it holds and 0 elsewhere; a `where` whose comparison has nan on
+        a side is nan.
         """
         return self.nodes(graph, resolve)[self.root]
 
     def nodes(self, graph: Terms, resolve: Callable[[Name], Node]) -> dict[int, Node]:
         """The nodes of all terms that the value depends on, by their numbers."""
         nodes: dict[int, Node] = {}
-        needed = self._needed(self.root)
-        for number, term in enumerate(self.terms):
-            if number in needed:
-                nodes[number] = _node(graph, term, [nodes[i] for i in term.args], resolve)
+        numbers: set[int] = set()  # terms that are never nan while names are finite
+        for number in sorted(self._needed(self.root)):
+            term = self.terms[number]
+            args = [nodes[i] for i in term.args]
+            total = term.op in _NEVER_NAN and numbers.issuperset(term.args)
+            if total or term.constant is not None:
+                numbers.add(number)
+            elif term.op == "where":
+                args[2] = _where_false(graph, self.terms[term.args[0]], nodes, args[2])
+            nodes[number] = _node(graph, term, args, resolve)
         return nodes
 
     def evaluate(self, values: Callable[[Name], float]) -> float:
@@ -213,6 +226,15 @@ def _node(graph: Terms, term: Term, args: list[Node], resolve: Callable[[Name], 
     if term.op in ("gt", "ge"):
         return graph.call("lt" if term.op == "gt" else "le", args[1], args[0])
     return graph.call(term.op, *args)
+
+
+def _where_false(graph: Terms, comparison: Term, nodes: Mapping[int, Node], no: Node) -> Node:
+    """What a `where` is if its comparison does not hold: `no`, or nan if a side of that is nan."""
+    a, b = (nodes[i] for i in comparison.args)
+    if comparison.op in ("gt", "ge"):
+        a, b = b, a
+    opposite = graph.call("le" if comparison.op in ("lt", "gt") else "lt", b, a)
+    return graph.select(opposite, no, a + b)
 
 
 def _line(term: Term, args: list[_Line | None]) -> _Line | None:

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -148,12 +149,18 @@ class Term:
         return self.op in ("lt", "le", "gt", "ge")
 
 
+def _compare(holds: Callable[[Any, Any], bool]) -> Callable[[Any, Any], float]:
+    """1 or 0; nan, which is neither, where one of the two is nan."""
+    return lambda a, b: float(holds(a, b)) if a == a and b == b else math.nan
+
+
 #: What each operation means in double precision, with the values that C gives.
 MEANING: dict[str, Callable[..., Any]] = {
     **{name: row.value for name, row in OPERATIONS.items()},
-    "gt": lambda a, b: float(a > b),
-    "ge": lambda a, b: float(a >= b),
-    "where": OPERATIONS["select"].value,
+    **{name: _compare(getattr(operator, name)) for name in ("lt", "le", "gt", "ge")},
+    "where": lambda condition, a, b: (
+        (a if condition else b) if condition == condition else condition
+    ),
 }
 
 #: Operations with an exact value on fractions.

@@ -20,5 +20,5 @@ def let_go_before(scene: Scene, t: float) -> list[str]:
     events = [(str(e.hinge), e.when) for e in scene.event if e.do == "release"]
     return [
         name for name, condition in own + events
-        if condition.depends_on_time_only and condition.evaluate(lambda _: t)
+        if condition.depends_on_time_only and condition.evaluate(lambda _: t) > 0
     ]  # fmt: skip

@@ -215,7 +215,7 @@ def _peaks(
     at, once = np.unique(np.concatenate(places), return_index=True)  # where parts meet
     limit = np.concatenate(limits)[once]
     values = _values(view, one, at)
-    before, after = np.diff(values)[:-1], np.diff(values)[1:]
+    before, after = np.sign(np.diff(values)[:-1]), np.sign(np.diff(values)[1:])
     inside = np.flatnonzero(before * after < 0)[:_PEAKS] + 1
     return at[inside], values[inside], limit[inside]
 

@@ -28,6 +28,8 @@ def dip(value: Callable[[float], float], t: list[float], v: list[float]) -> floa
     """A time at which a function that is above zero at three times lies below it, if parabolas
     through the lowest of its values lead there; else None."""
     for _ in range(4):
+        if not np.isfinite(v).all():
+            return None
         slopes = np.diff(v) / np.diff(t)
         bend = (slopes[1] - slopes[0]) / (t[2] - t[0])
         if not bend > 0:
@@ -71,13 +73,13 @@ class Crossings:
 
     def changed(self, before: Array, after: Array) -> list[int]:
         """Switches whose margins have other signs now."""
-        with np.errstate(invalid="ignore"):
-            return np.flatnonzero(self._watched & (before * after < 0)).tolist()
+        opposite = np.sign(before) * np.sign(after) < 0
+        return np.flatnonzero(self._watched & opposite).tolist()
 
     def near(self, rows: list[Array]) -> list[int]:
         """Switches whose margins keep their sign and are smallest in the middle of three rows."""
         a, b, c = rows
-        same = (a * b > 0) & (b * c > 0) & self._watched
+        same = (np.sign(a) == np.sign(b)) & (np.sign(b) == np.sign(c)) & (b != 0) & self._watched
         return np.flatnonzero(same & (np.abs(b) <= np.minimum(np.abs(a), np.abs(c)))).tolist()
 
     def is_short(self, time: float) -> bool:

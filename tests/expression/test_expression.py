@@ -73,6 +73,39 @@ def test_value_directly_and_through_the_graph(text: str, expected: float) -> Non
     assert through_the_graph(expression) == pytest.approx(expected, abs=1e-14)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "where(log(y) > 0, 1, 2)", "where(log(y) >= 0, 1, 2)", "where(log(y) < 0, 1, 2)",
+        "where(log(y) <= 0, 1, 2)", "where(0 < sqrt(y), 1, 1)", "where(t > asin(x), t, 2*t)",
+        "where(y^0.5 < 1, 1, 2) + 3", "where(x > 0, where(1 < log(y), 1, 2), 3)",
+        "where(where(log(y) > 0, 1, 2) > 0, 1, 2)",
+    ],
+)  # fmt: skip
+def test_a_choice_by_a_comparison_that_is_no_number_is_none(text: str) -> None:
+    expression = parse(text)
+    assert math.isnan(expression.evaluate(lambda n: VALUES[n.text]))
+    assert math.isnan(through_the_graph(expression))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("where(exp(1000*x) > 1, 3, 4)", 3.0),
+        ("where(exp(1000*x) <= 1, 3, 4)", 4.0),
+        ("where(-exp(1000*x) < exp(900*x), 3, 4)", 3.0),
+        ("where(log(x) > 0, 3, 4)", 3.0),
+        ("where(log(x) < 0, 3, 4)", 4.0),
+        ("where(x > 0, 3, log(y))", 3.0),
+        ("where(y > 0, log(y), where(y > -1, 5, log(y)))", 5.0),
+    ],
+)
+def test_a_choice_by_numbers_and_infinities(text: str, expected: float) -> None:
+    expression = parse(text)
+    assert expression.evaluate(lambda n: VALUES[n.text]) == expected
+    assert through_the_graph(expression) == expected
+
+
 def test_every_function_of_the_grammar_is_covered_above() -> None:
     text = " ".join(t for t, _ in MEANINGS)
     assert [f for f in FUNCTIONS if f"{f}(" not in text.replace(" (", "(")] == []

@@ -252,3 +252,20 @@ def test_event_functions_may_fail(lab: Lab) -> None:
         assert run.failure is not None
         assert run.t <= 1.5 < run.failure.time
         del kept
+
+
+def test_an_event_that_fails_beside_switches_is_named(lab: Lab) -> None:
+    problem = rotation(lab, CONTINUE)
+    problem.system.n_events, problem.system.n_switches = 2, 1
+
+    def not_a_number(context: Any, t: float, y: Any, g: Any) -> int:
+        g[0], g[1], g[2] = -1.0, math.nan if t > 1.5 else -1.0, -1.0
+        return 0
+
+    problem.system.events = kept = lab.ffi.callback(
+        "int(void *, double, const double *, double *)", not_a_number
+    )
+    run = problem.run("dopri5", 3.0, (1, 0), rtol=1e-6)
+    assert run.advance() is Status.EVENT_FAILED
+    assert "the condition of event 1 is not a number" in run.message()
+    del kept

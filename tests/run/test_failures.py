@@ -10,6 +10,7 @@ import pytest
 from support.result_scenes import motor, pins, rod
 
 import mstmm
+from mstmm.errors import NumericalFailure
 from mstmm.runtime.integrate.loop import Status
 from mstmm.runtime.result.result import Result
 
@@ -39,6 +40,31 @@ def test_an_effort_outside_its_domain() -> None:
     assert run.status in (Status.NOT_FINITE, Status.STEP_TOO_SMALL, Status.RHS_FAILED)
     assert "motor" in run.message or "expression" in run.message
     check_remains(run)
+
+
+CHOICE = "where(sqrt(0.5 - q[0]) > 9, 1, 2)"
+
+
+@pytest.mark.parametrize("method", ["dop853", "pirk13", "rodas5p", "genalpha", "scipy-RK45"])
+@pytest.mark.parametrize("engine", ["looped", "fused"])
+def test_a_comparison_that_is_no_number_ends_the_run(engine: str, method: str) -> None:
+    """The comparison reads the root of a negative number from q = 0.5 on."""
+    run = mstmm.compile(motor(CHOICE, speed=1.0), engine=engine).simulate(1.0, method=method)
+    assert f'hinge "motor": law.effort[0] = "{CHOICE}" is nan' in run.message
+    assert run.last_state[1][0] == pytest.approx(0.5, abs=1e-3) and not run.trusted
+    check_remains(run)
+
+
+@pytest.mark.parametrize("engine", ["looped", "fused"])
+def test_a_comparison_that_is_no_number_ends_one_trajectory_of_a_batch(engine: str) -> None:
+    model = mstmm.compile(motor(CHOICE, speed=1.0), engine=engine)
+    q, u = np.full((9, 1), -5.0), np.ones((9, 1))
+    q[4] = 0.0
+    batch = model.simulate_batch((q, u), t_end=0.5, output_times=[0.0, 0.5], threads=1)
+    assert np.flatnonzero(~batch.success).tolist() == [4]
+    assert "motor" in batch.messages[4]
+    with pytest.raises(NumericalFailure, match=r'state 4: .*"where\(sqrt.* is nan'):
+        model.accelerations(np.where(q > -1, 0.6, q), u)
 
 
 def test_too_many_steps() -> None:

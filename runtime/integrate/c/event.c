@@ -212,13 +212,14 @@ static int find_switch(const mstmm_work *work) {
     status = look(work, n, mstmm_n_watched(work->system), run->real.t, run->real.t_new,
                   learn_switches);
   }
+  if (status) return status; /* of the event that failed */
   if (run->count.event >= 0) {
     run->real.t_switch = run->real.t_stop;
     run->count.next_switch = run->count.event;
   }
   run->real.t_stop = run->real.t_new;
   run->count.event = -1;
-  return status;
+  return 0;
 }
 
 int mstmm_find_switch(const mstmm_work *work) {
