@@ -52,6 +52,10 @@ class Frames:
         rigidified = self.expanded.rigidified
         return {**self.flexible, **(rigidified.one_way if rigidified else {})}
 
+    def mass_center(self, name: str) -> tuple[float, ...]:
+        """(3) mass centre of a body of the scene, internal axes, m."""
+        return self.placements[name].point(self.scene.bodies.by_name[name].center_of_mass)
+
     def end(self, reference: str) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
         """(body position, axes (9), offset (3)) of "body" or "body.end", internal axes."""
         name, at = split(self.expanded.nodes.get(reference, reference))

@@ -165,6 +165,8 @@ def _with_drives(scene: Scene, tree: Topology) -> Iterator[tuple[int, HingeTable
 
 def _load(frames: Frames, load: Load, values: Values) -> LoadNumbers:
     body, _, offset = frames.end(load.on)
+    if load.at is not None:
+        offset = frames.mass_center(load.on)
     name = split(load.on)[0] if load.axes == "body" else load.axes
     reference = "ground" if load.axes == "inertial" else name
     axes, own, _ = frames.end(reference)

@@ -97,6 +97,8 @@ def same(scene: mstmm.Scene, keep: Collection[str] = ()) -> Merged:
         {"event": [{"when": "t.a.x + t.z > 100", "do": "stop"}]},
         {"load": [{"on": "q.a", "force": ["2*t", 1, 0], "moment": [0, "t", 2], "axes": "body"}]},
         {"load": [{"on": "p.a", "force": [1, "-t", 0], "axes": "r"}]},
+        {"load": [{"on": "q", "at": "center_of_mass", "force": [1, "-t", 0], "axes": "body"}]},
+        {"load": [{"on": "p", "at": "center_of_mass", "force": [0, 2, "t"]}]},
         {"spring": [{"from": "p.a", "to": "r.b", "law": {"stiffness": 10}}]},
         {"output": [{"name": "high", "of": "t.a.z - q.z"}]},
     ],

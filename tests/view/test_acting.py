@@ -59,6 +59,15 @@ def test_arrows_go_with_their_loads(run: Result) -> None:
     assert told.labels[:2] == (("force x", "N"), ("force y", "N"))
 
 
+def test_a_force_at_a_mass_center_is_drawn_there() -> None:
+    push = {"on": "rod", "at": "center_of_mass", "force": [0, 2.0, 0]}
+    run = run_of(load=[push])
+    stage = staged(run, "loads", most=11)
+    (force,) = (one for one in stage.bent if one.name.startswith("forces"))
+    away = force.vertices[:, -1] - run.position("rod.tip") / 2
+    assert np.abs(away[:, [0, 2]]).max() < 1e-9 and (away[:, 1] > 0).all()
+
+
 def test_turned_arrows_are_right_handed() -> None:
     vertices, faces = arrows.turned(np.zeros((1, 3)), np.array([[0.0, 0.0, 2.0]]), 0.01)
     middles = vertices[0].reshape(-1, 10, 3).mean(axis=1)

@@ -15,7 +15,7 @@ from ..rules.inertia import negative_moment, triangle_excess
 from ..rules.messages import MAX_PROBLEMS, TABLES, Problem, near
 from ..rules.values import GROUND, Location, split
 from ..tables.closures import CURVE
-from . import constraints, couplings, inputs, outside_names, topology
+from . import constraints, couplings, idle_loads, inputs, outside_names, topology
 from . import flexible as flexible_bodies
 from .angles import notes
 from .names import Scope, flexible, problem_with
@@ -96,6 +96,8 @@ def _references(scene: SceneTables) -> Iterator[Problem]:
         yield from _end(chain.inboard, scene, ("chain", i, "inboard"))
     for i, load in enumerate(scene.load):
         yield from _end(load.on, scene, ("load", i, "on"))
+        if load.at is not None:
+            yield from _mass_center(split(load.on)[0], scene, ("load", i, "at"))
         yield from _axes(scene, i)
     for i, shape in enumerate(scene.shape):
         yield from _end(shape.on, scene, ("shape", i, "on"))
@@ -129,6 +131,15 @@ def _end(reference: str, scene: SceneTables, place: Location) -> Iterator[Proble
     elif not at and body in {elastic.name for elastic in scene.elastic}:
         way_out = f'write "{body}.{next(iter(ends))}"' if ends else "give it ends"
         yield place, f'"{body}" is an elastic body, which is met at its ends alone; {way_out}'
+
+
+def _mass_center(body: str, scene: SceneTables, place: Location) -> Iterator[Problem]:
+    """A load at the mass centre of what is no rigid body."""
+    flexible_ones = {one.name for one in (*scene.beam, *scene.elastic)}
+    bodies = scene.skeleton.bodies
+    number = bodies.find(body)
+    if body in flexible_ones or (number is not None and bodies[number].type != "rigid"):
+        yield place, f'"{body}" is no rigid body, and has no mass centre of its own; name an end'
 
 
 def _axes(scene: SceneTables, i: int) -> Iterator[Problem]:
@@ -175,7 +186,7 @@ _ACCEPTED = "allow_unphysical_inertia = true"
 
 def risks(scene: SceneTables) -> tuple[Risk, ...]:
     """What is accepted but worth knowing: inertias that no body can have, angles that look like
-    degrees, beams that are asked for what they cannot do well."""
+    degrees, beams that are asked for what they cannot do well, loads that move nothing."""
     found, dusty = [], []
     for _, name, body in _tables(scene):
         excess = triangle_excess(body.inertia_matrix)
@@ -192,7 +203,10 @@ def risks(scene: SceneTables) -> tuple[Risk, ...]:
         found.append(Risk(
             "inertia", name, means, "write 0 for it", entry, 0.0, "kg*m2", doubt=False, before=True,
         ))  # fmt: skip
-    return (*found, *notes(scene), *flexible_bodies.risks(scene), *inputs.risks(scene))
+    return (
+        *found, *notes(scene), *flexible_bodies.risks(scene), *inputs.risks(scene),
+        *idle_loads.risks(scene),
+    )  # fmt: skip
 
 
 # --- names in expressions -------------------------------------------------------------------------

@@ -17,11 +17,15 @@ from .hinge import Hinge
 from .law import SpringLaw
 from .members import Hinges
 
+#: What `at` of a load may be.
+MASS_CENTER = "center_of_mass"
 _ZERO = (number(0), number(0), number(0))
 
 
 class Load(Table):
     """A force (N) and a moment (N m) on an end of a body; three expressions each.
+
+    With `at` = "center_of_mass" the force acts at the mass centre of the rigid body named in `on`.
 
     On a beam alternatively `force_per_length` (N/m), the same everywhere on `span`, from one x to
     another in m (None: the whole length).  `axes` is "inertial", "body" (the loaded body's own; of
@@ -31,6 +35,7 @@ class Load(Table):
 
     name: Annotated[str, texts.name("the load's name")] = ""
     on: Annotated[str, texts.end(ground=False)]
+    at: Annotated[str | None, texts.choice(MASS_CENTER)] = None
     force: Annotated[
         tuple[Expression, Expression, Expression],
         texts.expressions("three numbers or expressions in N", 3),
@@ -50,6 +55,8 @@ class Load(Table):
 
     @model_validator(mode="after")
     def _check(self) -> Load:
+        if self.at is not None:
+            self._check_mass_center()
         if self.force_per_length is None:
             if self.span is not None:
                 raise refuse("only force_per_length acts on a span; leave it out", "span")
@@ -70,6 +77,17 @@ class Load(Table):
                 f"expected [from, to] in m with 0 <= from < to, found {found(self.span)}", "span"
             )
         return self
+
+    def _check_mass_center(self) -> None:
+        """Raises for what does not act at a mass centre."""
+        body, end = split(self.on)
+        if end:
+            raise refuse(
+                f'"{MASS_CENTER}" is a place of the body, and on = {found(self.on)} another one; '
+                f"write on = {found(body)}, or leave `at` out", "at",
+            )  # fmt: skip
+        if self.force_per_length is not None:
+            raise refuse("force_per_length acts along a beam; leave `at` out", "at")
 
 
 class Event(Table):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from mstmm.expression.expression import Expression, number, parse
 from mstmm.numbers.rotations import Matrix
-from mstmm.scene import Load, Scene, split
+from mstmm.scene import End, Load, Scene, split
+from mstmm.scene.tables.loads import MASS_CENTER
 
 from ...chart.models import with_tables
 from .references import OWN_AXES
@@ -24,6 +25,36 @@ def with_axes_of(scene: Scene, gone: str, axes: str, turned: Matrix) -> Scene:
             _turned(load, axes, turned) if _axes_of(load) == gone else load for load in scene.load
         ),
     )
+
+
+def with_ends_at_mass_centers(scene: Scene) -> Scene:
+    """The scene whose loads at mass centres of welded bodies act at ends there, which stay where
+    they are in a body of several."""
+    welded = {e for h in scene.hinge if h.is_weld for e in (h.inboard_body, h.outboard_body)}
+    moved = {load.on for load in scene.load if load.at == MASS_CENTER} & welded
+    if not moved:
+        return scene
+    ends = {
+        body.name: _free_name(body.ends, MASS_CENTER) for body in scene.body if body.name in moved
+    }
+    return with_tables(
+        scene,
+        body=tuple(
+            one.model_copy(
+                update={"ends": {**one.ends, ends[one.name]: End(position=one.center_of_mass)}}
+            ) if one.name in ends else one for one in scene.body
+        ),
+        load=tuple(
+            one.model_copy(update={"on": f"{one.on}.{ends[one.on]}", "at": None})
+            if one.at == MASS_CENTER and one.on in ends else one for one in scene.load
+        ),
+    )  # fmt: skip
+
+
+def _free_name(taken: Collection[str], name: str) -> str:
+    while name in taken:
+        name += "_"
+    return name
 
 
 def _axes_of(load: Load) -> str:

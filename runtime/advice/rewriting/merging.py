@@ -23,7 +23,7 @@ from ...pack.merge.spoken import Spoken, spoken_of
 from ...pack.merge.welds import end_at, end_of, orientation_of, together, welded
 from ..choice import RIGID
 from ..renaming import composed, renamed
-from .axes import with_axes_of
+from .axes import with_axes_of, with_ends_at_mass_centers
 from .chains import Written, short, written_out
 from .references import INERTIAL, with_names
 
@@ -79,7 +79,7 @@ def merged(scene: Scene, keep: Collection[str] = ()) -> Merged | None:
     """The scene with every weld between rigid bodies, and between these and the ground, gone; None
     where there is none.  Bodies and hinges to `keep` stay by themselves."""
     written = written_out(scene, [one for one in short(scene) if _welded(one, scene)])
-    found = Merged(_with_bodies(written.scene))
+    found = Merged(with_ends_at_mass_centers(_with_bodies(written.scene)))
     stays = {renamed(name, written.names) for name in keep}
     while True:
         spoken = spoken_of(found.scene, stays)

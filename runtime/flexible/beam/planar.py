@@ -153,7 +153,7 @@ class Planar:
         own = turn.T @ n
         pushes = (load.force, load.force_per_length or ())
         return (
-            self._at_height(load.on, n, height, np.zeros(3))
+            (load.at is not None or self._at_height(load.on, n, height, np.zeros(3)))
             and all(_nothing(push, own) for push in pushes if push)
             and _only(load.moment, own)
         )

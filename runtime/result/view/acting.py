@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,6 +59,9 @@ class Acting:
         beams = {beam.name for beam in self.run.model.scene.beam}
         at_root = load.on in beams and load.force_per_length is None
         pose = self.when.poses(self.run, f"{load.on}.root" if at_root else load.on)
+        if load.at is not None:
+            points = values.load(number)[0][self.when.kept]
+            pose = replace(pose, position=self.when.smooth(points[:, 0:3], points[:, 3:6]))
         places = [pose.position]
         if load.force_per_length is not None and split(load.on)[0] in self.run.model.flexible:
             places = self._along(load, pose)
@@ -98,7 +101,8 @@ class Acting:
             there = [number for number in numbers if number[2].any()]
             labels = tuple((label, unit) for label, unit, _ in there)
             values = np.array([v for *_, v in there]).reshape(len(there), len(one.force)).T
-            text = (f'load on "{one.load.on}"',)
+            where = f", at its {one.load.at}" if one.load.at else ""
+            text = (f'load on "{one.load.on}"{where}',)
             yield f"loads/{one.load.name}", Told(one.load.name, text, np.zeros(3), labels, values)
 
 

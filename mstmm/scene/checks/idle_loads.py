@@ -1,0 +1,102 @@
+"""Forces that act where a body turns about, and so move nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from ...numbers.rotations import Vector, apply, cross, norm, product, transpose
+from ...risk import Risk
+from ..rules.values import GROUND, split
+from ..tables.hinge_frames import start_motion
+from ..tables.loads import MASS_CENTER
+
+if TYPE_CHECKING:
+    from ..tables.all import SceneTables
+    from ..tables.body import Body
+    from ..tables.hinge import Hinge
+    from ..tables.loads import Load
+
+#: Distances below this part of a body's own are rounding.
+_ROUNDING = 1e-12
+#: Bodies between a load and the ground that are looked at.
+_DEEPEST = 20
+
+
+def risks(scene: SceneTables) -> Iterator[Risk]:
+    """Loads whose force acts at a point of a moving body that stands still in any motion."""
+    if not scene.load:
+        return
+    bodies = {body.name: body for body in scene.body if body.type == "rigid"}
+    holders: dict[str, list[Hinge]] = {}
+    for hinge in scene.hinge:
+        holders.setdefault(hinge.outboard_body, []).append(hinge)
+    for load in scene.load:
+        pivot = _pivot_of(load, bodies, holders)
+        if pivot is not None:
+            body = split(load.on)[0]
+            yield Risk(
+                "idle-load", f'load "{load.name}"',
+                f'load "{load.name}" acts where "{body}" turns about (hinge "{pivot.name}"): its '
+                "force moves nothing",
+                f'name an end of the body, or write at = "{MASS_CENTER}"',
+                doubt=False, before=True,
+            )  # fmt: skip
+
+
+def _pivot_of(
+    load: Load, bodies: Mapping[str, Body], holders: Mapping[str, list[Hinge]]
+) -> Hinge | None:
+    """The hinge about which the body turns where the force acts; None where that point moves, or
+    where nothing moves."""
+    name, end = split(load.on)
+    pushed = any(not entry.is_zero for entry in load.force)
+    if not pushed or any(not entry.is_zero for entry in load.moment) or name not in bodies:
+        return None
+    body, pivot = bodies[name], None
+    point = body.center_of_mass if load.at is not None else body.end_position(end)
+    for _ in range(_DEEPEST):
+        held = holders.get(name, [])
+        if len(held) != 1 or not _keeps(held[0], bodies[name], point):
+            return None
+        hinge = held[0]
+        if not hinge.is_weld:
+            pivot = pivot or hinge
+        if hinge.inboard_body == GROUND:
+            return pivot
+        if hinge.inboard_body not in bodies:
+            return None
+        point = _seen_inboard(hinge, bodies, point)
+        name = hinge.inboard_body
+    return None
+
+
+def _arm(hinge: Hinge, body: Body, point: Vector) -> Vector:
+    """A point of the outboard body from the hinge, in the axes of its end."""
+    end = split(hinge.outboard)[1]
+    (a, b, c), (x, y, z) = point, body.end_position(end)
+    return apply(transpose(body.end_rotation(end)), (a - x, b - y, c - z))
+
+
+def _keeps(hinge: Hinge, body: Body, point: Vector) -> bool:
+    """Whether a hinge turns its outboard body about a point and does not move that."""
+    facts, motions = hinge.facts, start_motion(hinge)
+    if facts is None or motions is None or hinge.lets_go:
+        return False
+    arm = _arm(hinge, body, point)
+    size = max(map(abs, (*point, *body.center_of_mass)), default=0.0)
+    rounding = _ROUNDING * (size or 1.0)
+    if len(motions) > 1 and norm(arm) > rounding:
+        return False
+    turns = all(varies.startswith("000") for varies in facts.varies)
+    return turns and all(norm(cross(turn, arm)) <= rounding for _, turn in motions)
+
+
+def _seen_inboard(hinge: Hinge, bodies: Mapping[str, Body], point: Vector) -> Vector:
+    """The point in the axes of the inboard body, where the hinge does not move it."""
+    inboard, end = bodies[hinge.inboard_body], split(hinge.inboard)[1]
+    arm = _arm(hinge, bodies[hinge.outboard_body], point)
+    turned = apply(product(inboard.end_rotation(end), hinge.rotation), arm)
+    a, b, c = inboard.end_position(end)
+    x, y, z = turned
+    return (a + x, b + y, c + z)
