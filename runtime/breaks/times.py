@@ -23,6 +23,7 @@ from mstmm.risk import Risk
 
 from .acting import Acting
 from .pace import Pace, pace
+from .poles import poles
 from .roots import roots
 from .view import View
 
@@ -40,6 +41,8 @@ class TimeMap:
         breaks: (n,) s, ascending, from the start to before the end: steps end there.
         starts, longest: (m,) s: from `starts[i]` on, up to the next, no step is longer.
         narrowest: what asks for the shortest steps.
+        pole: the first time (s, a break) at which an effort or a load grows beyond all bounds, so
+            that no motion passes, and which one does, in words.
         notes: what could not be mapped.
     """
 
@@ -47,6 +50,7 @@ class TimeMap:
     starts: Array
     longest: Array
     narrowest: str = ""
+    pole: tuple[float, str] | None = None
     notes: tuple[Risk, ...] = field(default=())
 
     def too_long(self, step: float) -> Risk | None:
@@ -102,6 +106,7 @@ def _multiples(step: float, start: float, end: float) -> Array:
 
 def _mapped(expressions: list[Acting], start: float, end: float, inputs: Inputs) -> TimeMap:
     breaks, paces, notes = set[float](), list[tuple[Pace, str]](), list[Risk]()
+    ends = list[tuple[float, str]]()
     for one in expressions:
         view = View(one.expression, dict(one.constants), one.drive)
         breaks.update(one.expression.time_breaks())
@@ -111,12 +116,20 @@ def _mapped(expressions: list[Acting], start: float, end: float, inputs: Inputs)
             jumps = jump(one.expression, _around(knots, start, end), inputs)
             if jumps:
                 raise SceneError(f"{one.what}: {_shown(one)} {jumps}")
+        acts = not (one.drive or one.condition)
         for margin in view.margins():
             found = roots(margin, start, end, view.most)
             breaks.update(found.gaps.ravel().tolist())
             jumps = jump(one.expression, found.gaps.tolist(), inputs) if one.drive else ""
             if jumps:
                 raise SceneError(f"{one.what}: {_shown(one)} {jumps}")
+            at_pole, whole = poles(view, found.gaps) if acts else (found.gaps[:0, 0] > 0, False)
+            if at_pole.any():
+                first = float(found.gaps[np.argmax(at_pole), 0])
+                if whole:
+                    ends.append((max(first, start), _endless(one)))
+                else:
+                    notes.append(_pole(one, first))
             if not found.complete:
                 notes.append(_many_switches(one, found.open_from))
         watched = view.watched()
@@ -126,8 +139,29 @@ def _mapped(expressions: list[Acting], start: float, end: float, inputs: Inputs)
                 notes.append(_too_fast(one, float(paces[-1][0].longest.min())))
     starts, longest, narrowest = _shortest(paces)
     return TimeMap(
-        _inside(breaks, start, end), starts, longest, narrowest, tuple(dict.fromkeys(notes))
+        _inside(breaks, start, end),
+        starts,
+        longest,
+        narrowest,
+        min(ends, default=None),
+        tuple(dict.fromkeys(notes)),
     )
+
+
+def _endless(one: Acting) -> str:
+    return (
+        f"{one.what} ({_shown(one)}) grows beyond all bounds there, too fast for any motion to "
+        "pass; end the run before, or bound it, such as by min or max"
+    )
+
+
+def _pole(one: Acting, t: float) -> Risk:
+    return Risk(
+        "pole", one.what,
+        f"a part of {one.what} ({_shown(one)}) grows beyond all bounds at t = {t:.6g} s: unless "
+        "what it multiplies vanishes there, no motion passes",
+        "end the run before, or bound the part, such as by min or max", before=True,
+    )  # fmt: skip
 
 
 def _around(knots: list[float], start: float, end: float) -> list[tuple[float, float]]:

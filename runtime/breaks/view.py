@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from mstmm.arrays import Array
 from mstmm.expression.expression import Expression
 from mstmm.expression.parser import Term
 
@@ -44,6 +45,18 @@ class View:
     def terms(self, t: Interval) -> dict[int, Enclosure]:
         """Enclosures of all terms that depend on the variable alone."""
         return enclose(self.expression.terms, self.order, self.constants, t, self.variable)
+
+    def values(self, number: int, at: Array) -> Array:
+        """(n,) a term at values (n,) of the variable; nan where it has none."""
+        bounds = self.terms(Interval(at, at))[number].value
+        with np.errstate(invalid="ignore"):
+            return np.broadcast_to((bounds.lo + bounds.hi) / 2, at.shape)
+
+    def widest(self) -> list[int]:
+        """Terms that depend on the variable alone and are in no larger one that does."""
+        terms = self.expression.terms
+        within = {i for n in self.moving for i in terms[n].args}
+        return sorted(self.moving - within)
 
     def watched(self) -> list[Watched]:
         """The functions that could be narrow: all but sums, products and switches; of a drive,

@@ -54,6 +54,7 @@ class Status(IntEnum):
     TANGENT_FAILED = -10
     NOT_CONVERGED = -11
     LET_THROUGH = -12
+    POLE = -13
 
 
 _STATUS = {int(status): status for status in Status}
@@ -152,6 +153,8 @@ class Run:
             there; the right-hand side never sees a break itself but the number before or after.
         bounds: (starts, longest): from each start on, the first at or before t_start, no adaptive
             step is longer.
+        pole: the break at which the right-hand side has a pole, where the run ends, and what has
+            it, in words.
         capacity: rows of the sample buffer, at least 2.
 
     Raises:
@@ -170,13 +173,14 @@ class Run:
         atol: ArrayLike | None = None,
         breaks: ArrayLike = (),
         bounds: tuple[ArrayLike, ArrayLike] = ((), ()),
+        pole: tuple[float, str] | None = None,
         capacity: int | None = None,
     ) -> None:
         self._ffi, self._lib, self._system = ffi, lib, system
         self._run = run = ffi.new("mstmm_run *")
         run.system = system
         self._outputs(run, settings.output_times)
-        self.map_times(breaks, bounds)
+        self.map_times(breaks, bounds, pole)
         self._buffer(run, capacity)
         self.begin(tableau, settings, y0, atol)
 
@@ -275,16 +279,22 @@ class Run:
         """`mstmm_run *`, for C that advances the run itself."""
         return self._run
 
-    def map_times(self, breaks: ArrayLike, bounds: tuple[ArrayLike, ArrayLike]) -> None:
-        """Breaks and bounds, as at the making, to look out for from now on instead."""
+    def map_times(
+        self, breaks: ArrayLike, bounds: tuple[ArrayLike, ArrayLike],
+        pole: tuple[float, str] | None = None,
+    ) -> None:  # fmt: skip
+        """Breaks, bounds and pole, as at the making, to look out for from now on instead."""
         rows = [np.atleast_1d(np.array(x, dtype=np.float64)) for x in (breaks, *bounds)]
         stops, starts, longest = (self._ffi.from_buffer("double[]", row) for row in rows)
-        self._mapped = (len(rows[0]), stops, len(rows[1]), starts, longest)
+        end = self._ffi.NULL if pole is None else self._doubles([pole[0]])
+        self._mapped = (len(rows[0]), stops, len(rows[1]), starts, longest, end)
+        self.pole = pole
         self._lib.mstmm_run_map(self._run, *self._mapped)
 
     def take_over(self, other: Run) -> None:
         """Stand where another run of the same settings does, and look out for the same times."""
         self._mapped, self._run.t_end = other._mapped, other._run.t_end
+        self.pole = other.pole
         self._lib.mstmm_run_map(self._run, *self._mapped)
         self.restore(other.state())
 
@@ -453,6 +463,8 @@ class Run:
             cause: what is known to have made the numbers fail.
         """
         fail = self.failure
+        if self.pole is not None and self.status is Status.POLE:
+            cause = self.pole[1]
         if fail is None:
             event = _name("event", self.event, events)
             return {
@@ -542,6 +554,7 @@ def failure_text(
         Status.LET_THROUGH: f"{event} holds, and the motion goes on into it {at}: it throws back "
         "what comes to it, not what lies on it; what lies still needs a stop that carries it "
         "(law.limits with a stiffness)",
+        Status.POLE: f"a pole {at}: {cause}",
         Status.EVENT_CHATTER: f"{event} fires without end {at}",
         Status.BAD_ARGUMENT: f"check {_ARGUMENTS.get(fail.code, 'the arguments')}",
     }

@@ -159,7 +159,7 @@ class Session:
         except SceneError:
             self._forget_given()
             raise
-        self._run.map_times(known.breaks, (known.starts, known.longest))
+        self._run.map_times(known.breaks, (known.starts, known.longest), known.pole)
         self._record.reach = end
 
     # --- where it is ----------------------------------------------------------------------------

@@ -22,7 +22,6 @@ from mstmm.expression.expression import Name
 from mstmm.risk import Risk
 
 from ..breaks.acting import acting, owners
-from ..breaks.intervals import Interval
 from ..breaks.pace import CELLS, Pace, Watched, pace
 from ..breaks.view import View
 from ..run.execution import Watch, first_run
@@ -189,7 +188,7 @@ def _first(view: View, path: _Path, ends_are_steps: bool) -> tuple[float, float,
         return None
     for one in watched:
         places, values, longest = _peaks(view, one, known, narrow, high)
-        ends = _values(view, one, path.ends)
+        ends = view.values(one.term, path.ends)
         for place, value, limit in zip(places, values, longest, strict=True):
             steps = (path.least <= place) & (place <= path.most) & (path.moved > limit)
             if ends_are_steps:
@@ -214,12 +213,7 @@ def _peaks(
         limits.append(np.full(count, longest))
     at, once = np.unique(np.concatenate(places), return_index=True)  # where parts meet
     limit = np.concatenate(limits)[once]
-    values = _values(view, one, at)
+    values = view.values(one.term, at)
     before, after = np.sign(np.diff(values)[:-1]), np.sign(np.diff(values)[1:])
     inside = np.flatnonzero(before * after < 0)[:_PEAKS] + 1
     return at[inside], values[inside], limit[inside]
-
-
-def _values(view: View, one: Watched, at: Array) -> Array:
-    bounds = view.terms(Interval(at, at))[one.term].value
-    return np.broadcast_to((bounds.lo + bounds.hi) / 2, at.shape)

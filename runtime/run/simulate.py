@@ -55,7 +55,7 @@ def make_run(
     return Run(
         system.engine.ffi, system.engine.lib, system.system, tableau, settings, start,
         atol=tolerances(system, settings, start, energy), breaks=known.breaks,
-        bounds=(known.starts, known.longest), capacity=capacity,
+        bounds=(known.starts, known.longest), pole=known.pole, capacity=capacity,
     )  # fmt: skip
 
 

@@ -97,13 +97,14 @@ int mstmm_run_go_on(mstmm_run *run, double t_end, int changed) {
 }
 
 void mstmm_run_map(mstmm_run *run, int64_t n_breaks, const double *breaks, int64_t n_bounds,
-                   const double *bound_starts, const double *bounds) {
+                   const double *bound_starts, const double *bounds, const double *pole) {
   const int64_t at_break = run->count.at_break; /* of a break that the new ones may begin behind */
   run->n_breaks = n_breaks;
   run->breaks = breaks;
   run->n_bounds = n_bounds;
   run->bound_starts = bound_starts;
   run->bounds = bounds;
+  run->pole = pole;
   run->count.break_index = run->count.bound_index = 0;
   mstmm_pass_breaks(run);
   run->count.at_break = at_break;

@@ -150,8 +150,10 @@ int mstmm_in_gap(const mstmm_run *run) {
   return run->count.at_break && run->count.lands_on_break && run->real.h <= GAP * size;
 }
 
-int mstmm_too_many(mstmm_run *run) {
+int mstmm_no_further(mstmm_run *run) {
   const int64_t steps = run->count.steps;
+  if (run->pole && run->real.t >= *run->pole)
+    return mstmm_note(run, MSTMM_POLE, 0, -1, run->real.t);
   if (run->max_steps && steps >= run->max_steps)
     return mstmm_note(run, MSTMM_TOO_MANY_STEPS, 0, -1, run->real.t);
   const int64_t some = run->count.chatter < 0 ? SOME_STEPS : SOON;
@@ -197,7 +199,7 @@ int mstmm_try_step(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const int fixed = run->fixed_step > 0.0;
   double error, absolute;
-  int status = mstmm_too_many(run);
+  int status = mstmm_no_further(run);
   if (!status) status = mstmm_first_stage(work);
   if (status) return status;
   if (!fixed && run->real.h_next == 0.0)

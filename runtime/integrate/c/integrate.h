@@ -114,7 +114,8 @@ enum {
   MSTMM_BAD_ARGUMENT = -9,  /* `code` says which, see mstmm_run_start */
   MSTMM_TANGENT_FAILED = -10, /* with `code`, at `fail_time` */
   MSTMM_NOT_CONVERGED = -11,  /* Newton's iteration, at `fail_time`, least of all in `component` */
-  MSTMM_LET_THROUGH = -12     /* what `event` should have thrown back, see lets_through */
+  MSTMM_LET_THROUGH = -12,    /* what `event` should have thrown back, see lets_through */
+  MSTMM_POLE = -13            /* the right-hand side has a pole there, see mstmm_run.pole */
 };
 
 /* Which tangent implicit methods take: each what suits it, the exact one, or that of laws alone. */
@@ -201,6 +202,7 @@ typedef struct mstmm_run {
   int64_t n_bounds; /* adaptive steps: none from bound_starts[i] on is longer than bounds[i] */
   const double *bound_starts; /* strictly increasing, the first at or before t_start */
   const double *bounds;
+  const double *pole;   /* the break at which a pole begins: the run ends there; NULL: none */
   int64_t n_outputs;    /* < 0: a sample at every accepted step */
   const double *outputs; /* strictly increasing, within [t_start, t_end] */
   double *workspace;     /* mstmm_workspace_size doubles */
@@ -241,7 +243,7 @@ int mstmm_run_change(mstmm_run *run, const mstmm_tableau *tableau, double *works
 int mstmm_run_go_on(mstmm_run *run, double t_end, int changed);
 /* Times to look out for from now on, in the place of those that the run was started with. */
 void mstmm_run_map(mstmm_run *run, int64_t n_breaks, const double *breaks, int64_t n_bounds,
-                   const double *bound_starts, const double *bounds);
+                   const double *bound_starts, const double *bounds, const double *pole);
 /* The current good state, n_state doubles inside the workspace. */
 const double *mstmm_run_y(const mstmm_run *run);
 /* State of a run as plain numbers: sizes, writing, and reading back into a run whose problem part

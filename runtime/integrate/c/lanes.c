@@ -194,9 +194,9 @@ static int aim(const mstmm_cut_group *c, mstmm_attempt *a) {
     run->real.h = 0.0;
     if (group->trajectory[lane] < 0) continue;
     if (!group->retries[lane]) run->count.rejected_last = 0;
-    const int too_many = group->retries[lane] ? 0 : mstmm_too_many(run);
-    if (too_many) {
-      finish(c, lane, too_many);
+    const int ended = group->retries[lane] ? 0 : mstmm_no_further(run);
+    if (ended) {
+      finish(c, lane, ended);
       continue;
     }
     a->failed[lane] = mstmm_aim(run);

@@ -48,8 +48,9 @@ double mstmm_initial_step(const mstmm_work *work, double interval);
 int mstmm_aim(mstmm_run *run);
 /* Between two breaks that are one but for rounding no error is asked for. */
 int mstmm_in_gap(const mstmm_run *run);
-/* Have there been too many steps, or is no end in sight?  0, or a failure. */
-int mstmm_too_many(mstmm_run *run);
+/* Does the run end here: at a pole, after too many steps, without an end in sight?  0, or a
+ * failure. */
+int mstmm_no_further(mstmm_run *run);
 double mstmm_smallest_step(const mstmm_run *run);
 double mstmm_interval(const mstmm_run *run);
 int mstmm_output_inside(const mstmm_run *run);

@@ -231,7 +231,8 @@ def _side_by_side(
         status = Status(outcome.status)
         rows.evaluations[i] = outcome.evaluations
         rows.success[i] = status is Status.FINISHED
-        rows.messages[i] = _lanes_message(models[i], library, systems[0], outcome)
+        span = settings.t_start, settings.t_end
+        rows.messages[i] = _lanes_message(models[i], library, systems[0], outcome, span)
     flat = rows.samples[which].reshape(-1, model.nq + model.nu)
     times = np.tile(np.asarray(settings.output_times), len(which))
     flat, _ = settled(systems[0], times, flat, np.zeros((len(flat), 1)))
@@ -239,8 +240,9 @@ def _side_by_side(
 
 
 def _lanes_message(
-    model: Compiled, library: FusedLibrary, system: SceneSystem, outcome: Any
-) -> str:
+    model: Compiled, library: FusedLibrary, system: SceneSystem, outcome: Any,
+    span: tuple[float, float],
+) -> str:  # fmt: skip
     status = Status(outcome.status)
     if status is Status.FINISHED:
         return f"finished at t = {outcome.t:.9g} s"
@@ -253,6 +255,8 @@ def _lanes_message(
     failure = Failure(status, float(outcome.fail_time), component, None, int(outcome.code))
     untold = status in (Status.NOT_FINITE, Status.ACCEPT_FAILED)
     way_out = "simulate this one alone to learn the cause" if untold else ""
+    if status is Status.POLE and (pole := model.packed.time_map(*span).pole):
+        way_out = pole[1]
     return failure_text(failure, system.components(), cause=way_out) + last
 
 

@@ -108,7 +108,9 @@ def _problem(lanes: Lanes, run: Any, times: Array) -> list[Any]:
     run.first_step = settings.first_step
     run.atol, run.breaks, run.outputs, run.bound_starts, run.bounds = pointers
     run.n_breaks, run.n_outputs, run.n_bounds = len(known.breaks), len(times), len(known.starts)
-    return [*arrays, *pointers]
+    end = engine.pointer(np.array([known.pole[0]])) if known.pole else engine.ffi.NULL
+    run.pole = end
+    return [*arrays, *pointers, end]
 
 
 def _group(lanes: Lanes, many: Any, settling: SceneSystem, numbers: Any, kept: list[Any]) -> Any:

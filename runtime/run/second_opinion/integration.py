@@ -145,6 +145,10 @@ class _Loop:
 
         Between two breaks that are one but for rounding nothing changes.
         """
+        if self.known.pole is not None and self.t >= self.known.pole[0]:
+            found = Failure(Status.POLE, self.t, None, None, 0)
+            at = f"last good state at t = {self.t:.9g} s"
+            raise Ended(Status.POLE, f"{failure_text(found, cause=self.known.pole[1])}; {at}")
         if self.is_now(stop):
             self.t = stop
             return y
