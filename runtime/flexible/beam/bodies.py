@@ -68,13 +68,16 @@ class BeamBodies:
         return Modes(**{choice.direction: choice.count for choice in chosen})
 
     def _idle(self, beam: Beam) -> frozenset[str]:
-        """Directions in which nothing moves the beam; asked for where the shapes are "auto"."""
+        """Directions in which nothing moves the beam, nor buckles it before it buckles in another
+        one; asked for where the shapes are "auto"."""
         if self._plane is None or beam.modes is not None:
             return frozenset()
         axes = {"y": 1, "z": 2}
         stays = [word for word, axis in axes.items() if not self._plane.leaves(beam.name, axis)]
         # A beam that nothing bends at all keeps the shapes along y, to show that it stays straight.
-        return frozenset([stays[-1], "twist"] if stays else [])
+        if not stays or self._plane.buckles(beam.name, axes[stays[-1]]):
+            return frozenset()
+        return frozenset([stays[-1], "twist"])
 
 
 def beam_body(scene: Scene, beam: Beam) -> ModalBody:

@@ -14,8 +14,9 @@ Twist and tension follow the section that is held, or the mean where the hinge l
 Number of shapes per bending direction: three eigenfunctions (four in the mean frame), or all static
 shapes and two more.  Twist and axial shapes join where their stiffness and inertia are given and
 their first frequency is below three times the highest of bending: beyond, they follow the loads at
-once and cost only small steps.  A scene that stays in a plane (`planar`) gets the shapes of that
-plane alone.
+once and cost only small steps.  Twist also joins where bending about the stiff axis can buckle the
+beam sideways before it leaves the range of its model.  A scene that stays in a plane (`planar`)
+gets the shapes of that plane alone, unless its loads can buckle a beam out of it.
 
 Where the mass matrix of a stiffened beam would not stay definite over the slopes that the model is
 made for (`definiteness`), the same shapes are taken in the mean frame, in which the shapes carry no
@@ -30,6 +31,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..definiteness import SLOPE
 from .bases import CLAMPED_FREE, FREE_FREE, GIVEN, SIMPLY_SUPPORTED, STATIC, Basis, static_count
 from .data import BeamData
 from .expression_shapes import ExpressionShape
@@ -72,7 +74,8 @@ def choices(
     for direction in ("twist", "axial"):
         frame = _rod_frame(beam, held, direction, frames["y"][0])
         basis = _basis(beam, data, held, direction, frame)
-        count = _rod_count(beam, data, direction, basis, highest)
+        tips = direction == "twist" and len(made) == 2 and _tips(data)
+        count = _rod_count(beam, data, direction, basis, highest, tips)
         if count and not _left_out(beam, direction, idle):
             made.append(Choice(direction, frame, basis, count, ""))
     return tuple(made)
@@ -183,13 +186,28 @@ def _count(beam: Beam, direction: str, frame: Frame, basis: Basis) -> int:
     return static + 2 if static else (4 if frame.kind == "mean" else 3)
 
 
-def _rod_count(beam: Beam, data: BeamData, direction: str, basis: Basis, highest: float) -> int:
+def _rod_count(
+    beam: Beam, data: BeamData, direction: str, basis: Basis, highest: float, tips: bool
+) -> int:
     if beam.modes is not None:
         return int(getattr(beam.modes, direction))
     first = _rod_frequency(data, direction)
-    if first == 0.0 or first > 3 * highest:
+    if first == 0.0 or (first > 3 * highest and not tips):
         return 0
-    return static_count(basis, direction) + 1
+    return static_count(basis, direction) + (2 if tips else 1)
+
+
+def _tips(data: BeamData) -> bool:
+    """Whether moments that bend the beam about its stiff axis to slopes within its model can buckle
+    it sideways, with twist.
+
+    A cantilever of stiffness S, softer B and GJ in twist buckles by a moment m sqrt(B GJ) / L at
+    slopes of s sqrt(B GJ) / S; s = 1.57 for a moment at its end, 2.01 for a force, 2.14 for a load
+    spread along it (Timoshenko and Gere, Theory of Elastic Stability, 2nd ed., sections 6.2, 6.3).
+    """
+    bending = np.sort([stiffness_of(data, d) for d in BENDING], axis=0)
+    slope = np.pi / 2 * np.sqrt(bending[0] * stiffness_of(data, "twist")) / bending[1]
+    return bool(slope.min() <= SLOPE)
 
 
 def _rod_frequency(data: BeamData, direction: str) -> float:

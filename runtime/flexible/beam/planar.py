@@ -3,6 +3,12 @@
 A structural test, exact: every hinge turns about one direction n or slides at right angles to it,
 gravity and loads lie in the plane, all mass centres at one height over it, and n is a principal
 direction of every inertia.  Anything that is not known to stay in the plane counts as leaving it.
+
+What nothing pushes out of the plane may still buckle out of it.  That cannot come first where each
+beam is at least as stiff across the plane as in it: hinges that turn about n alone hold every
+deflection across that they hold in the plane, and bending about the softer axis does not twist a
+beam (Timoshenko and Gere, Theory of Elastic Stability, 2nd ed., sections 2.1 and 6.3).  A spring
+in the plane braces beams in it alone.
 """
 
 from __future__ import annotations
@@ -18,11 +24,14 @@ from mstmm.scene.tables.hinge_frames import hinge_frames, start_motion
 if TYPE_CHECKING:
     from mstmm.expression.expression import Expression
     from mstmm.scene import Scene
+    from mstmm.scene.tables.beam import Beam
     from mstmm.scene.tables.hinge import Hinge
     from mstmm.scene.tables.loads import Load
 
 #: Angles, and heights relative to the largest, below this are rounding.
 _ROUNDING = 1e-9
+#: Below 1 / sqrt(2): which of two axes at right angles is along a direction.
+_HALF = 0.5
 
 
 class Planar:
@@ -33,6 +42,7 @@ class Planar:
         self._turn: dict[str, Array] = {GROUND: np.eye(3)}
         self._origin: dict[str, Array] = {GROUND: np.zeros(3)}
         self._known: dict[tuple[float, ...], bool] = {}
+        self._braced: dict[tuple[float, ...], bool] = {}
         self._ends = {b.name: b.ends for b in scene.body} | {b.name: b.ends for b in scene.beam}
         self.possible = not (scene.chain or scene.elastic) and self._place_all()
 
@@ -41,10 +51,33 @@ class Planar:
         if not self.possible:
             return True
         n = self._turn[beam][:, axis]
-        key = tuple(np.round(n * np.sign(n[np.argmax(np.abs(n))]), 9) + 0.0)
+        key = _key(n)
         if key not in self._known:
             self._known[key] = self._in_plane(n)
         return not self._known[key]
+
+    def buckles(self, beam: str, axis: int) -> bool:
+        """Whether loads in the plane at right angles to the beam's own axis 1 (y) or 2 (z) can
+        buckle a beam of the scene along that axis before they buckle it in the plane."""
+        n = self._turn[beam][:, axis]
+        key = _key(n)
+        if key not in self._braced:
+            sprung = any(spring.law.stiffness for spring in self.scene.spring)
+            self._braced[key] = not sprung and all(
+                self._is_stiffer_across(one, n) for one in self.scene.beam if one.model != "rigid"
+            )
+        return not self._braced[key]
+
+    def _is_stiffer_across(self, beam: Beam, n: Array) -> bool:
+        """Whether no section bends more easily along n than in the plane at right angles to it."""
+        along_z = abs(float(self._turn[beam.name][:, 2] @ n)) > _HALF
+        across, within = (0, 1) if along_z else (1, 0)  # [about y, about z]
+        return all(
+            piece.bending_stiffness is not None
+            and piece.bending_stiffness[across]
+            >= piece.bending_stiffness[within] * (1 - _ROUNDING)
+            for piece in beam.sections
+        )
 
     # --- where everything is ----------------------------------------------------------------------
 
@@ -157,6 +190,11 @@ class Planar:
             and all(_nothing(push, own) for push in pushes if push)
             and _only(load.moment, own)
         )
+
+
+def _key(n: Array) -> tuple[float, ...]:
+    """The same for a direction and its opposite."""
+    return tuple(np.round(n * np.sign(n[np.argmax(np.abs(n))]), 9) + 0.0)
 
 
 def _stays(translation: Array, rotation: Array, n: Array) -> bool:
