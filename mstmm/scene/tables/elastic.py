@@ -13,7 +13,7 @@ class Elastic(ElasticKeys):
     """A general elastic body; its axes are those of its mesh.
 
     Exactly one of `matrices` (a .npz file), `arrays`, `mesh` (a file) and `box` tells what it is
-    made of.  `modes` is the number of fixed-interface modes, None for "auto".
+    made of.  `modes` is the number of vibration modes, None for "auto".
     """
 
     @model_validator(mode="after")

@@ -74,8 +74,7 @@ class Planar:
         across, within = (0, 1) if along_z else (1, 0)  # [about y, about z]
         return all(
             piece.bending_stiffness is not None
-            and piece.bending_stiffness[across]
-            >= piece.bending_stiffness[within] * (1 - _ROUNDING)
+            and piece.bending_stiffness[across] >= piece.bending_stiffness[within] * (1 - _ROUNDING)
             for piece in beam.sections
         )
 

@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.numbers.rotations import from_orientation
 from mstmm.scene.checks.topology import holders
 from mstmm.scene.rules.values import GROUND, split
+from mstmm.scene.tables.hinge_frames import start_motion
 
 from ...host.apart import apart
 from ..computable import computed
@@ -25,7 +27,7 @@ from ..modal_body import ModalBody
 from ..modal_port import ModalPort
 from ..support import Supports
 from .checks import checked
-from .craig_bampton import Reduction, reduce
+from .craig_bampton import Reduction, Release, reduce
 from .matrices import from_arrays, load_matrices, save_matrices
 from .mesh import Material, box_mesh, mesh_model, read_mesh, refuse_large
 from .model import ElasticModel
@@ -37,6 +39,7 @@ from .skin import skin
 if TYPE_CHECKING:
     from mstmm.scene import Hinge, Scene
     from mstmm.scene.tables.elastic import Elastic
+    from mstmm.scene.tables.law import LawEntry
 
 __all__ = [
     "elastic_bodies", "elastic_body", "modal_body", "model_of", "rigid_of", "save_matrices",
@@ -74,11 +77,12 @@ def modal_body(elastic: Elastic, scene: Scene) -> ModalBody:
     held = holder.outboard_end if holder is not None else next(iter(elastic.ends))
     used = frozenset(_used(elastic.name, scene) | {held})
     source, (frame, why) = _Source(elastic), _frame(elastic, holder, held)
-    body = _made(source, held, used, frame, why)
+    free = _freedom(elastic.name, held, holder, scene)
+    body = _made(source, held, used, free, frame, why)
     if elastic.frame != "auto" or frame == "mean" or _stays_definite(body, held, scene):
         return body
     why = "mean, because the mass matrix stays definite there"
-    return _made(source, held, used, "mean", why)
+    return _made(source, held, used, free, "mean", why)
 
 
 def _stays_definite(body: ModalBody, held: str, scene: Scene) -> bool:
@@ -104,10 +108,12 @@ class _Source:
 
 
 @lru_cache(maxsize=KEPT)
-def _made(source: _Source, held: str, used: frozenset[str], frame: str, why: str) -> ModalBody:
+def _made(
+    source: _Source, held: str, used: frozenset[str], free: Freedom, frame: str, why: str
+) -> ModalBody:
     elastic = source.elastic
     where = f'elastic "{elastic.name}"'
-    return computed(where, lambda: _maybe_apart(_reduced, elastic, held, used, frame, why))
+    return computed(where, lambda: _maybe_apart(_reduced, elastic, held, used, free, frame, why))
 
 
 def _maybe_apart(work: Callable[..., T], elastic: Elastic, *arguments: Any) -> T:
@@ -127,7 +133,9 @@ def _unknowns(elastic: Elastic) -> float:
     return path.stat().st_size / 50 if path.is_file() else 0.0
 
 
-def _reduced(elastic: Elastic, held: str, used: frozenset[str], frame: str, why: str) -> ModalBody:
+def _reduced(
+    elastic: Elastic, held: str, used: frozenset[str], free: Freedom, frame: str, why: str
+) -> ModalBody:
     model = model_of(elastic)
     ports = []
     for name, end in elastic.ends.items():
@@ -136,12 +144,45 @@ def _reduced(elastic: Elastic, held: str, used: frozenset[str], frame: str, why:
     modes = AUTO_MODES if elastic.modes is None else elastic.modes
     notes = [f"frame: {why}"]
     if elastic.modes is None:
-        notes.append(f"modes: {modes} fixed-interface modes")
+        notes.append(f"modes: {modes} vibration modes")
     return elastic_body(
-        elastic.name, model, ports, held, modes, frame,
+        elastic.name, model, ports, held, modes, frame, release=_release(elastic, held, free),
         highest=elastic.highest_frequency, stiffening=elastic.stiffening,
         damping=elastic.damping, start=elastic.initial, notes=notes,
     )  # fmt: skip
+
+
+#: (translation, rotation) per speed that a hinge leaves free, outboard axes, and whether something
+#: acts along it.
+Freedom = tuple[tuple[tuple[float, ...], bool], ...]
+
+
+def _freedom(name: str, held: str, holder: Hinge | None, scene: Scene) -> Freedom:
+    """What the hinge of a body leaves free; nothing where that is not known or may change."""
+    released = {event.hinge for event in scene.event}
+    if holder is None or holder.lets_go or holder.name in released:
+        return ()
+    loaded = held in _used(name, scene, but=holder)
+    coupled = any(holder.name in one.parts for c in scene.coupling for one in c.names)
+    drive, motions = holder.drive or (), start_motion(holder) or ()
+    return tuple(
+        ((*translation, *rotation), loaded or coupled or _acts(holder.law.entry(k)))
+        for k, (translation, rotation) in enumerate(motions)
+        if k >= len(drive) or drive[k] is None
+    )
+
+
+def _acts(law: LawEntry) -> bool:
+    """Whether a law ever gives an effort."""
+    numbers = law.stiffness, law.damping, law.inertia
+    return any(numbers) or not law.effort.is_zero or law.friction.acts or law.limits.acts
+
+
+def _release(elastic: Elastic, held: str, free: Freedom) -> Release:
+    turn = np.array(from_orientation(elastic.ends[held].orientation))
+    twists = [(np.array(twist).reshape(2, 3) @ turn.T).reshape(6) for twist, _ in free]
+    loaded = [twist for twist, (_, acts) in zip(twists, free, strict=True) if acts]
+    return Release(*(np.array(some).reshape(-1, 6).T for some in (twists, loaded)))
 
 
 def rigid_of(elastic: Elastic) -> tuple[Array, dict[str, Port]]:
@@ -185,13 +226,15 @@ def _holder(name: str, scene: Scene) -> Hinge | None:
     return holders(scene).get(name)
 
 
-def _used(name: str, scene: Scene) -> set[str]:
-    """Ends on which a hinge, a chain, a load or a spring acts."""
+def _used(name: str, scene: Scene, but: Hinge | None = None) -> set[str]:
+    """Ends on which a hinge (`but` for one), a chain, a load, a spring or a constraint acts."""
     references = [
-        reference for hinge in scene.hinge for reference in (hinge.inboard, hinge.outboard)
-    ]
+        reference for hinge in scene.hinge if hinge is not but
+        for reference in (hinge.inboard, hinge.outboard)
+    ]  # fmt: skip
     references += [chain.inboard for chain in scene.chain] + [load.on for load in scene.load]
-    references += [reference for force in scene.forces for reference in (force.from_, force.to)]
+    acting = (*scene.forces, *scene.constraint)
+    references += [reference for one in acting for reference in (one.from_, one.to)]
     return {at for body, at in map(split, references) if body == name and body != GROUND}
 
 
@@ -226,12 +269,14 @@ def elastic_body(
     damping: Any = None,
     start: Any = None,
     notes: Sequence[str] = (),
+    release: Release | None = None,
 ) -> ModalBody:
     """The modal body of a checked model.
 
     Args:
         ports: every end; `held` names the one that the inboard hinge holds.
-        modes: fixed-interface modes besides six static shapes per loaded end but the held one.
+        modes: vibration modes besides six static shapes per loaded end but the held one.
+        release: what the inboard hinge leaves free at the held end; None for nothing.
         frame: "tangent" (at the held end) or "mean".
         highest: shapes above this frequency in rad/s are left out.
         stiffening: with the stiffness that stresses bring, where the model knows stresses.
@@ -243,7 +288,7 @@ def elastic_body(
     ports = list(ports)
     refuse_shared(model, ports)
     holding = next(p for p in ports if p.name == held)
-    reduction = reduce(model, ports, holding, modes, frame, highest)
+    reduction = reduce(model, ports, holding, modes, frame, highest, release)
     found = moments(model, reduction.shapes)
     K = np.diag(found.mass * reduction.frequencies**2)
     stiff = _stiffened(reduction, ports, stiffening)
@@ -271,9 +316,10 @@ def _stiffened(reduction: Reduction, ports: list[Port], stiffening: bool) -> Sec
 
 def _notes(model: ElasticModel, reduction: Reduction, stiffening: bool) -> list[str]:
     lowest, top = reduction.frequencies[0], reduction.frequencies[-1]
+    kind = "of the body as its hinge holds it" if reduction.released else "fixed-interface"
     notes = [
         *model.notes,
-        f"shapes: {reduction.static} static and {reduction.fixed} fixed-interface, orthogonal, "
+        f"shapes: {reduction.static} static and {reduction.fixed} {kind}, orthogonal, "
         f"{lowest:.6g} to {top:.6g} rad/s",
     ]
     if len(reduction.left_out):

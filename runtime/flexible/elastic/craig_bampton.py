@@ -3,12 +3,20 @@
 Component mode synthesis as named in Rui, Wang, Zhang, section 8.2 ((8.22) to (8.24)); the choice of
 shapes is that of R. R. Craig, M. C. C. Bampton, AIAA J. 6 (1968) 1313-1319.  The six rigid-body
 combinations go with the choice of the floating frame.
+
+Modes with an end clamped are poor where a hinge leaves it free: a free bar of two such modes per
+plane has its second frequency at twice what it is.  Where no other end carries loads, and where the
+hinge leaves all motions free, the vibration shapes are those of the body as its hinge holds it, and
+the static ones attachment modes with inertia relief: the deflections under unit loads on the ends,
+balanced by the inertia of the rigid motions that the hinge leaves free (R. R. Craig, A. J. Kurdila,
+Fundamentals of Structural Dynamics, 2nd ed., sections 17.2 and 17.3).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +24,7 @@ from mstmm.arrays import Array
 
 from .model import ElasticModel
 from .ports import Port
-from .sections import Clamped, Sections
+from .sections import Clamped, Sections, moved_to
 
 FRAMES = ("tangent", "mean")
 
@@ -24,6 +32,15 @@ FRAMES = ("tangent", "mean")
 _DENSE = 300
 #: Squared frequencies below this part of the largest are motions without strain.
 _STRAINLESS = 1e-14
+
+
+@dataclass(frozen=True)
+class Release:
+    """What a hinge leaves free at the section that it holds: twists (6, f) [displacement of its
+    point; rotation], body axes, and those of them (6, g) along which something acts on it."""
+
+    twists: Array
+    loaded: Array
 
 
 @dataclass(frozen=True)
@@ -36,7 +53,7 @@ class Reduction:
         frame: "tangent" (shapes vanish at `held`) or "mean" (shapes carry no momentum).
         shapes: (u, n), m per m of modal coordinate; sections: (w, n) the same over sections.
         frequencies: (n,) rad/s, ascending, of the body with its other ends free.
-        static: how many static shapes went in, fixed: how many fixed-interface modes.
+        static: how many static shapes went in, fixed: how many vibration modes.
         left_out: frequencies of shapes above the highest one wanted.
     """
 
@@ -48,6 +65,7 @@ class Reduction:
     static: int
     fixed: int
     left_out: Array
+    released: bool = False  #: the modes are those of the body as its hinge holds it
 
     def motion(self, port: Port) -> Array:
         """(6, n): displacement (m) of the port's point and rotation (rad) of its section."""
@@ -66,26 +84,33 @@ def reduce(
     modes: int,
     frame: str,
     highest: float | None = None,
+    release: Release | None = None,
 ) -> Reduction:
-    """Craig-Bampton shapes of a model with ports.
+    """Craig-Bampton shapes of a model with ports, or those of a body that its hinge leaves free.
 
     Args:
         ports: every port; those that are `loaded` get six static shapes each.
         held: the loaded port by which the body is held.
-        modes: number of fixed-interface modes.
+        modes: number of vibration modes.
         frame: "tangent" at the held port, or "mean".
         highest: shapes above this frequency (rad/s) are left out.
+        release: what the hinge leaves free at the held port; None for nothing.
 
     Raises SceneError for more modes than there are, a body that moves without strain, and if no
     shape is left.
     """
     sections = Sections(model, tuple(ports))
     loaded = [port for port in ports if port.loaded]
-    clamped = sections.clamped(loaded)
     others = [port for port in loaded if port is not held]
-    parts = [clamped.constraint_shapes(port) for port in others]
-    parts.append(clamped.full(fixed_interface_modes(clamped, modes)))
-    shapes = sections.expand @ np.hstack(parts)
+    free = 0 if release is None else release.twists.shape[1]
+    if release is not None and (free == 6 or (free and not others)):
+        found = _released_shapes(sections, held, others, release, modes)
+    else:
+        release, clamped = None, sections.clamped(loaded)
+        parts = [clamped.constraint_shapes(port) for port in others]
+        parts.append(clamped.full(fixed_interface_modes(clamped, modes)))
+        found = np.hstack(parts)
+    shapes = sections.expand @ found
     if not shapes.shape[1]:
         raise model.refuse(
             "modes = 0 leaves no shape, for only one end carries loads; write modes = 1 or more, "
@@ -101,13 +126,28 @@ def reduce(
             f"rad/s, found {highest:.6g}; raise it, or describe the body as a rigid [[body]]"
         )
     return Reduction(
-        sections, held, frame, shapes[:, kept], frequencies[kept], 6 * len(others), modes,
-        frequencies[~kept],
+        sections, held, frame, shapes[:, kept], frequencies[kept], found.shape[1] - modes, modes,
+        frequencies[~kept], release is not None,
     )  # fmt: skip
 
 
-def fixed_interface_modes(clamped: Clamped, modes: int) -> Array:
-    """(free, modes): the lowest modes with the sections of all loaded ports held."""
+def _released_shapes(
+    sections: Sections, held: Port, others: Sequence[Port], release: Release, modes: int
+) -> Array:
+    """(w, n): attachment modes, then the lowest modes of the body as its hinge holds it; less the
+    motion of the held section."""
+    at_origin = moved_to(-held.position)
+    motions = sections.rigid @ (at_origin @ release.twists)
+    clamped = sections.clamped([held])
+    rows = [sections.rows[port.name].toarray() for port in others]
+    rows.append(release.loaded.T @ sections.rows[held.name].toarray())
+    static = clamped.statics(sections.relieved(np.vstack(rows).T, motions))
+    return np.hstack([static, clamped.full(fixed_interface_modes(clamped, modes, motions))])
+
+
+def fixed_interface_modes(clamped: Clamped, modes: int, motions: Array | None = None) -> Array:
+    """(free, modes): the lowest modes with the sections of all loaded ports held, but for the rigid
+    `motions` (w, f) that are left free: the deflections against those."""
     if not modes:
         return np.zeros((len(clamped.free), 0))
     model = clamped.sections.model
@@ -118,7 +158,8 @@ def fixed_interface_modes(clamped: Clamped, modes: int) -> Array:
         )
     mass = clamped.sections.mass.tocsc()[clamped.free][:, clamped.free]
     dense = len(clamped.free) <= _DENSE or 2 * modes >= clamped.count
-    squares, found = _dense(clamped, mass, modes) if dense else _sparse(clamped, mass, modes)
+    inertia = _FollowingMass(mass, *_carried_mass(clamped, motions))
+    squares, found = (_dense if dense else _sparse)(clamped, inertia, modes)
     usable = int(np.count_nonzero(np.isfinite(squares) & (squares > 0)))
     if usable < modes:
         raise model.refuse(
@@ -128,13 +169,40 @@ def fixed_interface_modes(clamped: Clamped, modes: int) -> Array:
     return found
 
 
-def _dense(clamped: Clamped, mass: object, modes: int) -> tuple[Array, Array]:
+@dataclass(frozen=True)
+class _FollowingMass:
+    """The mass (free, free) of deflections against rigid motions that follow them freely: M less
+    C^T J^-1 C with C (f, free) their coupling and J (f, f) the inertia of the motions."""
+
+    mass: Any
+    coupling: Array
+    inertia: Array
+
+    def dense(self) -> Array:
+        """(free, free)."""
+        followed = self.coupling.T @ np.linalg.solve(self.inertia, self.coupling)
+        return np.asarray(self.mass.toarray() - followed)
+
+    def __matmul__(self, x: Array) -> Array:
+        followed = self.coupling.T @ np.linalg.solve(self.inertia, self.coupling @ x)
+        return np.asarray(self.mass @ x - followed)
+
+
+def _carried_mass(clamped: Clamped, motions: Array | None) -> tuple[Array, Array]:
+    """Coupling (f, free) of rigid motions (w, f) with the unknowns, and their inertia (f, f)."""
+    if motions is None:
+        return np.zeros((0, len(clamped.free))), np.zeros((0, 0))
+    moved = np.asarray((clamped.sections.mass @ motions).T)
+    return moved[:, clamped.free], moved @ motions
+
+
+def _dense(clamped: Clamped, mass: _FollowingMass, modes: int) -> tuple[Array, Array]:
     from scipy import linalg
 
     stiffness = clamped.sections.stiffness.tocsc()[clamped.free][:, clamped.free].toarray()
     rows = clamped.rows
     basis = np.eye(len(stiffness)) if rows is None else linalg.null_space(rows.toarray())
-    m, k = basis.T @ mass.toarray() @ basis, basis.T @ stiffness @ basis  # type: ignore[attr-defined]
+    m, k = basis.T @ mass.dense() @ basis, basis.T @ stiffness @ basis
     #  the mass may be singular (lumped, without rotary inertia), the stiffness is not
     try:
         inverse, found = linalg.eigh((m + m.T) / 2, (k + k.T) / 2)
@@ -149,7 +217,7 @@ def _dense(clamped: Clamped, mass: object, modes: int) -> tuple[Array, Array]:
     return squares, basis @ found[:, order]
 
 
-def _sparse(clamped: Clamped, mass: object, modes: int) -> tuple[Array, Array]:
+def _sparse(clamped: Clamped, mass: _FollowingMass, modes: int) -> tuple[Array, Array]:
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
     size, solve = len(clamped.free), clamped.inverse
@@ -159,10 +227,11 @@ def _sparse(clamped: Clamped, mass: object, modes: int) -> tuple[Array, Array]:
         return solve(load.reshape(size, 1), None).reshape(size)
 
     operator = LinearOperator((size, size), matvec=inverse, dtype=np.float64)
+    weighing = LinearOperator((size, size), matvec=mass.__matmul__, dtype=np.float64)
     start = inverse(np.cos(np.arange(size)))  # one start for all runs, so that runs agree
     try:
         squares, found = eigsh(
-            stiffness, k=modes, M=mass, sigma=0.0, OPinv=operator, v0=start, which="LM"
+            stiffness, k=modes, M=weighing, sigma=0.0, OPinv=operator, v0=start, which="LM"
         )
     except ArpackError as failure:
         raise clamped.sections.model.refuse(

@@ -47,7 +47,7 @@ def second_order(reduction: Reduction, ports: list[Port]) -> SecondOrder:
     moving = [p for p in ports if reduction.frame == "mean" or p is not reduction.held]
     loads = np.hstack([_body_loads(reduction), *(_port_loads(reduction, p) for p in moving)])
     if reduction.frame == "mean":
-        loads = _relieved(reduction, loads)
+        loads = reduction.sections.relieved(loads, reduction.sections.rigid)
     static = reduction.sections.clamped([reduction.held]).statics(loads)
     families = model.stress(reduction.sections.expand @ static, reduction.shapes)
     families = (families + families.transpose(0, 2, 1)) / 2
@@ -70,27 +70,3 @@ def _body_loads(reduction: Reduction) -> Array:
 def _port_loads(reduction: Reduction, port: Port) -> Array:
     """(w, 3): unit forces at the port's point."""
     return np.asarray(reduction.sections.rows[port.name].toarray().T[:, :3])
-
-
-def _relieved(reduction: Reduction, loads: Array) -> Array:
-    """Loads with the inertia of the rigid-body acceleration they cause: in balance."""
-    sections, model = reduction.sections, reduction.sections.model
-    accelerations = np.linalg.solve(model.inertia, _rigid(reduction).T @ loads)
-    inertia = sections.expand.T @ (model.mass @ (model.rigid @ accelerations))
-    return np.asarray(loads - inertia)
-
-
-def _rigid(reduction: Reduction) -> Array:
-    """(w, 6): unit rigid-body motions of the body over its sections."""
-    sections, model = reduction.sections, reduction.sections.model
-    places = [port for port in sections.ports if port.stiff]
-    found = np.zeros((sections.expand.shape[1], 6))
-    taken = np.concatenate([*(port.unknowns(model) for port in places), []]).astype(int)
-    for k, port in enumerate(places):
-        for axis in range(3):
-            found[6 * k + axis, axis] = 1.0
-            found[6 * k + 3 + axis, 3 + axis] = 1.0
-            found[6 * k : 6 * k + 3, 3 + axis] = np.cross(np.eye(3)[axis], port.position)
-    rest = np.setdiff1d(np.arange(model.mass.shape[0]), taken)
-    found[6 * len(places) :] = model.rigid[rest]
-    return found

@@ -78,6 +78,23 @@ class Sections:
                 found[port.name] = mean @ self.expand[port.unknowns(self.model)]
         return found
 
+    @cached_property
+    def rigid(self) -> Array:
+        """(w, 6): unit translations, then unit rotations about the origin."""
+        model, found = self.model, np.zeros((self.expand.shape[1], 6))
+        taken = np.concatenate([*(port.unknowns(model) for port in self._stiff), []]).astype(int)
+        for k, port in enumerate(self._stiff):
+            found[6 * k : 6 * k + 6] = moved_to(port.position)
+        rest = np.setdiff1d(np.arange(model.mass.shape[0]), taken)
+        found[6 * len(self._stiff) :] = model.rigid[rest]
+        return found
+
+    def relieved(self, loads: Array, motions: Array) -> Array:
+        """Loads (w, k) with the inertia of the rigid motions (w, f) that they cause, so that they
+        do no work on those."""
+        inertia = self.mass @ motions
+        return np.asarray(loads - inertia @ np.linalg.solve(motions.T @ inertia, motions.T @ loads))
+
     def clamped(self, held: Sequence[Port]) -> Clamped:
         """The same body with the sections of some ports held, factorised once."""
         names = tuple(port.name for port in held)
@@ -86,6 +103,13 @@ class Sections:
     @cached_property
     def _clamped(self) -> dict[tuple[str, ...], Clamped]:
         return {}
+
+
+def moved_to(point: Array) -> Array:
+    """(6, 6): translation and rotation at a point from translation and rotation at the origin."""
+    found = np.eye(6)
+    found[:3, 3:] = -np.cross(np.eye(3), point)
+    return found
 
 
 @dataclass(frozen=True)

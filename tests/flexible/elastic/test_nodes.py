@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import mstmm
 from mstmm.runtime.flexible.elastic.bodies import model_of
-from mstmm.runtime.flexible.elastic.craig_bampton import reduce
+from mstmm.runtime.flexible.elastic.craig_bampton import Release, reduce
 from mstmm.runtime.flexible.elastic.ports import port
 
 Array = NDArray[np.float64]
@@ -36,7 +36,8 @@ class Nodes:
         table = bar.scene(elastic).elastic[0]
         self.model = model_of(table)
         ports = [port(self.model, name, end, True) for name, end in table.ends.items()]
-        reduction = reduce(self.model, ports, ports[0], table.modes or 0, "tangent")
+        free = Release(np.eye(6), np.zeros((6, 0)))
+        reduction = reduce(self.model, ports, ports[0], table.modes or 0, "tangent", release=free)
         self.shapes = reduction.shapes
         self.K = np.diag(self.model.inertia[0, 0] * reduction.frequencies**2)
 
@@ -78,7 +79,7 @@ def state(pair: tuple[Nodes, mstmm.Model]) -> tuple[Array, Array]:
     q, u = pair[1].initial_state()
     turned = draw.normal(size=4)
     q[:7] = [0.1, 0.2, -0.3, *(turned / np.linalg.norm(turned))]
-    q[7:], u[:] = 0.05 * draw.normal(size=len(q) - 7), draw.normal(size=len(u))
+    q[7:], u[:] = 0.02 * draw.normal(size=len(q) - 7), draw.normal(size=len(u))
     return q, u
 
 
