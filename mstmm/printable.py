@@ -1,6 +1,14 @@
-"""Text from outside, safe to show: a file's name may hold what moves a terminal's cursor."""
+"""Text to show: short lists, and text from outside made safe."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def abbreviate(names: Sequence[str], count: int = 4) -> str:
+    """The first `count` names in one line, and how many more there are."""
+    more = len(names) - count
+    return ", ".join(names[:count]) + (f" and {more} more" if more > 0 else "")
 
 
 def printable(text: str) -> str:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mstmm.printable import abbreviate
+
 from .options import Json, new_file, positive
 
 if TYPE_CHECKING:
@@ -81,9 +83,4 @@ def together(notes: Iterable[Note], file: str) -> list[str]:
     for note in notes:
         place = note.where.removeprefix(file).removeprefix(": ")
         about[note.text].append(f"{note.element} ({place})" if place else note.element)
-    return [f"{_some(elements)}: {text}" for text, elements in about.items()]
-
-
-def _some(elements: list[str]) -> str:
-    more = len(elements) - _NAMED
-    return ", ".join(elements[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+    return [f"{abbreviate(elements, _NAMED)}: {text}" for text, elements in about.items()]

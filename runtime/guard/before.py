@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 from mstmm.arrays import Array
-from mstmm.risk import Risk
+from mstmm.risk import DeferredRisks, Risk
 
 from ..run.notes import foreseen
 from . import branches, fast, heavy, locked, misfit, shapes, spun
@@ -33,22 +33,6 @@ _GUARDS: tuple[tuple[Callable[[Compiled], bool], Guard], ...] = (
 _concerned: WeakKeyDictionary[Compiled, tuple[Guard, ...]] = WeakKeyDictionary()
 
 
-class Later:
-    """Risks that are looked for when somebody asks for them, once: a run costs nothing for them."""
-
-    def __init__(self, find: Callable[[], Iterable[Risk]]) -> None:
-        self._find: Callable[[], Iterable[Risk]] | None = find
-        self._found: tuple[Risk, ...] = ()
-
-    def __iter__(self) -> Iterator[Risk]:
-        if self._find is not None:
-            self._found, self._find = tuple(self._find()), None
-        return iter(self._found)
-
-    def __reduce__(self) -> tuple[type[tuple[Risk, ...]], tuple[tuple[Risk, ...]]]:
-        return tuple, (tuple(self),)
-
-
 @dataclass(frozen=True)
 class Start:
     """What is known of a run of a model at its start: risks, but for that of its fixed step, which
@@ -60,7 +44,7 @@ class Start:
 
     def given(self, run: Trajectory, q: Array, u: Array) -> Trajectory:
         """The run from (nq,), (nu,) with what was known of it, and what its steps tell."""
-        risks = Later(lambda: (*self.risks, *run.risks, *fast.held_back(self.model, run)))
+        risks = DeferredRisks(lambda: (*self.risks, *run.risks, *fast.held_back(self.model, run)))
         return replace(run, start=(q, u), risks=risks, told=self.told)
 
 
@@ -72,5 +56,7 @@ def look(model: Compiled, settings: Settings, q: Array, u: Array) -> Start:
     if model not in _concerned:
         _concerned[model] = tuple(guard for concerns, guard in _GUARDS if concerns(model))
     guards, known = _concerned[model], foreseen(model.packed, settings)
-    found = Later(lambda: (*known, *(x for guard in guards for x in guard(model, settings, q, u))))
+    found = DeferredRisks(
+        lambda: (*known, *(x for guard in guards for x in guard(model, settings, q, u)))
+    )
     return Start(model, found)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
+from mstmm.risk import Assessed
 
 from ..pack.layout import refuse_dense
 from ..run.system import SceneSystem
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
+class Equations(Assessed):
     """M x'' + C x' + K x = V v + W w of motions x near a state of a scene, SI units.
 
     x (n,) are tangent increments of the coordinates that nobody imposes: dq = N(q) x where

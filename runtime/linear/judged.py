@@ -9,15 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
+from mstmm.printable import abbreviate
+from mstmm.risk import RUN, Risk, advice
 
 from ..engine.sizes import speed_sizes
+from ..guard.answers import find_state_risks
 from ..run.system import SceneSystem
 from .matrices import State
+from .modes import modes
 from .output.outputs import left_out
 
 if TYPE_CHECKING:
     from .equations import Equations
-    from .motions import Modes
 
 #: Distance from rest, and acceleration per s^2 of what nothing holds, in sizes of coordinates;
 #: stiffness that counts as none, in parts; matrices that still count as the same, in parts.
@@ -26,44 +30,74 @@ _STILL, _SOFT, SAME = 1e-6, 1e-13, 1e-6
 _CANCELLED = 1e-11
 #: How far matrices are compared along the motion, in rad or sizes.
 _AHEAD = 0.1
-#: Coordinates that a sentence names.
-_NAMED = 4
+#: Coordinates up to which matrices are made to look at the state, and up to which all motions are.
+_LARGEST, _ALL_MOTIONS = 2000, 400
 
 
-def warnings_of(linear: Equations, found: Modes) -> Iterator[str]:
-    """Sentences, the gravest first."""
+def find_linear_risks(linear: Equations) -> Iterator[Risk]:
+    """Risks of the state and of what the linear model leaves out, the gravest first."""
+    state = linear.state
+    yield from find_state_risks(linear.model, state.t, state.q, state.u)
+    yield from _unsteady(linear)
+    yield from _without_effect(linear)
+    for one in linear.model.scene.controller:
+        yield advice(
+            "controller-left-out", f'controller "{one.name}"',
+            f'controller "{one.name}" is left out: its inputs ({abbreviate(list(one.outputs))}) '
+            "stand still at the values of the scene", "close the loop by the inputs of this model",
+        )  # fmt: skip
+    for name, why in left_out(linear):
+        yield advice(
+            "output-left-out", f'output "{name}"', f"output {name} is not among the outputs: {why}",
+            "name an output that has a linear form",
+        )  # fmt: skip
+    if linear.model.packed.system.timed:
+        yield advice(
+            "time-dependent", RUN, f"loads depend on time: linearised at t = {state.t:g} s",
+            "give the time that is meant, t=...",
+        )  # fmt: skip
+    if len(linear) <= _ALL_MOTIONS:
+        yield from modes(linear, None, None).motion_risks()
+    else:
+        yield advice(
+            "stability-unknown", RUN,
+            f"more than {_ALL_MOTIONS} coordinates: not examined for motions that grow or that "
+            "nothing pushes back", "look at the slowest modes, modes(count=...)",
+        )  # fmt: skip
+
+
+def find_response_risks(linear: Equations) -> Iterator[Risk]:
+    """Risks of a linear model for its steady response, which a growing motion prevents."""
+    for risk in linear.risks:
+        yield replace(risk, doubt=True) if risk.name == "unstable" else risk
+
+
+def _unsteady(linear: Equations) -> Iterator[Risk]:
+    """A state that does not last, or along whose motion the matrices change."""
     leaving = accelerating(linear)
     if leaving:
-        yield (
-            f"the state does not last: {some(leaving)} accelerate there, so that the model "
-            "holds beside the motion through it, and only for a moment"
-        )
-    elif linear.state.u.any() and _changes(linear):
-        yield (
+        yield Risk(
+            "unsteady-state", abbreviate(leaving),
+            f"the state does not last: {abbreviate(leaving)} accelerate there, so that the model "
+            "holds beside the motion through it, and only for a moment",
+            "linearise at an equilibrium or a steady motion",
+        )  # fmt: skip
+    elif len(linear) <= _LARGEST and linear.state.u.any() and _changes(linear):
+        yield Risk(
+            "changing-coefficients", RUN,
             "the matrices change along the motion of this state: frequencies and growth of one "
-            "moment are not those of the motion"
-        )
+            "moment are not those of the motion",
+            "simulate the motion, or linearise about a state that keeps its matrices",
+        )  # fmt: skip
+
+
+def _without_effect(linear: Equations) -> Iterator[Risk]:
     for name, column in zip(linear.inputs, linear.V.T, strict=True):
         if len(linear) and not column.any():
-            yield f"input {name} moves nothing at this state"
-    for one in linear.model.scene.controller:
-        yield (
-            f'controller "{one.name}" is left out: its inputs ({some(list(one.outputs))}) stand '
-            "still at the values of the scene"
-        )
-    for name, why in left_out(linear):
-        yield f"output {name} is not among the outputs: {why}"
-    if linear.model.packed.system.timed:
-        yield f"what acts goes by time: the model is that of t = {linear.state.t:g} s"
-    growing = found.eigenvalues.real.max(initial=0)
-    if growing > 0:
-        k = int(found.eigenvalues.real.argmax())
-        moving = some(found.moving(k))
-        yield f"unstable: a motion of {moving} grows with {growing:.4g} 1/s"
-    free = np.flatnonzero(found.omega == 0)
-    if len(free):
-        moved = dict.fromkeys(name for k in free for name in found.moving(int(k)))
-        yield f"nothing pushes back {some(list(moved))}: motions of frequency 0"
+            yield advice(
+                "input-without-effect", f'input "{name}"', f"input {name} has no effect here",
+                "choose another input or state",
+            )  # fmt: skip
 
 
 def unrest(linear: Equations) -> bool:
@@ -89,12 +123,28 @@ def accelerating(linear: Equations) -> list[str]:
     a, sizes = linear.state.a[free], speed_sizes(linear.model)[free]
     if not a.any():
         return []
-    stiffness = linear.K * np.outer(sizes, sizes)
-    pushed = (linear.M @ a) * sizes
-    away = np.linalg.lstsq(stiffness, pushed, rcond=_SOFT)[0]
-    left = np.linalg.solve(linear.M, (pushed - stiffness @ away) / sizes) / sizes
+    if len(linear) > _LARGEST:
+        away, left = _displacement_by_sweep(linear, a) / sizes, np.zeros(len(a))
+    else:
+        stiffness = linear.K * np.outer(sizes, sizes)
+        pushed = (linear.M @ a) * sizes
+        away = np.asarray(np.linalg.lstsq(stiffness, pushed, rcond=_SOFT)[0], dtype=np.float64)
+        missing = (pushed - stiffness @ away) / sizes
+        left = np.asarray(np.linalg.solve(linear.M, missing) / sizes, dtype=np.float64)
     leaves = (np.abs(away) > _STILL) | (np.abs(left) > _STILL)
     return [linear.coordinates[k] for k in np.flatnonzero(leaves)]
+
+
+def _displacement_by_sweep(linear: Equations, a: Array) -> Array:
+    """(n,) distance from rest, K^-1 M a, without matrices; infinite where K is singular."""
+    if linear.mechanism is not None or linear.turning is not None:
+        return np.where(a == 0, 0.0, np.inf)
+    pencil = linear.pencil
+    try:
+        pencil.factor(0.0)
+    except NumericalFailure:
+        return np.where(a == 0, 0.0, np.inf)
+    return np.asarray(pencil.solve(pencil.mass(a)), dtype=np.float64)
 
 
 def _changes(linear: Equations) -> bool:
@@ -127,9 +177,3 @@ def apart(one: Array, other: Array) -> float:
     """Largest difference, in parts of the largest entry."""
     scale = float(np.abs(one).max(initial=0))
     return float(np.abs(one - other).max(initial=0)) / scale if scale else 0.0
-
-
-def some(names: list[str]) -> str:
-    """The first few names, and how many more there are."""
-    more = len(names) - _NAMED
-    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike
 from mstmm.arguments import short
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
+from mstmm.risk import Risk
 
 from ..pack.layout import refuse_dense
 from .harmonic.counted import ExactModes, exact_modes
 from .harmonic.exact import Chosen
 from .harmonic.losses import Losses
 from .harmonic.prescribed import Ratios
-from .judged import warnings_of
+from .judged import find_linear_risks
 from .modes import modes
 from .motions import Modes
 from .response import FrequencyResponse, frequency_response
@@ -100,9 +101,9 @@ class Linear(StateSpace):
         return exact_modes(self, count, exact)
 
     @cached_property
-    def warnings(self) -> tuple[str, ...]:
-        """What speaks against taking the model for the scene, in sentences."""
-        return tuple(warnings_of(self, self.modes()))
+    def findings(self) -> tuple[Risk, ...]:  # type: ignore[override]
+        """Risks of the state, and of what a linear model leaves out."""
+        return tuple(find_linear_risks(self))
 
     def output_matrices(self, outputs: Sequence[str] | None = None) -> tuple[Array, Array]:
         """C (outputs, states) and D (outputs, inputs) of y = C z + D v; `outputs` as
@@ -134,10 +135,10 @@ class Linear(StateSpace):
         return matrices(self, path)
 
     def to_dict(self) -> dict[str, Any]:
-        """Names, state and matrices, for JSON."""
+        """Names, state, matrices and risks, for JSON."""
         from .files import dictionary
 
-        return dictionary(self) | {"warnings": list(self.warnings)}
+        return dictionary(self) | self.assessment()
 
     def save(self, path: str | Path) -> Path:
         """Matrices by the names of their rows and columns: .nc (extra io), or .csv with a row for

@@ -7,7 +7,7 @@ its root locus.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -19,7 +19,9 @@ from scipy.optimize import linear_sum_assignment
 
 from mstmm.arrays import Array, Integers, numbers
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.risk import RUN, Assessed, DeferredRisks, Risk
 
+from ..guard.answers import merge_over_values
 from . import files
 from .motions import Complex, Modes
 
@@ -31,16 +33,19 @@ At = Callable[[float], "Linear"]
 
 #: How near a critical value is found, in parts of the range that is searched.
 _NEAR = 1e-12
+#: Part of its first value to which the slowest frequency falls before a limit point.
+_VANISHING = 0.03
 
 
 @dataclass(frozen=True, eq=False)
-class Locus:
+class Locus(Assessed):
     """Motions over a parameter: `values` (m,), `eigenvalues` (m, k), a column for each motion; nan
-    where it is not among those of its value."""
+    where it is not among those of its value; `findings`, the risks at each value."""
 
     parameter: str
     values: Array = field(repr=False)
     eigenvalues: Complex = field(repr=False)
+    findings: Iterable[Risk] = field(default=(), repr=False)
 
     @property
     def frequency(self) -> Array:
@@ -106,7 +111,11 @@ def traced(at: At, parameter: str, values: Array, count: int | None, damped: boo
     for row, (before, now) in enumerate(pairwise(found), start=1):
         order = _paired(before, now, order, width)
         rows[row, order] = now.eigenvalues
-    return Locus(parameter, values, rows)
+    each = list(zip(values.tolist(), found, strict=True))
+    findings = DeferredRisks(
+        lambda: merge_over_values(parameter, [(value, one.risks) for value, one in each])
+    )
+    return Locus(parameter, values, rows, findings)
 
 
 def _paired(before: Modes, now: Modes, order: Integers, width: int) -> Integers:
@@ -123,15 +132,17 @@ def _paired(before: Modes, now: Modes, order: Integers, width: int) -> Integers:
 
 
 @dataclass(frozen=True)
-class Critical:
+class Critical(Assessed):
     """The value of a parameter beyond which a motion grows; `kind` is "divergence" (a stiffness is
-    lost, as in buckling) or "flutter", `frequency` in Hz."""
+    lost, as in buckling) or "flutter", `frequency` in Hz; `findings` are the risks of the last
+    stable state below it."""
 
     parameter: str
     value: float
     kind: str
     frequency: float
     moving: tuple[str, ...]
+    findings: Iterable[Risk] = field(default=(), repr=False)
 
 
 def critical(at: At, parameter: str, low: float, high: float) -> Critical:
@@ -140,39 +151,74 @@ def critical(at: At, parameter: str, low: float, high: float) -> Critical:
 
     Raises SceneError where the ends are not so.
     """
-    growing = [_growing(at, value) for value in (low, high)]
-    if growing[0] is not None:
+    first, last = _modes_at(at, low), _modes_at(at, high)
+    if first is None or _growing(first) is not None:
         raise SceneError(
             f"{parameter} = {low:g}: a motion grows there already; expected a value at which the "
             "scene is stable"
         )
-    if growing[1] is None:
+    if last is not None and _growing(last) is None:
         raise SceneError(
             f"{parameter} = {high:g}: no motion grows there; expected a value beyond the critical"
         )
-    last, span = growing[1], high - low
+    below, span = first, high - low
     while abs(high - low) > _NEAR * abs(span):
         middle = (low + high) / 2
         if middle in (low, high):
             break
-        found = _growing(at, middle)
-        low, high, last = (middle, high, last) if found is None else (low, middle, found)
-    value, names = last
+        found = _modes_at(at, middle)
+        if found is not None and _growing(found) is None:
+            low, below = middle, found
+        else:
+            high, last = middle, found
+    growing = None if last is None else _growing(last)
+    value, names = (0j, ()) if last is None or growing is None else (
+        complex(last.eigenvalues[growing]), tuple(last.moving(growing))
+    )  # fmt: skip
     kind = "divergence" if value.imag == 0 else "flutter"
-    return Critical(parameter, (low + high) / 2, kind, abs(value.imag) / (2 * np.pi), names)
+    lost = _lost_equilibrium(parameter, high, first, below) if last is None else ()
+    return Critical(
+        parameter, (low + high) / 2, kind, abs(value.imag) / (2 * np.pi), names,
+        DeferredRisks(lambda: (*lost, *_risks_below(parameter, low, below))),
+    )  # fmt: skip
 
 
-def _growing(at: At, value: float) -> tuple[complex, tuple[str, ...]] | None:
-    """The motion that grows most and what it moves; a scene without rest counts as one that does
-    not stand."""
+def _modes_at(at: At, value: float) -> Modes | None:
+    """All motions; None where the scene has no equilibrium."""
     try:
-        linear = at(value)
+        modes = at(value).modes()
     except NumericalFailure:
-        return 0j, ()
-    modes = linear.modes()
+        return None
     if not len(modes):
         raise SceneError("nothing moves in this scene, so that nothing grows")
+    return modes
+
+
+def _growing(modes: Modes) -> int | None:
+    """The motion that grows most."""
     k = int(modes.eigenvalues.real.argmax())
-    if modes.eigenvalues[k].real <= 0:
-        return None
-    return complex(modes.eigenvalues[k]), tuple(modes.moving(k))
+    return k if modes.eigenvalues[k].real > 0 else None
+
+
+def _risks_below(parameter: str, value: float, below: Modes) -> Iterator[Risk]:
+    """Risks of the last stable state; that its loads take away a stiffness is the answer itself."""
+    own = (
+        risk for risk in below.risks
+        if risk.name not in ("unstable", "unrestrained")
+        and not (risk.name == "buckling" and risk.figure is not None and risk.figure < 0)
+    )  # fmt: skip
+    return merge_over_values(parameter, [(value, own)])
+
+
+def _lost_equilibrium(parameter: str, high: float, first: Modes, below: Modes) -> tuple[Risk, ...]:
+    """No equilibrium was found beyond the value: at a limit point a stiffness vanishes before."""
+    if float(below.omega.min()) <= _VANISHING * float(first.omega.min()):
+        return ()
+    return (
+        Risk(
+            "no-equilibrium", RUN,
+            f"at {parameter} = {high:g} no equilibrium was found, but no stiffness vanishes before "
+            "that: the value may be where the search failed, not where stability ends",
+            "look at equilibrium() on both sides of the value",
+        ),
+    )  # fmt: skip

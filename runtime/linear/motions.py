@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from mstmm.arrays import Array, real
 from mstmm.errors import SceneError
+from mstmm.printable import abbreviate
+from mstmm.risk import Assessed, Risk, advice
 
 from ..engine.sizes import scene_length
 from . import files, shares
@@ -28,7 +30,7 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class Modes(Assessed):
     """k motions x(t) = Re(shape exp(eigenvalue t)) near a state, by rising omega.
 
     Attributes:
@@ -51,6 +53,31 @@ class Modes:
 
     def __len__(self) -> int:
         return len(self.eigenvalues)
+
+    @property
+    def findings(self) -> Iterator[Risk]:  # type: ignore[override]
+        """Risks of the linear model, and motions that grow or are free."""
+        yield from self.linear.risks
+        yield from self.motion_risks()
+
+    def motion_risks(self) -> Iterator[Risk]:
+        """Motions that grow, and motions that nothing pushes back."""
+        growing = self.eigenvalues.real.max(initial=0)
+        if growing > 0:
+            k = int(self.eigenvalues.real.argmax())
+            moving = abbreviate(self.moving(k))
+            yield advice(
+                "unstable", moving, f"unstable: a motion of {moving} grows with {growing:.4g} 1/s",
+                "small motions leave this state; choose a stable one",
+            )  # fmt: skip
+        free = np.flatnonzero(self.omega == 0)
+        if len(free):
+            moved = list(dict.fromkeys(name for k in free for name in self.moving(int(k))))
+            yield advice(
+                "unrestrained", abbreviate(moved),
+                f"nothing pushes back {abbreviate(moved)}: motions of frequency 0",
+                "add a stiffness if they are not meant to move freely",
+            )  # fmt: skip
 
     @property
     def omega(self) -> Array:
@@ -143,6 +170,7 @@ class Modes:
             "kinetic": {name: row.tolist() for name, row in self.kinetic().items()},
             "strain": {name: [None if np.isnan(x) else x for x in row.tolist()]
                        for name, row in self.strain().items()},
+            **self.assessment(),
         }  # fmt: skip
 
     def to_dataset(self) -> Any:

@@ -9,7 +9,7 @@ frequency.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.risk import Assessed, DeferredRisks, Risk
 
 from ..engine.response import Response
 from ..engine.sizes import speed_sizes
@@ -36,6 +37,7 @@ from .harmonic.losses import Losses, stiffer
 from .harmonic.prescribed import Ratios, modal_damping
 from .harmonic.refused import given, refuse_drives, refuse_in_motion, refuse_ratios
 from .harmonic.steady import refuse_turning, refuse_unsteady
+from .judged import find_response_risks
 from .matrices import Matrices
 from .output.outputs import outputs_of, read_by, rows_of
 from .output.seen import Seen
@@ -64,7 +66,7 @@ _FASTEST = 1e100
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyResponse:
+class FrequencyResponse(Assessed):
     """Amplitudes of outputs under inputs cos(omega t) of unit amplitude.
 
     Attributes:
@@ -72,6 +74,7 @@ class FrequencyResponse:
         inputs, outputs: names.
         input_units, output_units: their units.
         values: (k, outputs, inputs) complex; an output is Re(values exp(i omega t)).
+        findings: risks of the linear model and of what was asked of it.
     """
 
     omega: Array = field(repr=False)
@@ -80,6 +83,7 @@ class FrequencyResponse:
     input_units: tuple[str, ...] = field(repr=False)
     output_units: tuple[str, ...] = field(repr=False)
     values: Complex = field(repr=False)
+    findings: Iterable[Risk] = field(default=(), repr=False)
 
     @property
     def frequency(self) -> Array:
@@ -129,6 +133,7 @@ class FrequencyResponse:
             "inputs": list(self.inputs), "outputs": list(self.outputs),
             "input_units": list(self.input_units), "output_units": list(self.output_units),
             "real": self.values.real.tolist(), "imag": self.values.imag.tolist(),
+            **self.assessment(),
         }  # fmt: skip
 
     def to_dataset(self) -> Any:
@@ -196,6 +201,7 @@ def frequency_response(
     return FrequencyResponse(
         frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
         tuple(one.unit for one in pushes), tuple(one.unit for one in shown), values,
+        DeferredRisks(lambda: find_response_risks(linear)),
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import cmath
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,9 @@ from numpy.typing import ArrayLike
 
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
+from mstmm.risk import Assessed, DeferredRisks, Risk
 
+from ..guard.answers import merge_over_values
 from . import files
 from .motions import Complex
 from .response import frequency_response
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Waterfall:
+class Waterfall(Assessed):
     """Amplitudes `values` (m, k) of one output under one input, complex: over a parameter (m,) and
     omega (k,) in rad/s."""
 
@@ -33,6 +35,7 @@ class Waterfall:
     input: str
     output: str
     values: Complex = field(repr=False)
+    findings: Iterable[Risk] = field(default=(), repr=False)
 
     def plot(self, path: str | Path | None = None) -> Any:
         """`matplotlib.figure.Figure`: magnitudes in dB as colours; written where `path` is given.
@@ -90,4 +93,8 @@ def waterfall(
     found = [frequency_response(at(x), omega, [pushed], [shown]) for x in points.tolist()]
     rows = np.array([one.values[:, 0, 0] for one in found])
     first = found[0]
-    return Waterfall(parameter, points, first.omega, first.inputs[0], first.outputs[0], rows)
+    each = list(zip(points.tolist(), found, strict=True))
+    return Waterfall(
+        parameter, points, first.omega, first.inputs[0], first.outputs[0], rows,
+        DeferredRisks(lambda: merge_over_values(parameter, [(x, one.risks) for x, one in each])),
+    )  # fmt: skip

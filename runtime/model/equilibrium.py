@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,12 +10,15 @@ from numpy.typing import NDArray
 
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
+from mstmm.printable import abbreviate
+from mstmm.risk import Assessed, DeferredRisks, Risk
 
 from ..engine.loops.freedom import Freedom
 from ..engine.rest import Rest, Undetermined, Unsettled, approached, leaving
 from ..engine.rest_by_sweep import Loose, RestBySweep
 from ..engine.sizes import speed_sizes
 from ..engine.tangent import Tangent
+from ..guard.answers import find_state_risks
 from ..run.at_rest.mechanism import Mechanism
 from ..run.system import SceneSystem
 from .turns import without_turns
@@ -32,20 +36,20 @@ _SWEPT, _DENSE = 20, 600
 _CANCELLED = 1e-14
 
 
-class Equilibrium(np.ndarray[Any, np.dtype[np.float64]]):
-    """q (nq,) of an equilibrium, an array like any other.
+class Equilibrium(Assessed, np.ndarray[Any, np.dtype[np.float64]]):
+    """q (nq,) of an equilibrium, an array like any other, and how far it can be trusted.
 
     `residuals` are the efforts in N or N*m (of modal coordinates N, or N*m for twist) still missing
     there, by the names of the free speeds, and `unstable` those of these speeds with which it is
     left once it is disturbed, where efforts have a potential (a saddle, or the top of a hill);
-    arrays computed from this one have neither.
+    arrays computed from this one have neither, and no findings.
     """
 
     residuals: dict[str, float]
     unstable: tuple[str, ...]
 
     def __array_finalize__(self, source: object) -> None:
-        self.residuals, self.unstable = {}, ()
+        self.residuals, self.unstable, self.findings = {}, (), ()
 
 
 def equilibrium(model: Compiled, q: Array, t: float, tolerance: float) -> Equilibrium:
@@ -59,7 +63,7 @@ def equilibrium(model: Compiled, q: Array, t: float, tolerance: float) -> Equili
     try:
         found, left = _found(model, problem, q, t, tolerance)
     except Undetermined as failure:
-        names = _some([name(failure.problem.places[k]) for k in failure.places])
+        names = abbreviate([name(failure.problem.places[k]) for k in failure.places])
         raise NumericalFailure(
             f"the equilibrium is undetermined along {names}: nothing pushes these coordinates "
             "back; fix them, drive them or add a stiffness"
@@ -75,7 +79,19 @@ def equilibrium(model: Compiled, q: Array, t: float, tolerance: float) -> Equili
     efforts = dict(zip(problem.places, problem.needed(found).tolist(), strict=True))
     result.residuals = {name(j): effort for j, effort in efforts.items()}
     result.unstable = tuple(map(name, left))
+    result.findings = DeferredRisks(lambda: _find_risks(model, t, result))
     return result
+
+
+def _find_risks(model: Compiled, t: float, found: Equilibrium) -> Iterator[Risk]:
+    """Risks of the state, and coordinates with which it is left once it is disturbed."""
+    yield from find_state_risks(model, t, np.asarray(found), np.zeros(model.nu))
+    if found.unstable:
+        names = abbreviate(found.unstable)
+        yield Risk(
+            "unstable", names, f"unstable: once disturbed the state is left along {names}",
+            "take another start, q=..., if a stable equilibrium is meant", doubt=False,
+        )  # fmt: skip
 
 
 def _found(
@@ -185,12 +201,6 @@ def _straight_places(model: Compiled, free: list[int]) -> NDArray[np.int64] | No
 def _with_drives(model: Compiled, q: Array, t: float) -> Array:
     """q with driven coordinates where their drives have them."""
     return SceneSystem(model.looped).start(t, q, np.zeros(model.nu))[: model.nq]
-
-
-def _some(names: list[str]) -> str:
-    """All of a few names, the first of many and how many there are besides."""
-    more = len(names) - _LISTED
-    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _largest(model: Compiled, problem: Rest, residual: Array) -> str:

@@ -22,13 +22,13 @@ from ..kernels import store
 from ..kernels.identity import kernels_hash
 from ..result import meshes
 from ..result.batch import BATCH
+from ..result.factory import result_of
 from ..result.output import provenance
 from ..result.output.columns import READERS, Columns
 from ..result.record import Record
 from ..result.result import Result
 from ..run.trajectory import Trajectory
 from .model import Model
-from .results import result_of
 
 
 def load_result(path: str | Path) -> Result | Columns:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from ..result.batch import Batch
     from ..result.result import Result
     from ..run.batch.inputs import BatchInput
+    from .assemble import Assembly
     from .equilibrium import Equilibrium
     from .session import Session
 
@@ -80,7 +81,7 @@ class Model(Linearised, Displayed):
         u: ArrayLike | None = None,
         hold: Sequence[str] = (),
         t: float = 0.0,
-    ) -> tuple[Array, Array]:
+    ) -> Assembly:
         """The nearest (q, u) at which all loops are closed at t (s), near the start where nothing
         is given.
 

@@ -12,22 +12,10 @@ from mstmm.arrays import Array
 from ..engine.compiled import Compiled
 from ..guard.before import Start
 from ..integrate.settings import Settings
+from ..result.factory import result_of
 from ..result.result import Result
 from ..run.checkpoint import Checkpoint
-from ..run.error_estimate import ErrorEstimate
 from ..run.execution import Watch, first_run, second_run
-from ..run.trajectory import Trajectory
-
-
-def result_of(model: Compiled, run: Trajectory, error: ErrorEstimate | None = None) -> Result:
-    """The result of a run: with elastic responses where the model has one-way bodies."""
-    expanded = model.packed.expanded
-    rigid = None if expanded is None else expanded.rigidified
-    if rigid is None or not rigid.one_way:
-        return Result(model, run, error)
-    from ..result.one_way.result import OneWayResult
-
-    return OneWayResult(model, run, error)
 
 
 def simulate(

@@ -21,6 +21,7 @@ from ..engine.renewed import with_held, with_values
 from ..integrate.loop import Run, Samples, Status
 from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO
+from ..result.factory import result_of
 from ..run import classical, second_opinion
 from ..run.endings import message_of
 from ..run.engine_choice import for_many
@@ -28,7 +29,6 @@ from ..run.measured import MeasuredOutputs, refuse_one_way
 from ..run.simulate import SLICE, make_run, settled, settles, split
 from ..run.stability import check_step
 from ..run.system import SceneSystem
-from .results import result_of
 
 if TYPE_CHECKING:
     from ..engine.compiled import Compiled

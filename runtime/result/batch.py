@@ -14,6 +14,7 @@ from mstmm.arguments import path_of
 from mstmm.arrays import Array, whole
 from mstmm.errors import SceneError
 from mstmm.extras import missing
+from mstmm.risk import RUN, Assessed, Risk
 
 from ..integrate.loop import Statistics, Status
 from ..run.batch.batch import BatchResult
@@ -50,11 +51,25 @@ class BatchRun(Record):
         return candidates(self)
 
 
-class Batch(BatchResult):
+class Batch(Assessed, BatchResult):
     """What n runs gave, with all quantities of single runs but the work, which batches leave out.
 
-    Values are nan at times that a run did not reach.
+    Values are nan at times that a run did not reach.  Its runs are not examined, so that a batch is
+    never trusted: simulate single runs for a verdict.
     """
+
+    @property
+    def findings(self) -> Iterator[Risk]:  # type: ignore[override]
+        """Runs that failed, and that no run is examined."""
+        for k in np.flatnonzero(~np.asarray(self.success)).tolist():
+            yield Risk(
+                "run-failed", f"run {k}", f"run {k} failed: {self.messages[k]}",
+                "simulate it alone", figure=k,
+            )  # fmt: skip
+        yield Risk(
+            "unexamined", RUN, "runs of a batch are not examined: their balances and errors are "
+            "unknown", "simulate single runs with certify=True",
+        )  # fmt: skip
 
     def run(self, k: int) -> BatchRun:
         """Run k with its own model, as a result that has names and quantities but no certificate.

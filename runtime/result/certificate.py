@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from mstmm.markup import Displayed, table
-from mstmm.risk import Risk, sentences
+from mstmm.risk import Risk, order_risks, sentences
 
 from ..integrate.reached import ReachedError
 from ..run.error_estimate import ANGLE, PART, ErrorEstimate, limit
@@ -18,7 +18,7 @@ from .evidence import Drift, Give
 from .flexible import certify
 from .flexible import risks as flexible_risks
 from .flexible.certify import Flexibility
-from .risks import of_balances, of_numbers, of_quaternions, ordered
+from .risks import of_balances, of_numbers, of_quaternions
 from .verdict import ACCURACY, Verdict
 
 
@@ -95,7 +95,7 @@ class Certificate(Displayed):
             pivot = None  # it vanishes where the coordinates fail
         early = self.step is not None and self.step.risk is not None
         looked_at = (pivot, locked, self.step if early else self.later)
-        return ordered((
+        return order_risks((
             *of_numbers(self.finite, self.reached), *self.known,
             *of_balances((self.energy, *self.momentum), self.control),
             *of_quaternions(self.quaternion_residual),

@@ -1,8 +1,8 @@
-"""Risks that the numbers of a run show by themselves, and their order."""
+"""Risks that the numbers of a run show by themselves."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -16,14 +16,6 @@ from .evidence import Drift
 
 #: Distance of a quaternion's length from 1 that is a risk.
 LENGTH = 1e-3
-
-
-def ordered(found: Iterable[Risk]) -> tuple[Risk, ...]:
-    """Doubts first, each once; of what was seen before the run and in it the later row."""
-    rows = tuple(dict.fromkeys(found))
-    seen = {(risk.name, risk.element) for risk in rows if not risk.before}
-    kept = (risk for risk in rows if not risk.before or (risk.name, risk.element) not in seen)
-    return tuple(sorted(kept, key=lambda risk: not risk.doubt))
 
 
 def of_numbers(finite: bool, reached: ReachedError | None) -> Iterator[Risk]:

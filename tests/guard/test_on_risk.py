@@ -10,8 +10,7 @@ import pytest
 from support.result_scenes import motor, pins, rod
 
 import mstmm
-from mstmm.risk import RUN, Risk, from_rows, sentences, to_rows
-from mstmm.runtime.result.risks import ordered
+from mstmm.risk import RUN, Risk, from_rows, order_risks, sentences, to_rows
 
 #: A fixed step at which the fastest motion is followed badly but stays bounded.
 COARSE: dict[str, Any] = {"method": "rk4", "step": 0.2}
@@ -66,7 +65,7 @@ def test_what_the_run_has_seen_stands_for_what_was_seen_before() -> None:
     other = Risk("pivot-loss", 'hinge "b"', "soon", "mend it", before=True)
     late = Risk("pivot-loss", 'hinge "a"', "now", "mend it")
     advice = Risk("stiff", RUN, "slow", "be patient", doubt=False)
-    assert ordered([advice, early, other, late, late]) == (other, late, advice)
+    assert order_risks([advice, early, other, late, late]) == (other, late, advice)
 
 
 # --- what is done about them ----------------------------------------------------------------------

@@ -143,4 +143,4 @@ def test_pushes_that_move_nothing() -> None:
     with pytest.raises(SceneError, match='hinge "turn" is driven there'):
         model.linearize(inputs=["turn.effort"])
     linear = model.linearize([0, 0], inputs=["idle"])
-    assert any("input idle moves nothing" in text for text in linear.warnings)
+    assert any("input idle has no effect" in text for text in linear.warnings)

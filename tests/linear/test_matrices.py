@@ -121,7 +121,7 @@ def test_a_column_buckles_where_euler_has_it(load: float, stable: bool) -> None:
     """At pi^2/4 E I/L^2 = 2.4674; eight shapes are a little stiffer."""
     linear = mstmm.compile(column(load, "inertial", 8)).linearize()
     assert (linear.modes().eigenvalues.real.max() <= 0) == stable
-    assert bool(linear.warnings) != stable
+    assert any("unstable" in text for text in linear.warnings) != stable
 
 
 @pytest.mark.parametrize(("load", "stable"), [(20.03, True), (20.07, False)])

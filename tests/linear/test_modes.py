@@ -241,7 +241,7 @@ def test_states_that_do_not_last_are_told() -> None:
     turning = of(hanging(2)).linearize([0, 0], [1.0, 0.0])
     assert turning.warnings
     timed = pendulum(law={"effort": "sin(t)"})
-    assert "goes by time" in of(timed).linearize([0.0]).warnings[0]
+    assert "depend on time" in of(timed).linearize([0.0]).warnings[0]
 
 
 def test_what_makes_no_sense() -> None:

@@ -14,8 +14,8 @@ from .asked import Asked, AtStart, Output, Plot, SceneFile, Set, assigned
 
 if TYPE_CHECKING:
     from mstmm.arrays import Array
+    from mstmm.risk import Assessed
     from mstmm.runtime.linear.harmonic.losses import Losses
-    from mstmm.runtime.linear.linear import Linear
     from mstmm.runtime.linear.motions import Modes
 
 #: Rows of tables on the terminal; coordinates and bodies that a mode's row names.
@@ -44,7 +44,7 @@ def linearize(
     linear = asked.linear(inputs)
     if asked.answered(linear):
         return
-    _tell_of(linear)
+    _print_assessment(linear)
     terminal.say(
         f"coordinates {len(linear)}, inputs {len(linear.inputs)}, "
         f"disturbances {len(linear.disturbances)}"
@@ -96,7 +96,7 @@ def modes(
     asked.show(found)
     if asked.answered(found):
         return
-    _tell_of(linear)
+    _print_assessment(found)
     head = ["mode>", "Hz>", "rad/s>", "damping>", "moves most", "kinetic energy"]
     carried = found.first(_ROWS).kinetic()
     rows = [
@@ -177,7 +177,7 @@ def frf(
     )  # fmt: skip
     if asked.answered(found):
         return
-    _tell_of(linear)
+    _print_assessment(found)
     head = ["output", "input", "largest magnitude>", "at Hz>"]
     rows = []
     for i, y in enumerate(found.outputs):
@@ -202,10 +202,12 @@ def _losses(texts: list[str]) -> Losses:
     return assigned("--structural", texts, "boom=0.02") or 0.0
 
 
-def _tell_of(linear: Linear) -> None:
+def _print_assessment(answer: Assessed) -> None:
+    """The verdict on an answer and its warnings."""
     from .. import output as terminal
 
-    for text in linear.warnings if len(linear) <= 2000 else ():
+    terminal.say(answer.verdict)
+    for text in answer.warnings:
         terminal.note(f"warning: {text}")
 
 

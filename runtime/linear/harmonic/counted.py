@@ -11,6 +11,7 @@ and J rises by one at each, by as many as coincide.  Bisection of all of them at
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ import numpy as np
 
 from mstmm.arrays import Array, Integers, whole
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.risk import Assessed, DeferredRisks, Risk
 
 from ...engine.response import Response
 from .exact import Chosen, ExactBeams, exact_beams
@@ -40,7 +42,7 @@ _SYMMETRIC = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class ExactModes:
+class ExactModes(Assessed):
     """The slowest k undamped natural motions, those with exact beams, by rising omega.
 
     Attributes:
@@ -49,12 +51,14 @@ class ExactModes:
             beside the tangent at the other.
         shapes: (n, k), the largest entry of each 1.
         complete: True: none below the last is missing.
+        findings: risks of the linear model.
     """
 
     omega: Array
     coordinates: tuple[str, ...] = field(repr=False)
     shapes: Array = field(repr=False)
     complete: bool = True
+    findings: Iterable[Risk] = field(default=(), repr=False)
 
     def __len__(self) -> int:
         return len(self.omega)
@@ -69,7 +73,7 @@ class ExactModes:
         return {
             "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
             "coordinates": list(self.coordinates), "shapes": self.shapes.tolist(),
-            "complete": self.complete,
+            "complete": self.complete, **self.assessment(),
         }  # fmt: skip
 
 
@@ -79,7 +83,8 @@ def exact_modes(linear: Equations, count: int, chosen: Chosen) -> ExactModes:
     beams = exact_beams(linear, chosen, 0.0).undamped()
     counter = _Counter(beams)
     omega = counter.bisected(count)
-    return ExactModes(omega, beams.linear.coordinates, counter.shapes(omega))
+    shapeless = DeferredRisks(lambda: (risk for risk in linear.risks if risk.name != "shapes"))
+    return ExactModes(omega, beams.linear.coordinates, counter.shapes(omega), findings=shapeless)
 
 
 class _Counter:

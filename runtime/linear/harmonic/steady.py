@@ -12,9 +12,10 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from mstmm.errors import SceneError
+from mstmm.printable import abbreviate
 
 from ..channels import Channel
-from ..judged import SAME, accelerating, apart, later, some
+from ..judged import SAME, accelerating, apart, later
 from ..output.outputs import outputs_of, rows_of
 from ..output.seen import Seen
 
@@ -38,9 +39,10 @@ def refuse_unsteady(linear: Equations, pushes: Sequence[Channel], shown: Sequenc
     changing = list(_changing(linear, pushes, shown))
     if changing:
         raise SceneError(
-            f"frequency response: the state turns, and along its motion changes {some(changing)}, "
-            "so that other frequencies answer too; push by efforts of hinges and read their "
-            "speeds, which go in outboard axes, or ask about a state at rest"
+            "frequency response: the state turns, and along its motion changes "
+            f"{abbreviate(changing)}, so that other frequencies answer too; push by "
+            "efforts of hinges and read their speeds, which go in outboard axes, "
+            "or ask about a state at rest"
         )
 
 

@@ -23,11 +23,12 @@ from ...host.interruptible import Interrupt, interruptible
 from ...integrate.reached import Attempt, ReachedError
 from ...integrate.settings import Settings
 from ...integrate.steppers import AUTO
+from ...result.factory import result_of
 from ...result.measure import Coordinates, Measure, Quantities
 from ...run.beginnings import put_back, taken
 from ...run.error_estimate import compare
 from ...run.execution import Watch, first_run
-from ..results import certified, result_of
+from ..results import certified
 from .asked import Asked
 from .family import Family, damps, held_back, kind_of_run
 from .looks import Kind, Look, estimate, first_rtol, hopeless, next_rtol, told

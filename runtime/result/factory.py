@@ -1,0 +1,23 @@
+"""The result that fits a run: with elastic responses where the model has one-way bodies."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .result import Result
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+    from ..run.error_estimate import ErrorEstimate
+    from ..run.trajectory import Trajectory
+
+
+def result_of(model: Compiled, run: Trajectory, error: ErrorEstimate | None = None) -> Result:
+    """The result of a run: with elastic responses where the model has one-way bodies."""
+    expanded = model.packed.expanded
+    rigid = None if expanded is None else expanded.rigidified
+    if rigid is None or not rigid.one_way:
+        return Result(model, run, error)
+    from .one_way.result import OneWayResult
+
+    return OneWayResult(model, run, error)
