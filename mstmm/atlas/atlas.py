@@ -10,7 +10,7 @@ from typing import Any
 
 from ..arguments import short
 from ..errors import EnvironmentFailure, SceneError
-from ..runtime.host.files import replacing
+from ..runtime.host.files import write_text
 from . import cases as known
 from .case import Case, measure
 
@@ -51,10 +51,8 @@ class Atlas:
         except OSError as error:
             raise EnvironmentFailure(f'folder "{place}" cannot be made: {error.strerror}') from None
         data, text = place / "atlas.json", place / "atlas.md"
-        with replacing(data) as temporary:
-            temporary.write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
-        with replacing(text) as temporary:
-            temporary.write_text(page(self.cases, pictures), encoding="utf-8")
+        write_text(data, json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
+        write_text(text, page(self.cases, pictures))
         return [data, text, *(self.plot(place) if pictures else ())]
 
 

@@ -48,6 +48,8 @@ def scene_text() -> str:
 
 def demo(json: Json = False) -> None:
     """Run an example; leave a result, pictures, one that moves, and a table in this folder."""
+    from mstmm.runtime.host.files import write_text
+
     from . import output, summary
 
     scene, result_file, table_file, picture, moving = _targets()
@@ -60,7 +62,7 @@ def demo(json: Json = False) -> None:
         result.table(*TABLE, rows=11), "", *summary.certificate_lines(result, 80),
     ])  # fmt: skip
     result.save(result_file)
-    table_file.write_text(text + "\n", encoding="utf-8")
+    write_text(table_file, text + "\n")
     if picture is not None:
         result.plot(*PICTURE, path=picture, title=TITLE)
     if moving is not None:
@@ -96,10 +98,12 @@ def _targets() -> tuple[Path, Path, Path, Path | None, Path | None]:
 
 def _write_scene(path: Path) -> str | None:
     """Leave the scene to play with; a file that somebody changed stays."""
+    from mstmm.runtime.host.files import write_text
+
     text = scene_text()
     if path.exists() and path.read_bytes() != text.encode():
         return "a scene of yours, left as it is"
-    path.write_text(text, encoding="utf-8")
+    write_text(path, text)
     return None
 
 

@@ -21,12 +21,13 @@ def export_robot(
 ) -> None:  # fmt: skip
     """Write the robot of a scene, and tell what of the scene URDF does not say."""
     import mstmm
+    from mstmm.runtime.host.files import write_text
 
     from .output import emit_json, say
 
     target = new_file(output, scene, ".urdf")
     found = mstmm.export_robot(mstmm.load_scene(scene), target.stem)
-    target.write_text(found.text, encoding="utf-8")
+    write_text(target, found.text)
     if json:
         notes = [{"element": n.element, "text": n.text} for n in found.notes]
         emit_json({"robot": str(target), "notes": notes})

@@ -58,6 +58,7 @@ def import_robot(
 ) -> None:  # fmt: skip
     """Write the scene of a robot, and tell what of the file a scene has not."""
     import mstmm
+    from mstmm.runtime.host.files import write_text
 
     from .output import emit_json, say
 
@@ -67,7 +68,7 @@ def import_robot(
         mimics="held" if hold_mimics else "coupled",
         units={"length": length, "mass": mass},
     )  # fmt: skip
-    target.write_text(found.to_toml(), encoding="utf-8")
+    write_text(target, found.to_toml())
     if json:
         notes = [{"where": n.where, "element": n.element, "text": n.text} for n in found.notes]
         emit_json({"scene": str(target), "names": dict(found.names), "notes": notes})

@@ -154,7 +154,7 @@ def new_file(given: str | None, beside: str, ending: str) -> Path:
     if given is not None:
         return output_file(given, (ending,))
     path = output_file(Path(beside).stem + ending, (ending,))
-    if path.exists():
+    if os.path.lexists(path):
         raise MstmmError(
             f"{path} is there already; name another with --output, or this one to write it anew"
         )

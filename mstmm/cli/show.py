@@ -67,6 +67,7 @@ def show(
     json: Json = False,
 ) -> None:  # fmt: skip
     """Show an element's equations, matrix, intermediate form or C, with units and sources."""
+    from mstmm.runtime.host.files import write_text
     from mstmm.scene.load import is_scene_file
 
     from .output import emit_json, note, put
@@ -84,7 +85,7 @@ def show(
         pages = {view.name: _page(view, at, format) for view in _views(element, at)}
     text = "\n".join(pages.values())
     if target is not None:
-        target.write_text(text, encoding="utf-8")
+        write_text(target, text)
     if json:
         written = None if target is None else str(target)
         emit_json({"at": at, "format": format, "pages": pages, "file": written})

@@ -14,7 +14,7 @@ from mstmm.errors import SceneError
 from mstmm.scene import Scene
 
 from ..chart.point import Setting
-from ..host.files import replacing
+from ..host.files import write_text
 from .choice import Choice
 from .evidence import Evidence
 from .renaming import renamed
@@ -177,8 +177,7 @@ class Advice:
         place = path_of("scene", path)
         if place.suffix != ".toml":
             raise SceneError(f"{place}: expected a name that ends in .toml")
-        with replacing(place) as temporary:
-            temporary.write_text(self.to_toml(), encoding="utf-8")
+        write_text(place, self.to_toml())
         return place
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from mstmm.errors import EnvironmentFailure
 
-from ..host.files import replacing
+from ..host.files import write_text
 from .page import page
 from .picture import installed, plot
 from .record import ChartRecord
@@ -42,8 +42,7 @@ class Chart(ChartRecord):
             raise EnvironmentFailure(f'folder "{place}" cannot be made: {error.strerror}') from None
         made = []
         for name, text in (("chart.html", self.to_html()), ("chart.json", self.to_json())):
-            with replacing(place / name) as temporary:
-                temporary.write_text(text, encoding="utf-8")
+            write_text(place / name, text)
             made.append(place / name)
         if installed():
             self.plot(place / "chart.png")

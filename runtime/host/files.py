@@ -112,6 +112,13 @@ def replacing(path: Path) -> Iterator[Path]:
         raise EnvironmentFailure(f'"{path}" cannot be written: {reason}') from error
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text file so that the old one stays whole until the new one is on the disk; a link of
+    this name is replaced, not followed.  EnvironmentFailure where it cannot be written."""
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
 @contextlib.contextmanager
 def _aside(folder: Path) -> Iterator[Path]:
     """Name of a file to be written; the lock is made before that file and removed after it."""

@@ -29,11 +29,11 @@ from mstmm.ir.tape import compile_tape
 from mstmm.scene import Scene
 from mstmm.scene.checks.types import types
 
-from ..host.files import replacing
+from ..host.files import write_text
 from ..libraries.build import Built, Order, fetched, found, remove
 from ..libraries.build_extension import COMPILE_ARGS
-from ..libraries.entry import ABOUT, Damaged
-from ..libraries.folder import objection
+from ..libraries.entry import ABOUT, Damaged, read_private
+from ..libraries.folder import objection, parent_objection
 from ..libraries.toolchain import time_limit
 from . import prebuilt
 from .prebuilt import Element
@@ -41,6 +41,7 @@ from .prebuilt import Element
 Key = tuple[str, str]
 
 _ROOT = (0,)  # may put a store where all can read it
+_WHAT = "kernel store"
 _WAY_OUT = "set MSTMM_KERNELS to a folder of your own"
 
 
@@ -63,9 +64,10 @@ def _trusted(place: Path) -> None:
 
     What lies there becomes equations and code of this process.
     """
-    for each in (folder(), place):
-        with suppress(OSError):  # not there: nothing to trust
-            problem = objection(each, os.stat(each), "kernel store", _WAY_OUT, _ROOT)
+    with suppress(OSError):  # not there: nothing to trust
+        for each in (folder(), place):
+            problem = objection(each, os.stat(each), _WHAT, _WAY_OUT, _ROOT)
+            problem = problem or parent_objection(each, _WHAT, _WAY_OUT)
             if problem:
                 raise EnvironmentFailure(problem)
 
@@ -84,8 +86,8 @@ def keep(spec: ElementSpec, files: dict[str, str]) -> tuple[Path, str]:
         for made in (folder(), place):
             made.mkdir(mode=0o700, exist_ok=True)
         for name, text in {**files, "element.json": element_to_json(spec)}.items():
-            with replacing(place / name) as temporary:
-                temporary.write_text(text, encoding="utf-8")
+            write_text(place / name, text)
+            (place / name).chmod(0o600)
     except (OSError, EnvironmentFailure) as error:
         said = error.strerror if isinstance(error, OSError) else error
         raise EnvironmentFailure(
@@ -106,7 +108,7 @@ def _replaces(place: Path, spec: ElementSpec) -> str:
     """A remark if another definition of this name is in the store."""
     try:
         earlier = element_from_json((place / "element.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return ""
     if earlier.hash() == spec.hash():
         return ""
@@ -129,11 +131,11 @@ def _order(spec: ElementSpec) -> Order:
     def sources(key: str) -> dict[str, str]:
         names = ("mstmm.h", f"{spec.kind}_{spec.name}.c")
         try:
-            return {name: (place / name).read_text(encoding="utf-8") for name in names}
-        except OSError as error:
+            return {name: read_private(place / name).decode() for name in names}
+        except (OSError, Damaged) as error:
+            why = getattr(error, "strerror", None) or error
             raise EnvironmentFailure(
-                f"{place} lacks its C text ({error.strerror}); generate it again: "
-                "mstmm generate FILE"
+                f"{place} lacks its C text ({why}); generate it again: mstmm generate FILE"
             ) from None
 
     return Order(
@@ -172,8 +174,12 @@ def spec(key: Key) -> ElementSpec | None:
 
 def _read(path: Path) -> ElementSpec:
     try:
-        return element_from_json(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        return element_from_json(read_private(path).decode())
+    except Damaged as damage:
+        raise EnvironmentFailure(
+            f"{path}: {damage}; generate it again: mstmm generate FILE"
+        ) from None
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         said = f"{type(error).__name__}: {error}"
         raise ElementError(
             f"{path}: the stored element is damaged ({said}); "

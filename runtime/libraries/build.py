@@ -148,7 +148,7 @@ def _workshop(parent: Path) -> Iterator[Path]:
     try:
         with locked(outer / LOCK, 0.0):
             inner = outer / "entry"
-            inner.mkdir()
+            inner.mkdir(mode=0o700)
             yield inner
     finally:
         shutil.rmtree(outer, ignore_errors=True)

@@ -20,6 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from .folder import is_private
+
 #: Layout of the folder; an entry of another layout is built again.
 FORMAT = 1
 
@@ -54,7 +56,7 @@ def read(folder: Path, key: str | None = None) -> Entry | None:
         raise Damaged("it belongs to another scene or compiler")
     entry = Entry(folder, about)
     try:
-        content = entry.library.read_bytes()
+        content = read_private(entry.library)
     except OSError as error:
         raise Damaged(f"its library cannot be read ({error.strerror})") from None
     if len(content) != about["bytes"]:
@@ -66,12 +68,14 @@ def read(folder: Path, key: str | None = None) -> Entry | None:
 
 def _described(folder: Path) -> dict[str, Any] | None:
     try:
-        about = json.loads((folder / ABOUT).read_bytes())
+        if not is_private(os.lstat(folder)):
+            raise Damaged("others may write to its folder, or it is a link")
+        about = json.loads(read_private(folder / ABOUT))
     except FileNotFoundError:
         if folder.is_dir():
             raise Damaged("its description is missing") from None
         return None
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         raise Damaged("its description cannot be read") from None
     expected = {"format": int, "key": str, "library": str, "bytes": int, "sha256": str}
     if not isinstance(about, dict) or about.get("format") != FORMAT:
@@ -83,6 +87,20 @@ def _described(folder: Path) -> dict[str, Any] | None:
     return about
 
 
+def read_private(path: Path) -> bytes:
+    """The content of a regular file that nobody else may write to.
+
+    Raises Damaged for another file or a link, OSError where it cannot be read.
+    """
+    if not is_private(os.lstat(path)):
+        raise Damaged(f"others may write to {path.name}, or it is a link")
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
+    with open(handle, "rb") as file:
+        if not is_private(os.fstat(handle)):
+            raise Damaged(f"others may write to {path.name}")
+        return file.read()
+
+
 def write(folder: Path, library: str, about: Mapping[str, Any]) -> Entry:
     """Describe the library that lies in `folder`.  Raises OSError."""
     content = (folder / library).read_bytes()
@@ -91,6 +109,7 @@ def write(folder: Path, library: str, about: Mapping[str, Any]) -> Entry:
         "sha256": hashlib.sha256(content).hexdigest(), **about,
     }  # fmt: skip
     (folder / ABOUT).write_text(json.dumps(described, indent=1), encoding="utf-8")
+    (folder / ABOUT).chmod(0o600)
     return Entry(folder, described)
 
 

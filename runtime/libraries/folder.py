@@ -15,6 +15,9 @@ from mstmm.errors import EnvironmentFailure
 
 VARIABLE = "MSTMM_CACHE"
 
+#: The user who may put a library where all can read it.
+_ROOT = 0
+
 _WAY_OUT = f"set {VARIABLE} to a folder of your own"
 
 
@@ -43,7 +46,7 @@ def private_folder() -> Path:
         raise EnvironmentFailure(
             f"the cache folder {place} cannot be used ({error.strerror}); {_WAY_OUT}"
         ) from None
-    problem = objection(place, status)
+    problem = objection(place, status) or parent_objection(place, "cache", _WAY_OUT)
     if problem:
         raise EnvironmentFailure(problem)
     return place
@@ -76,3 +79,23 @@ def objection(
             f"{stat.S_IMODE(status.st_mode):04o}); chmod 700 it after a look, or {way_out}"
         )
     return ""
+
+
+def parent_objection(place: Path, what: str, way_out: str) -> str:
+    """Why somebody else could put another folder into the place of one; "" if nobody can."""
+    for parent in place.resolve().parents:
+        status = parent.stat()
+        shared = status.st_mode & stat.S_IWOTH and not status.st_mode & stat.S_ISVTX
+        if shared or status.st_uid not in (os.geteuid(), _ROOT):
+            return (
+                f"others may replace the {what} folder {place}: its parent {parent} belongs to "
+                f"user {status.st_uid} and has mode {stat.S_IMODE(status.st_mode):04o}; {way_out}"
+            )
+    return ""
+
+
+def is_private(status: os.stat_result) -> bool:
+    """Whether a file or folder, no link, is ours or root's and closed to other writers."""
+    kept = stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)
+    ours = status.st_uid in (os.geteuid(), _ROOT)
+    return kept and ours and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)

@@ -85,3 +85,16 @@ def test_runs_show_quantities_by_the_names_of_the_file(mstmm: Command) -> None:
     assert done.code == 0
     (head,) = (line for line in done.out.splitlines() if "tool.x" in line)
     assert "shoulder-1.angle" in head and "1st arm.z" in head
+
+
+def test_a_dangling_link_of_the_scene_name_is_not_written_through(
+    mstmm: Command, folder: Path
+) -> None:
+    (folder / "arm.urdf").write_text(
+        '<robot name="arm"><link name="a"><inertial><mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>'
+    )
+    (folder / "arm.toml").symlink_to(folder / "elsewhere.toml")
+    done = mstmm("import", "arm.urdf")
+    assert done.code == 2 and "there already" in done.err
+    assert not (folder / "elsewhere.toml").exists()

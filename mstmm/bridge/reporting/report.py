@@ -41,7 +41,7 @@ def report(
     path = path_of("report", path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise SceneError(f'report "{path}": expected a name ending in .html')
-    from ...runtime.host.files import replacing
+    from ...runtime.host.files import write_text
 
     title = text_of("title", title) or path.stem
     quantities = texts_of("quantities", quantities, "energy")
@@ -56,8 +56,7 @@ def report(
         ("provenance", "Where it comes from", words.provenance(result)),
     )
     page = document(title, style, sections, words.verdict(result))
-    with replacing(path) as part:
-        part.write_text(page, encoding="utf-8")
+    write_text(path, page)
     return path
 
 

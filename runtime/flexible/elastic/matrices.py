@@ -12,7 +12,7 @@ from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.scene.rules.messages import near
 
-from ...host.files import read_arrays, refuse_special
+from ...host.files import read_arrays, refuse_special, replacing
 from .model import ElasticModel
 
 _MATRICES = ("mass", "stiffness", "scalar_mass")
@@ -41,7 +41,7 @@ def save_matrices(
     for key, matrix in zip(_MATRICES, (mass, stiffness, scalar_mass), strict=True):
         if matrix is not None:
             arrays |= _written(key, matrix)
-    with open(path, "wb") as file:
+    with replacing(Path(path)) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)
     return Path(path)
 
