@@ -101,6 +101,8 @@ class _Equations:
         self._system, self._frames = seeded(
             model.scene, self._known, list(names.parameters), lambda _, k: seeds[k]
         )
+        if dry := linear.dry:
+            self._system = replace(self._system, laws=dry.replaced(self._system.laws))
         self._q = [_rounded(x) for x in state.q.tolist()]
         self._u = [formula(x) for x in state.u.tolist()]
         for entries, kept_ones in ((self._q, names.coordinates), (self._u, names.speeds)):

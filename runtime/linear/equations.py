@@ -20,6 +20,7 @@ from .channels import Channel, columns
 from .drives import Columns, Moves, columns_of, coordinate
 from .loops.mechanism import Mechanism
 from .matrices import Matrices, State, matrices
+from .operating_point.friction import DryFriction
 from .pencil import Pencil
 from .standing import standing, with_held_springs, without_laws
 
@@ -49,6 +50,8 @@ class Equations(Assessed):
         about: the state by code compiled for the scene, where there is such code.
         mechanism: how closed loops let the scene move there: x are independent motions then; None
             for a tree.
+        dry: friction of hinges that rest at the state, which is left out or counts as viscous
+            damping; None where all of it is as the laws have it.
     """
 
     model: Compiled
@@ -58,6 +61,7 @@ class Equations(Assessed):
     turning: Array | None = field(default=None, repr=False)
     about: About | None = field(default=None, repr=False)
     mechanism: Mechanism | None = field(default=None, repr=False)
+    dry: DryFriction | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         return (
@@ -75,8 +79,15 @@ class Equations(Assessed):
 
     @property
     def tree(self) -> Engine:
-        """The scene, its loops torn open."""
-        return self.model.looped if self.mechanism is None else self.mechanism.tree
+        """The scene, its loops torn open, with dry friction as the model has it."""
+        if self.mechanism is not None:
+            return self.mechanism.tree
+        return self._smooth if self.dry else self.model.looped
+
+    @cached_property
+    def _smooth(self) -> Engine:
+        assert self.dry is not None
+        return self.dry.engine(self.model)
 
     @cached_property
     def _named(self) -> list[tuple[str, str]]:
@@ -267,7 +278,7 @@ class Equations(Assessed):
     @cached_property
     def pencil(self) -> Pencil:
         """M, C and K as operators, O(bodies), without the matrices; of states of trees at rest."""
-        return Pencil(self.model.looped, self.state, list(self.free))
+        return Pencil(self.tree, self.state, list(self.free))
 
     def spread(self, x: NDArray[Any]) -> NDArray[Any]:
         """(nu, ...) increments along all speeds of those of x (n, ...)."""

@@ -18,6 +18,7 @@ from ..guard.answers import find_state_risks
 from ..run.system import SceneSystem
 from .matrices import State
 from .modes import modes
+from .operating_point.sticking import friction_risks
 from .output.outputs import left_out
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ def find_linear_risks(linear: Equations) -> Iterator[Risk]:
     state = linear.state
     yield from find_state_risks(linear.model, state.t, state.q, state.u)
     yield from _unsteady(linear)
+    if len(linear) <= _LARGEST:
+        yield from friction_risks(linear)
     yield from _without_effect(linear)
     for one in linear.model.scene.controller:
         yield advice(

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ..linear.linear import Linear
     from ..linear.locus import Critical, Locus
     from ..linear.motions import Modes
+    from ..linear.operating_point.friction import Amplitudes
     from ..linear.response import FrequencyResponse
     from ..linear.waterfall import Waterfall
     from .linearize import Linearising
@@ -36,6 +37,7 @@ class Linearised(AtStates):
         *,
         inputs: Sequence[str] | None = None,
         disturbances: Sequence[str] | None = None,
+        friction: Amplitudes = None,
     ) -> Linear:
         """M x'' + C x' + K x = V v + W w near a state: at rest where nothing is given, else near
         `q` (nq,) and `u` (nu,; 0, or the scene's start q where only u is given) at time t (s).
@@ -47,6 +49,11 @@ class Linearised(AtStates):
         Coordinates that a drive imposes are left out; the others move along with it.  Exact, no
         differences.
 
+        Dry friction of hinges that rest at the state is left out, and `Linear.warnings` has the
+        amplitude below which they stick.  `friction` gives amplitudes V of speed (rad/s or m/s),
+        one or by the names of hinges, chains or speeds, at which it counts as the viscous damping
+        of equal work, 4 F/(pi V) of Coulomb's.  Of hinges that slide it has its own slope.
+
         Raises SceneError for a name or shape that does not fit, NumericalFailure where there is no
         equilibrium near the scene's start or the state has no accelerations.
         """
@@ -54,7 +61,7 @@ class Linearised(AtStates):
         return self._linearising(
             None if q is None else one("q", q, self.nq, instead),
             None if u is None else one("u", u, self.nu, instead),
-            real("t", t, "a time in s"), inputs, disturbances,
+            real("t", t, "a time in s"), inputs, disturbances, friction,
         )  # fmt: skip
 
     @cached_property
@@ -71,13 +78,14 @@ class Linearised(AtStates):
         t: float = 0.0,
         *,
         damped: bool | None = None,
+        friction: Amplitudes = None,
     ) -> Modes:
         """Natural motions near a state, as `linearize` takes it: all, or the `count` slowest.
 
         With damping and gyroscopic loads where there are any; `damped` False leaves them out.  See
-        `Linear.modes`.
+        `Linear.modes`, and `linearize` for `friction`.
         """
-        return self.linearize(q, u, t).modes(count, damped)
+        return self.linearize(q, u, t, friction=friction).modes(count, damped)
 
     def exact_modes(
         self,
@@ -101,11 +109,12 @@ class Linearised(AtStates):
         structural: Losses = 0.0,
         modal: Ratios = 0.0,
         exact: Chosen = False,
+        friction: Amplitudes = None,
     ) -> FrequencyResponse:
         """Amplitudes of outputs under harmonic inputs at omega (k,) in rad/s, near rest at `q`, or
-        at the equilibrium.  See `Linear.frequency_response`; without `inputs` those of the
-        scene push, else the ground moves."""
-        return self.linearize(q, None, t).frequency_response(
+        at the equilibrium.  See `Linear.frequency_response`, and `linearize` for `friction`;
+        without `inputs` those of the scene push, else the ground moves."""
+        return self.linearize(q, None, t, friction=friction).frequency_response(
             omega, inputs, outputs, structural=structural, modal=modal, exact=exact
         )
 
@@ -116,9 +125,11 @@ class Linearised(AtStates):
         count: int | None = None,
         *,
         damped: bool | None = None,
+        friction: Amplitudes = None,
     ) -> Locus:
         """Natural motions at rest over a number of the scene, named as in `with_parameters`: its
-        root locus, or Campbell's diagram where it is a spin ("constants.spin" in a drive).
+        root locus, or Campbell's diagram where it is a spin ("constants.spin" in a drive);
+        `friction` as in `linearize`.
 
         Raises SceneError for an unknown name or values (m,) that make no sense, NumericalFailure
         where there is no equilibrium.
@@ -126,7 +137,7 @@ class Linearised(AtStates):
         from ..linear.locus import traced
 
         points = one_row("values", values)
-        return traced(self._linear_at(parameter), parameter, points, count, damped)
+        return traced(self._linear_at(parameter, friction), parameter, points, count, damped)
 
     def waterfall(
         self, parameter: str, values: ArrayLike, omega: ArrayLike, input: str, output: str
@@ -137,16 +148,21 @@ class Linearised(AtStates):
         points = one_row("values", values)
         return waterfall(self._linear_at(parameter), parameter, points, omega, (input, output))
 
-    def critical(self, parameter: str, stable: float, unstable: float) -> Critical:
+    def critical(
+        self, parameter: str, stable: float, unstable: float, *, friction: Amplitudes = None
+    ) -> Critical:
         """Where between two values of a number of the scene a motion near rest begins to grow: the
-        buckling load, the speed of flutter.  By bisection; of several places one is found.
+        buckling load, the speed of flutter.  By bisection; of several places one is found;
+        `friction` as in `linearize`.
 
         Raises SceneError for an unknown name, or ends that are not stable and unstable.
         """
         from ..linear.locus import critical
 
         ends = real("stable", stable), real("unstable", unstable)
-        return critical(self._linear_at(parameter), parameter, *ends)
+        return critical(self._linear_at(parameter, friction), parameter, *ends)
 
-    def _linear_at(self, parameter: str) -> Callable[[float], Linear]:
-        return lambda value: self.with_parameters({parameter: value}).linearize(disturbances=())
+    def _linear_at(self, parameter: str, friction: Amplitudes = None) -> Callable[[float], Linear]:
+        return lambda value: self.with_parameters({parameter: value}).linearize(
+            disturbances=(), friction=friction
+        )

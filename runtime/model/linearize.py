@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from ..linear.judged import unrest
 from ..linear.linear import Linear
 from ..linear.loops.mechanism import mechanism_at, moving_at
 from ..linear.matrices import State, matrices
+from ..linear.operating_point.friction import Amplitudes, dry_friction
 from ..run.start import initial_state
 from ..run.system import SceneSystem
 from .derivatives import Differentiation
@@ -49,6 +51,7 @@ class Linearising:
         t: float,
         inputs: Sequence[str] | None,
         disturbances: Sequence[str] | None,
+        friction: Amplitudes = None,
     ) -> Linear:
         """See `Model.linearize`."""
         pushes, others = self._inputs, self._ground
@@ -57,28 +60,27 @@ class Linearising:
         if disturbances is not None:
             others = pushes_of(self._model, "disturbances", disturbances)
         q, u = self._state(q, u, t)
-        model, about = self._model, None
-        if model.freedom is None:
+        model, about, dry = self._model, None, dry_friction(self._model, u, friction)
+        if model.freedom is None and not dry:
             about = model.slopes.at(t, q, u)
-        if about is None:
-            state = State(t, q, u, self._accelerations(t, q, u))
-            if model.freedom is not None:
-                return self._of_mechanism(state, pushes, others)
-            return Linear(model, state, pushes, others, self._turning(state))
-        turning = None if self._straight or not u.any() else about.G
-        return Linear(model, State(t, q, u, about.a), pushes, others, turning, about)
+        if about is not None:
+            turning = None if self._straight or not u.any() else about.G
+            return Linear(model, State(t, q, u, about.a), pushes, others, turning, about)
+        state = State(t, q, u, self._accelerations(t, q, u))
+        bare = Linear(model, state, pushes, others, dry=dry)
+        if model.freedom is not None:
+            return self._of_mechanism(bare)
+        return replace(bare, turning=self._turning(state))
 
-    def _of_mechanism(
-        self, state: State, pushes: tuple[Channel, ...], others: tuple[Channel, ...]
-    ) -> Linear:
-        model = self._model
+    def _of_mechanism(self, bare: Linear) -> Linear:
+        model, state, dry = self._model, bare.state, bare.dry
         if not state.u.any():
-            found = Linear(model, state, pushes, others, mechanism=mechanism_at(model, state))
+            found = replace(bare, mechanism=mechanism_at(model, state, dry))
             if not unrest(found):
                 return found
-        loops = moving_at(model, state, self._slopes)
+        loops = moving_at(model, state, self._slopes, dry=dry)
         turning = None if loops is None else loops.turning
-        return Linear(model, state, pushes, others, turning, mechanism=loops)
+        return replace(bare, turning=turning, mechanism=loops)
 
     @cached_property
     def _inputs(self) -> tuple[Channel, ...]:

@@ -41,6 +41,12 @@ Plot = Annotated[
     str | None,
     typer.Option("--plot", metavar="FILE", help="A picture of it: .png, .svg or .pdf."),
 ]  # fmt: skip
+Friction = Annotated[
+    list[str] | None,
+    typer.Option("--friction", metavar="SPEED", help="Amplitude of speed, rad/s or m/s, at which "
+                 "dry friction counts as viscous damping, or of a hinge or chain: elbow=0.1; may "
+                 "be repeated.  Left out unless given."),
+]  # fmt: skip
 _FILES, _PICTURES = (".nc", ".csv"), (".png", ".svg", ".pdf")
 
 
@@ -55,6 +61,7 @@ class Asked:
     plot: str | None
     hinge: list[str] | None
     json: bool
+    friction: list[str] | None = None
     seen: str | None = None  #: of modes alone: where they are shown as they move
 
     def linear(self, inputs: list[str] | None) -> Linear:
@@ -65,7 +72,8 @@ class Asked:
         use_files(self.hinge or [])
         model = _changed(self.scene, self.change or [])
         state = model.initial_state() if self.at_start else (None, None)
-        return model.linearize(*state, inputs=inputs or None)
+        friction = number_or_named("--friction", self.friction or [], "elbow=0.1")
+        return model.linearize(*state, inputs=inputs or None, friction=friction)
 
     def _file(self) -> Path | None:
         return _checked(self.output, _FILES, "--output")
@@ -123,6 +131,18 @@ def _changed(scene: str, changes: list[str]) -> Model:
     numbers = assigned("--set", changes, "rod1.mass=2")
     model = compiled(scene, mstmm.load_scene(scene), engine="looped")
     return model.with_parameters(numbers) if numbers else model
+
+
+def number_or_named(
+    option: str, texts: Sequence[str], example: str
+) -> float | dict[str, float] | None:
+    """One number for all, or numbers by names; None where nothing is given."""
+    if len(texts) == 1 and "=" not in texts[0]:
+        try:
+            return float(texts[0])
+        except ValueError:
+            pass
+    return assigned(option, texts, example) or None
 
 
 def assigned(option: str, texts: Sequence[str], example: str) -> dict[str, float]:

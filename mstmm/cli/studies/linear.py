@@ -10,12 +10,11 @@ import typer
 from mstmm.errors import MstmmError
 
 from ..options import Elements, Json, at_least, positive
-from .asked import Asked, AtStart, Output, Plot, SceneFile, Set, assigned
+from .asked import Asked, AtStart, Friction, Output, Plot, SceneFile, Set, number_or_named
 
 if TYPE_CHECKING:
     from mstmm.arrays import Array
     from mstmm.risk import Assessed
-    from mstmm.runtime.linear.harmonic.losses import Losses
     from mstmm.runtime.linear.motions import Modes
 
 #: Rows of tables on the terminal; coordinates and bodies that a mode's row names.
@@ -30,6 +29,7 @@ def linearize(
                      "strut.effort, boom.tip.force.x, boom.tip.mz, an input of the scene; may be "
                      "repeated.  The inputs of the scene unless given."),
     ] = None,
+    friction: Friction = None,
     at_start: AtStart = False,
     change: Set = None,
     output: Output = None,
@@ -40,7 +40,7 @@ def linearize(
     """Make a scene linear near its rest: M x'' + C x' + K x = V v + W w."""
     from .. import output as terminal
 
-    asked = Asked(scene, at_start, change, output, plot, hinge, json)
+    asked = Asked(scene, at_start, change, output, plot, hinge, json, friction)
     linear = asked.linear(inputs)
     if asked.answered(linear):
         return
@@ -73,6 +73,7 @@ def modes(
     undamped: Annotated[
         bool, typer.Option("--undamped", help="Without damping and gyroscopic loads.")
     ] = False,
+    friction: Friction = None,
     at_start: AtStart = False,
     change: Set = None,
     output: Output = None,
@@ -89,7 +90,7 @@ def modes(
     """Natural motions of a scene near its rest: frequency, damping, and what moves."""
     from .. import output as terminal
 
-    asked = Asked(scene, at_start, change, output, plot, hinge, json, seen)
+    asked = Asked(scene, at_start, change, output, plot, hinge, json, friction, seen)
     linear = asked.linear(None)
     most = None if count is None or not len(linear) else min(count, len(linear))
     found = linear.modes(most, False if undamped else None)
@@ -152,6 +153,7 @@ def frf(
         typer.Option("--exact", metavar="BEAM", help="A beam by its exact dynamic stiffness in "
                      "place of shapes, all for every one; may be repeated."),
     ] = None,
+    friction: Friction = None,
     at_start: AtStart = False,
     change: Set = None,
     output: Output = None,
@@ -166,12 +168,13 @@ def frf(
 
     if not most > least:
         raise MstmmError(f"--from {least:g} --to {most:g}: expected a range that rises")
-    asked = Asked(scene, at_start, change, output, plot, hinge, json)
+    asked = Asked(scene, at_start, change, output, plot, hinge, json, friction)
     linear = asked.linear(None)
     omega = 2 * np.pi * np.geomspace(least, most, points)
     ratios: list[float] = modal or [0.0]
     found = linear.frequency_response(
-        omega, inputs or None, outputs or None, structural=_losses(structural or []),
+        omega, inputs or None, outputs or None,
+        structural=number_or_named("--structural", structural or [], "boom=0.02") or 0.0,
         modal=ratios[0] if len(ratios) == 1 else ratios,
         exact=True if exact == ["all"] else exact or False,
     )  # fmt: skip
@@ -190,16 +193,6 @@ def frf(
     if len(rows) > _ROWS:
         terminal.say(f"and {len(rows) - _ROWS} more")
     asked.say_where("all of it: --output FILE.csv or .nc, --plot FILE.png or --json")
-
-
-def _losses(texts: list[str]) -> Losses:
-    """One number for all, or numbers by names."""
-    if len(texts) == 1 and "=" not in texts[0]:
-        try:
-            return float(texts[0])
-        except ValueError:
-            pass
-    return assigned("--structural", texts, "boom=0.02") or 0.0
 
 
 def _print_assessment(answer: Assessed) -> None:

@@ -30,6 +30,7 @@ from ...flexible.kernel_inputs import in_frame
 from ...pack.parameters import data_of, made_of
 from ..channels import GROUND, Channel, channel
 from ..matrices import State
+from ..operating_point.friction import dry_friction
 from ..standing import standing
 from .losses import Losses, by_name
 
@@ -173,8 +174,9 @@ def _with_ends_as_shapes(linear: Equations, names: Sequence[str]) -> Equations:
     _, a = made.looped.accelerations(
         linear.state.t, q[None].copy(), still[None].copy(), made.looped.start_memory()[None]
     )
+    dry = None if linear.dry is None else dry_friction(made, still, linear.dry.amplitudes)
     return replace(
-        linear, model=made, state=State(linear.state.t, q, still, a[0]),
+        linear, model=made, state=State(linear.state.t, q, still, a[0]), dry=dry,
         controls=tuple(channel(made, one.name) for one in linear.controls),
         others=tuple(channel(made, one.name) for one in linear.others),
     )  # fmt: skip

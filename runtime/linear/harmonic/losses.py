@@ -26,9 +26,9 @@ from ...pack.system import (
     BodyRun,
     ForceNumbers,
     LawNumbers,
-    LawRun,
 )
 from ..matrices import State
+from ..operating_point.friction import changed_laws
 from ..standing import bushing_deflection, spring_length
 
 if TYPE_CHECKING:
@@ -54,7 +54,11 @@ def stiffer(linear: Equations, losses: Losses) -> Engine:
     model, engine, state = linear.model, linear.tree, linear.state
     system, lossy = engine.packed.system, by_name(model, losses)
     bodies = tuple(_stiffer_shapes(model, run, lossy) for run in system.bodies)
-    laws = tuple(law for run in system.laws for law in _stiffer_laws(engine, run, lossy))
+
+    def stiff(law: LawNumbers, body: int) -> LawNumbers:
+        return _stiffer_law(law, lossy(engine.hinge_name(body)))
+
+    laws = tuple(law for run in system.laws for law in changed_laws(run, stiff))
     forces = tuple(
         _stiffer_force(engine, force, state, lossy(one.name))
         for force, one in zip(system.forces, engine.packed.scene.forces, strict=True)
@@ -111,17 +115,6 @@ def _stiffer_shapes(model: Compiled, run: BodyRun, lossy: Callable[[str], float]
     if all(body.modal is None for body in run.alike):
         return run
     return replace(run, alike=tuple(map(one, run.alike)))
-
-
-def _stiffer_laws(engine: Engine, run: LawRun, lossy: Callable[[str], float]) -> Iterator[LawRun]:
-    """The same laws; one by one where a chain's members may lose different parts."""
-    factors = [lossy(engine.hinge_name(body)) for _, body, _, _ in run.each()]
-    if len(set(factors)) == 1:
-        yield replace(run, pattern=tuple(_stiffer_law(law, factors[0]) for law in run.pattern))
-        return
-    for (law, body, twist, places), factor in zip(run.each(), factors, strict=True):
-        alone = replace(law, member=0, turn=min(law.turn, 0), efforts=(places,))
-        yield LawRun(body, 1, 1, (_stiffer_law(alone, factor),), max(twist, 0))
 
 
 def _stiffer_law(law: LawNumbers, factor: float) -> LawNumbers:

@@ -32,6 +32,7 @@ from ...pack.pack import packed_system
 from ..channels import Channel, columns
 from ..drives import Columns, Moves, coordinate, slopes_along
 from ..matrices import Matrices, State, matrices
+from ..operating_point.friction import DryFriction
 from .motion import Motion, refuse_rows_of_speeds
 
 #: Exact slopes (nu, nu) of the accelerations at a state, by the names of `Derivatives`.
@@ -43,12 +44,14 @@ class Mechanism:
     """The motions of a mechanism beside one state.
 
     Attributes:
-        tree: the scene with its loops open.
+        tree: the scene with its loops open, with dry friction as the linear model has it.
         free: places of the speeds of the tree that nobody imposes.
         places: those of the n independent ones, which x are.
         ways: (nu, n) all speeds for a unit of each.
         turned: (n, n) stiffness of the loads that the loops carry, at rest.
         motion: what speeds do where the state does not rest, from `slopes`.
+        rough: the tree with all its dry friction, whose slopes those are.
+        dry: what of it the tree has viscous dampers for.
         model: whose mechanism it is.
     """
 
@@ -60,6 +63,8 @@ class Mechanism:
     turned: Array = field(repr=False)
     motion: Motion | None = field(default=None, repr=False)
     slopes: Slopes | None = field(default=None, repr=False)
+    rough: Engine | None = field(default=None, repr=False)
+    dry: DryFriction | None = field(default=None, repr=False)
 
     @property
     def turning(self) -> Array | None:
@@ -69,8 +74,8 @@ class Mechanism:
     def at(self, state: State) -> Mechanism | None:
         """The same motions at another state."""
         if self.slopes is None:
-            return mechanism_at(self.model, state)
-        return moving_at(self.model, state, self.slopes, self.places)
+            return mechanism_at(self.model, state, self.dry)
+        return moving_at(self.model, state, self.slopes, self.places, self.dry)
 
     def matrices(self, engine: Engine, state: State) -> Matrices:
         """Those of the tree, or of it with other elements, along x."""
@@ -78,9 +83,10 @@ class Mechanism:
         if self.motion is None:
             return Matrices(found.M, found.C, found.K + self.turned)
         whole = self.motion.matrices(found.M)
-        if engine is self.tree:
+        rough = self.rough or self.tree
+        if engine is rough:
             return whole
-        tree = self._along(self.tree, state)  # what the loops carry is the same for both
+        tree = self._along(rough, state)  # what the loops carry is the same for both
         return Matrices(found.M, whole.C + found.C - tree.C, whole.K + found.K - tree.K)
 
     def _along(self, engine: Engine, state: State) -> Matrices:
@@ -143,24 +149,25 @@ class Mechanism:
         return found
 
 
-def mechanism_at(model: Compiled, state: State) -> Mechanism | None:
-    """The mechanism at a state at rest; None for a tree.
+def mechanism_at(model: Compiled, state: State, dry: DryFriction | None = None) -> Mechanism | None:
+    """The mechanism at a state at rest, with viscous dampers for `dry` friction; None for a tree.
 
     Raises NumericalFailure where loops leave no one set of motions.
     """
     if model.freedom is None:
         return None
-    found = _mechanism(model, state, model.freedom.chosen(state.q))
+    found = _mechanism(model, state, model.freedom.chosen(state.q), dry)
     tree, free, ways = found.tree, found.free, found.ways
     carried = _along(model.looped, state, free, ways, _with_own_still(model, ways)).K
     return replace(found, turned=carried - _along(tree, state, free, ways, ways).K)
 
 
 def moving_at(
-    model: Compiled, state: State, slopes: Slopes, places: tuple[int, ...] | None = None
-) -> Mechanism | None:
+    model: Compiled, state: State, slopes: Slopes, places: tuple[int, ...] | None = None,
+    dry: DryFriction | None = None,
+) -> Mechanism | None:  # fmt: skip
     """The mechanism at a state that moves or does not last, along independent speeds in `places`
-    or those that are well chosen there; None for a tree.
+    or those that are well chosen there, with viscous dampers for `dry` friction; None for a tree.
 
     Raises SceneError for rows of speeds and scenes whose accelerations have no slopes,
     NumericalFailure as `mechanism_at`.
@@ -168,17 +175,24 @@ def moving_at(
     if model.freedom is None:
         return None
     refuse_rows_of_speeds(model, state.u)
-    found = _mechanism(model, state, places or model.freedom.chosen(state.q))
+    found = _mechanism(model, state, places or model.freedom.chosen(state.q), dry)
     return replace(found, motion=Motion.of(slopes(state), found.places, found.ways), slopes=slopes)
 
 
-def _mechanism(model: Compiled, state: State, places: tuple[int, ...]) -> Mechanism:
+def _mechanism(
+    model: Compiled, state: State, places: tuple[int, ...], dry: DryFriction | None
+) -> Mechanism:
     """Without what its loads and its motion do."""
     packed, freedom = model.packed, model.freedom
     assert freedom is not None
     ways, n = freedom.following(state.q, places), len(places)
-    tree = Engine(packed_system(torn(packed.system), packed))
-    return Mechanism(model, tree, model.free_speeds, places, ways, np.zeros((n, n)))
+    system = torn(packed.system)
+    tree = rough = Engine(packed_system(system, packed))
+    if dry:
+        tree = Engine(packed_system(replace(system, laws=dry.replaced(system.laws)), packed))
+    return Mechanism(
+        model, tree, model.free_speeds, places, ways, np.zeros((n, n)), rough=rough, dry=dry
+    )
 
 
 def _along(

@@ -1,0 +1,1 @@
+"""Operating points of linear models: dry friction there, and whether they last."""

@@ -1,0 +1,172 @@
+"""Dry friction in linear models: left out where a hinge rests, or as equivalent viscous damping.
+
+Dry friction has no slope at rest.  The law of a hinge is smooth over its regularisation velocity
+alone, and its slope there is the friction over that velocity, which is no property of the scene.
+Where the hinge slides at the state, the slope of its law is that of the motion, and stays.
+
+Under u = V sin(omega t) friction F(u) takes as much work from a period as a viscous damper of
+
+    c = 2/(pi V) integral from 0 to pi of F(V sin x) sin x dx,
+
+its describing function (N. Minorsky, Introduction to Non-linear Mechanics, 1947).  Coulomb's
+friction has c = 4 F/(pi V); what Stribeck's law adds is Dawson's integral.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from scipy.special import dawsn
+
+from mstmm.arrays import Array, real
+from mstmm.errors import SceneError
+from mstmm.scene.rules.messages import near
+
+from ...engine.engine import Engine
+from ...pack.pack import packed_system
+from ...pack.system import LawNumbers, LawRun
+
+if TYPE_CHECKING:
+    from ...engine.compiled import Compiled
+
+#: Amplitudes of speed (rad/s or m/s): one, or by the names of hinges, chains and speeds.
+Amplitudes = float | Mapping[str, float] | None
+
+#: Regularisation velocities above which a hinge slides: tanh is 1 but for 4e-9.
+_SLIDING = 10.0
+#: Places of damping, friction and velocities among the numbers of a law with friction.
+_KERNEL, _DAMPING, _COULOMB, _STATIC, _STRIBECK, _WIDTH = "full", 2, 3, 4, 5, 6
+
+
+class Rubbing(NamedTuple):
+    """Friction of one speed that rests: Coulomb's and static (N or N*m), the damping that takes its
+    place (N*s/m or N*m*s/rad), and whether an amplitude was given for it."""
+
+    speed: int
+    coulomb: float
+    static: float
+    damping: float
+    given: bool
+
+
+@dataclass(frozen=True, eq=False)
+class DryFriction:
+    """Friction of the hinges of a model that do not slide at speeds u (nu,), and what takes its
+    place."""
+
+    model: Compiled
+    rubbing: Mapping[int, Rubbing]
+    amplitudes: Amplitudes
+
+    def __bool__(self) -> bool:
+        return bool(self.rubbing)
+
+    def replaced(self, laws: tuple[LawRun, ...]) -> tuple[LawRun, ...]:
+        """Laws of the model's system with viscous damping in the place of this friction."""
+        first = self.model.packed.system.places["u"]
+
+        def change(law: LawNumbers, body: int) -> LawNumbers:
+            one = self.rubbing.get(int(first[body]) + law.speed)
+            if one is None or law.kernel != _KERNEL:
+                return law
+            p = list(law.p)
+            p[_DAMPING] = p[_DAMPING] + one.damping
+            p[_COULOMB] = p[_STATIC] = 0.0
+            return replace(law, p=tuple(p))
+
+        return tuple(law for run in laws for law in changed_laws(run, change))
+
+    def engine(self, model: Compiled) -> Engine:
+        """The looped engine of this model, or of it with other numbers, with these laws."""
+        packed = model.packed
+        made = replace(packed.system, laws=self.replaced(packed.system.laws))
+        return Engine(packed_system(made, packed))
+
+
+def changed_laws(run: LawRun, change: Callable[[LawNumbers, int], LawNumbers]) -> Iterator[LawRun]:
+    """A run of laws, each changed by itself and the place of its body: a pattern where all its
+    repeats change alike, else one by one."""
+    every = [(change(law, body), body, twist, places) for law, body, twist, places in run.each()]
+    width = len(run.pattern)
+    pattern = [law for law, _, _, _ in every[:width]]
+    if all(law is pattern[k % width] or law == pattern[k % width]
+           for k, (law, _, _, _) in enumerate(every)):  # fmt: skip
+        yield replace(run, pattern=(*pattern, *run.pattern[len(pattern) :]))
+        return
+    for law, body, twist, places in every:
+        alone = replace(law, member=0, turn=min(law.turn, 0), efforts=(places,))
+        yield LawRun(body, 1, 1, (alone,), max(twist, 0))
+
+
+def dry_friction(model: Compiled, u: Array, amplitudes: Amplitudes) -> DryFriction:
+    """The friction that a linear model about a state with speeds u (nu,) replaces.
+
+    Raises SceneError for names without friction and amplitudes that are not positive.
+    """
+    system, free = model.packed.system, set(model.free_speeds)
+    laws = [law for run in system.laws for law in run.pattern]
+    if not any(law.kernel == _KERNEL and law.p[_STATIC] for law in laws) and amplitudes is None:
+        return DryFriction(model, {}, None)
+    first = system.places["u"]
+    acting = {
+        int(first[body]) + law.speed: law.p
+        for run in system.laws for law, body, _, _ in run.each()
+        if law.kernel == _KERNEL and law.p[_STATIC]
+    }  # fmt: skip
+    amplitude_of = _amplitudes(model, amplitudes, list(acting))
+    found = {
+        speed: _rubbing(speed, p, amplitude_of(speed)) for speed, p in acting.items()
+        if speed in free and abs(u[speed]) <= _SLIDING * p[_WIDTH]
+    }  # fmt: skip
+    return DryFriction(model, found, amplitudes)
+
+
+def _rubbing(speed: int, p: tuple[float, ...], amplitude: float | None) -> Rubbing:
+    coulomb, static = p[_COULOMB], p[_STATIC]
+    if amplitude is None:
+        return Rubbing(speed, coulomb, static, 0.0, False)
+    x = amplitude / p[_STRIBECK]
+    level = coulomb + (static - coulomb) * float(dawsn(x)) / x
+    return Rubbing(speed, coulomb, static, 4 * level / (math.pi * amplitude), True)
+
+
+def _amplitudes(
+    model: Compiled, given: Amplitudes, speeds: list[int]
+) -> Callable[[int], float | None]:
+    """The amplitude of a speed; None where none is given for it."""
+    if given is None:
+        return lambda speed: None
+    if not isinstance(given, Mapping):
+        amplitude = _amplitude("friction", given)
+        return lambda speed: amplitude
+    known = {speed: _names(model.layout.u_name(speed)) for speed in speeds}
+    every = sorted({name for names in known.values() for name in names})
+    for name in given:
+        if name not in every:
+            raise SceneError(
+                f'friction: "{name}": expected a hinge with dry friction, its chain or one of its '
+                f"speeds{near(str(name), every)}"
+            )
+    amplitudes = {x: _amplitude(f'friction["{x}"]', value) for x, value in given.items()}
+    return lambda speed: next(
+        (amplitudes[name] for name in known[speed] if name in amplitudes), None
+    )
+
+
+def _names(speed: str) -> tuple[str, str, str]:
+    """What the friction of a speed is called: the speed, its hinge, the chain of that."""
+    hinge = speed.rpartition(".")[0]
+    return speed, hinge, hinge.partition("[")[0]
+
+
+def _amplitude(what: str, value: float) -> float:
+    found = real(what, value, "an amplitude of speed in rad/s or m/s, such as 0.1")
+    if found <= 0:
+        raise SceneError(
+            f"{what} = {found:g}: expected an amplitude of speed above 0 in rad/s or m/s; leave it "
+            "out for a model without dry friction"
+        )
+    return found

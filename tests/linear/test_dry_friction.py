@@ -1,0 +1,188 @@
+"""Dry friction in linear models: left out at rest, viscous at an amplitude, kept in sliding."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from linear.scenes import pendulum
+from scipy.integrate import quad
+
+import mstmm
+from mstmm.errors import SceneError
+
+#: m g l and the inertia of `pendulum` about its pivot.
+WEIGHT, INERTIA = 2 * 9.81 * 0.5, 0.53
+RUB = {"coulomb": 0.01}
+
+
+def of(scene: mstmm.Scene, engine: str = "looped") -> mstmm.Model:
+    return mstmm.compile(scene, engine=engine)
+
+
+def rough(law: dict[str, Any] | None = None, **friction: float) -> mstmm.Scene:
+    return pendulum(law={**(law or {}), "friction": RUB | friction})
+
+
+@pytest.mark.parametrize("engine", ["looped", "fused"])
+def test_it_is_left_out_at_rest(engine: str) -> None:
+    """sqrt(m g l/J) without damping; it sticks where its weight is less than friction."""
+    model = of(rough(), engine)
+    linear = model.linearize()
+    np.testing.assert_allclose(linear.modes().eigenvalues, [1j * math.sqrt(WEIGHT / INERTIA)])
+    (text,) = linear.warnings
+    assert "dry friction is left out" in text
+    assert f"pivot below an amplitude of {0.01 / WEIGHT:.4g} rad or efforts of 0.01 N*m" in text
+    slope = model.derivatives([0.0], [0.0]).state_matrix[1, 1]
+    assert slope == pytest.approx(-0.01 / 1e-3 / INERTIA)  # the exact slope of the law
+
+
+@pytest.mark.parametrize("amplitude", [0.004, 0.02, 0.7])
+def test_it_is_viscous_at_an_amplitude(amplitude: float) -> None:
+    """The damper that takes as much work from a sine as Coulomb's friction, 4 F/(pi V), and as
+    Stribeck's law, by quadrature."""
+    coulomb = of(rough()).linearize(friction=amplitude)
+    assert coulomb.C[0, 0] == pytest.approx(4 * 0.01 / (math.pi * amplitude), rel=1e-12)
+    assert not coulomb.warnings
+    linear = of(rough({"damping": 0.3}, static=0.025)).linearize(friction={"pivot": amplitude})
+
+    def work(x: float) -> float:
+        speed = amplitude * math.sin(x)
+        return (0.01 + 0.015 * math.exp(-((speed / 0.01) ** 2))) * math.sin(x)
+
+    mean = 2 * quad(work, 0, math.pi, epsabs=1e-13)[0] / (math.pi * amplitude)
+    assert linear.C[0, 0] == pytest.approx(0.3 + mean, rel=1e-9)
+    assert linear.damping[0, 0] == pytest.approx(0.3 + mean, rel=1e-9)
+
+
+def test_a_hinge_that_slides_keeps_its_slope() -> None:
+    """That of Stribeck's law at the speed of the motion."""
+    speed = 0.02
+    linear = of(rough(static=0.05)).linearize([0.0], [speed])
+    slope = -2 * speed / 0.01**2 * 0.04 * math.exp(-((speed / 0.01) ** 2))
+    assert linear.C[0, 0] == pytest.approx(slope, rel=1e-9)
+    assert not any("friction" in text for text in linear.warnings)
+
+
+def test_members_of_a_chain_by_themselves() -> None:
+    """One slides, two do not; amplitudes by the names of a member and of the chain."""
+    body = {"mass": 1.0, "center_of_mass": [0, -0.5, 0], "inertia": [0.1, 0.1, 0.1],
+            "ends": {"tip": [0, -1, 0]}}  # fmt: skip
+    hinge = {"type": "pin", "law": {"damping": 0.2, "friction": {"coulomb": 1.0, "static": 2.0}}}
+    model = of(mstmm.Scene(
+        gravity=(0, 0, 0),
+        chain=[{"name": "rope", "count": 3, "inboard": "ground", "body": body, "hinge": hinge,
+                "end": "tip"}],
+    ))  # fmt: skip
+    u = [0.0, 0.02, 0.0]
+    slope = 0.2 - 2 * 0.02 / 0.01**2 * math.exp(-4.0)
+    linear = model.linearize([0.0, 0.0, 0.0], u)
+    np.testing.assert_allclose(linear.damping.diagonal(), [0.2, slope, 0.2], rtol=1e-9)
+    assert "any amplitude" in next(text for text in linear.warnings if "friction" in text)
+    given = model.linearize([0.0] * 3, u, friction={"rope": 1e6, "rope[2].hinge": 2e6})
+    extra = [4 / (math.pi * 1e6), 0.0, 4 / (math.pi * 2e6)]
+    np.testing.assert_allclose(
+        given.damping.diagonal() - [0.2, slope, 0.2], extra, rtol=1e-6, atol=1e-13
+    )
+
+
+def test_answers_to_harmonic_pushes() -> None:
+    """1/(k - J w^2 + i w c), by the sweep."""
+    omega, model = np.array([0.5, 4.0, 9.0]), of(rough())
+    for friction, c in ((None, 0.0), (0.3, 4 * 0.01 / (math.pi * 0.3))):
+        found = model.frequency_response(omega, ["pivot.effort"], friction=friction)
+        expected = 1 / (WEIGHT - INERTIA * omega**2 + 1j * omega * c)
+        np.testing.assert_allclose(found.values[:, 0, 0], expected, rtol=1e-12)
+    linear = model.linearize()
+    assert linear.pencil.damping(np.ones(1)) == [0.0]
+    assert linear.symbolic(keep=["bob.mass"]).C.is_zero_matrix
+
+
+def test_growth_sets_in_where_the_given_damping_ends() -> None:
+    """A motor that pushes with c u: at once without friction, at c = 4 F/(pi V) with it."""
+    data = rough().model_dump(by_alias=True, exclude_defaults=True)
+    data["hinge"][0]["law"]["effort"] = ["c*u"]
+    model = of(mstmm.Scene(constants={"c": 0.0}, **data))
+    low, high = -0.1, 1.0
+    assert model.critical("constants.c", low, high).value == pytest.approx(0.0, abs=1e-6)
+    found = model.critical("constants.c", low, high, friction=0.2)
+    assert found.value == pytest.approx(4 * 0.01 / (math.pi * 0.2), abs=1e-6)
+    locus = model.locus("constants.c", [0.0, 0.02], friction=0.2)
+    c = 4 * 0.01 / (math.pi * 0.2) - locus.values
+    np.testing.assert_allclose(locus.growth[:, 0], -c / (2 * INERTIA), rtol=1e-9)
+
+
+def test_in_closed_loops_at_rest_and_in_motion() -> None:
+    """As the same loops without friction, in the hinge that is cut too; given, as dampers in
+    all hinges."""
+
+    def loop(friction: dict[str, float]) -> mstmm.Model:
+        law = {"law": {"damping": 0.1, "stiffness": 2.0, "friction": friction}}
+        about = {"mass": 0.4, "center_of_mass": [0, -0.15, 0], "inertia": [3e-3, 2e-4, 3e-3],
+                 "ends": {"tip": [0, -0.3, 0]}}  # fmt: skip
+        solid = {"mass": 1.0, "inertia": [0.01, 0.01, 0.01]}
+        pin = {"type": "pin", "axis": [0, 0, 1], **law}
+        return of(mstmm.Scene(
+            gravity=(0, -9.81, 0),
+            body=[solid | {"name": "shaft"}, about | {"name": "arm"}, about | {"name": "rod"},
+                  solid | {"name": "sleeve"}],
+            hinge=[
+                {"name": "spin", "type": "pin", "axis": [0, 1, 0], "inboard": "ground",
+                 "outboard": "shaft"},
+                pin | {"name": "swing", "inboard": "shaft", "outboard": "arm",
+                       "initial": {"q": 0.5}},
+                pin | {"name": "knee", "inboard": "arm.tip", "outboard": "rod",
+                       "initial": {"q": -1.0}},
+                {"name": "slide", "type": "prismatic", "axis": [0, 1, 0], "inboard": "shaft",
+                 "outboard": "sleeve", "initial": {"q": -0.6 * math.cos(0.5)}, **law},
+                pin | {"name": "foot", "inboard": "sleeve", "outboard": "rod.tip",
+                       "initial": {"q": -0.5}},
+            ],
+        ))  # fmt: skip
+
+    dry, bare = loop({"coulomb": 0.05}), loop({})
+    q = bare.initial_state()[0]
+    for speed in (0.0, 4.0):
+        u = np.zeros(bare.nu)
+        u[0] = speed
+        here, there = dry.linearize(q, u), bare.linearize(q, u)
+        assert here.free == there.free
+        for name in ("M", "C", "K"):
+            wanted = getattr(there, name)
+            np.testing.assert_allclose(getattr(here, name), wanted, atol=1e-9, err_msg=name)
+        assert any("dry friction is left out" in text for text in here.warnings)
+    assert here.mechanism is not None
+    ways, places = here.mechanism.ways, here.mechanism.places
+    given = dry.linearize(q, u, friction=2.0)
+    rests = np.ones(bare.nu)
+    rests[0] = 0.0
+    added = ways.T @ np.diag(rests * 4 * 0.05 / (2 * math.pi)) @ ways
+    assert len(places) == 2
+    np.testing.assert_allclose(given.C - here.C, added, rtol=1e-8, atol=1e-9)
+
+
+def test_what_makes_no_sense() -> None:
+    model = of(rough())
+    with pytest.raises(SceneError, match=r'friction: "pivott": expected .*did you mean "?pivot'):
+        model.linearize(friction={"pivott": 1.0})
+    for wrong in (0.0, -1.0):
+        with pytest.raises(SceneError, match="expected an amplitude of speed above 0"):
+            model.modes(friction=wrong)
+    with pytest.raises(SceneError, match="an amplitude of speed"):
+        model.linearize(friction="much")  # type: ignore[arg-type]
+
+
+def test_beside_beams_without_shapes() -> None:
+    """An exact beam on a hinge with friction, at low frequencies a rigid one on a damper."""
+    beam = {"name": "jib", "length": 1.0, "mass_per_length": 3.0, "bending_stiffness": 1e7,
+            "modes": {"y": 1}}  # fmt: skip
+    hinge = {"name": "slew", "type": "pin", "inboard": "ground", "outboard": "jib",
+             "law": {"stiffness": 10.0, "friction": {"coulomb": 0.5}}}  # fmt: skip
+    model = of(mstmm.Scene(gravity=(0, 0, 0), beam=[beam], hinge=[hinge]))
+    for friction, c in ((None, 0.0), (2.0, 1 / math.pi)):
+        found = model.frequency_response(
+            [2.0], ["slew.effort"], ["slew.angle"], exact=True, friction=friction
+        )
+        assert found.values[0, 0, 0] == pytest.approx(1 / (10.0 - 4.0 + 2j * c), rel=1e-5)
