@@ -151,7 +151,7 @@ def _of_choices(
         shapes=shapes_all,
         frame="/".join(dict.fromkeys(frame.kind for frame in frames)),
         notes=tuple(notes),
-        warnings=warnings(chosen),
+        warnings=warnings(chosen, held),
     )
 
 

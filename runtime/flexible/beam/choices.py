@@ -14,9 +14,11 @@ Twist and tension follow the section that is held, or the mean where the hinge l
 Number of shapes per bending direction: three eigenfunctions (four in the mean frame), or all static
 shapes and two more.  Twist and axial shapes join where their stiffness and inertia are given and
 their first frequency is below three times the highest of bending: beyond, they follow the loads at
-once and cost only small steps.  Twist also joins where bending about the stiff axis can buckle the
-beam sideways before it leaves the range of its model.  A scene that stays in a plane (`planar`)
-gets the shapes of that plane alone, unless its loads can buckle a beam out of it.
+once and cost only small steps.  A beam whose length the rest of a loop holds (`restraint`) has the
+static axial shapes at least, without which it could not sag.  Twist also joins where bending about
+the stiff axis can buckle the beam sideways before it leaves the range of its model.  A scene that
+stays in a plane (`planar`) gets the shapes of that plane alone, unless its loads can buckle a beam
+out of it.
 
 Where the mass matrix of a stiffened beam would not stay definite over the slopes that the model is
 made for (`definiteness`), the same shapes are taken in the mean frame, in which the shapes carry no
@@ -75,7 +77,8 @@ def choices(
         frame = _rod_frame(beam, held, direction, frames["y"][0])
         basis = _basis(beam, data, held, direction, frame)
         tips = direction == "twist" and len(made) == 2 and _tips(data)
-        count = _rod_count(beam, data, direction, basis, highest, tips)
+        pulled = direction == "axial" and held.restrained
+        count = _rod_count(beam, data, direction, basis, highest, tips, pulled)
         if count and not _left_out(beam, direction, idle):
             made.append(Choice(direction, frame, basis, count, ""))
     return tuple(made)
@@ -92,9 +95,14 @@ def in_the_mean(chosen: tuple[Choice, ...]) -> tuple[Choice, ...]:
     return tuple(replace(c, frame=Frame("mean"), why=why if c.why else "") for c in chosen)
 
 
-def warnings(chosen: tuple[Choice, ...]) -> tuple[str, ...]:
+def warnings(chosen: tuple[Choice, ...], held: Holding) -> tuple[str, ...]:
     """Static shapes that are missing because fewer shapes were asked for."""
     found = []
+    if held.restrained and all(c.direction != "axial" for c in chosen):
+        found.append(
+            "modes: no axial shapes, but both ends are held along the beam, which cannot sag "
+            "without them; give axial = 1 or more"
+        )
     for c in chosen:
         static = static_count(c.basis, c.direction)
         if c.count < static:
@@ -187,14 +195,17 @@ def _count(beam: Beam, direction: str, frame: Frame, basis: Basis) -> int:
 
 
 def _rod_count(
-    beam: Beam, data: BeamData, direction: str, basis: Basis, highest: float, tips: bool
-) -> int:
+    beam: Beam, data: BeamData, direction: str, basis: Basis, highest: float, tips: bool,
+    pulled: bool,
+) -> int:  # fmt: skip
     if beam.modes is not None:
         return int(getattr(beam.modes, direction))
-    first = _rod_frequency(data, direction)
-    if first == 0.0 or (first > 3 * highest and not tips):
+    first, static = _rod_frequency(data, direction), static_count(basis, direction)
+    if first == 0.0 or (first > 3 * highest and not (tips or pulled)):
         return 0
-    return static_count(basis, direction) + (2 if tips else 1)
+    if direction == "axial" and static and 2 * first > 3 * highest:
+        return static  # vibrations with the ends held are twice as fast
+    return static + (2 if tips else 1)
 
 
 def _tips(data: BeamData) -> bool:

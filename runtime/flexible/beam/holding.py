@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from mstmm.scene.tables.bushing import Bushing
 from mstmm.scene.tables.loads import Load, Spring
 
 from .data import BeamData
+from .restraint import restrained_beams
 from .static_shapes import stiffness_of
 
 if TYPE_CHECKING:
@@ -33,12 +34,16 @@ MOSTLY = 0.7
 #: this share of the beam's inertia about it, a spring from this share of the beam's own stiffness.
 HEAVY = 0.1
 
+#: What a force at a section loads besides bending, which needs no static shapes for it.
+_ALONG = ("axial",)
+
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class End:
-    """What acts at one section: moments per direction, and whether a heavy load does."""
+    """What acts at one section: directions that are loaded so that they need static shapes (by
+    moments, and axially by forces), and whether a heavy load does."""
 
     x: float
     moments: frozenset[str] = frozenset()
@@ -58,6 +63,7 @@ class Holding:
     sprung: frozenset[str] = frozenset()
     ends: tuple[End, ...] = ()
     said: str = ""  #: the hinge in words
+    restrained: bool = False  #: the rest of the scene holds its length
 
 
 class Surroundings:
@@ -81,9 +87,9 @@ class Surroundings:
                 self.acts.setdefault(name, []).append((end or "root", element))
         self._masses = {b.name: b.mass if b.type == "rigid" else np.inf for b in scene.body}
         self._masses |= {b.name: b.mass for b in scene.beam}
-        for chain in scene.chain:
-            name = split(chain.inboard)[0]
+        for name in _tied(scene, self.closes):
             self._masses[name] = np.inf
+        self.restrained = restrained_beams(scene)
         self._beyond: dict[str, float] = {}
 
     def mass_beyond(self, body: str) -> float:
@@ -103,6 +109,15 @@ class Surroundings:
             own = self._masses.get(name, np.inf)
             self._beyond[name] = own + sum(self._beyond[child] for child in children)
         return self._beyond[body]
+
+
+def _tied(scene: Scene, closes: Mapping[str, list[Hinge]]) -> Iterator[str]:
+    """Bodies that carry what their mass does not tell: loops, chains, springs and constraints."""
+    for body, hinges in closes.items():
+        yield from (body, *(hinge.inboard_body for hinge in hinges))
+    yield from (split(chain.inboard)[0] for chain in scene.chain)
+    for element in (*scene.forces, *scene.constraint):
+        yield from (split(element.from_)[0], split(element.to)[0])
 
 
 def _references(element: _Acting) -> tuple[str, ...]:
@@ -131,6 +146,7 @@ def holding(around: Surroundings, beam: Beam, data: BeamData) -> Holding:
         sprung=free if stiff or any(not e.is_zero for e in hinge.law.effort) else frozenset(),
         ends=ends,
         said=f"the {hinge.type} hinge",
+        restrained=beam.name in around.restrained,
     )
 
 
@@ -175,7 +191,8 @@ def _ends(around: Surroundings, beam: Beam, data: BeamData) -> Iterator[End]:
         free = _directions(turn @ np.array(hinge.rotation), free_axes(hinge))
         if any(hinge.law.stiffness) or any(hinge.law.inertia) or _acts(hinge):
             free = frozenset()
-        heavy = around.mass_beyond(hinge.outboard_body) > HEAVY * data.mass
+        closes = around.holds.get(hinge.outboard_body) is not hinge
+        heavy = closes or around.mass_beyond(hinge.outboard_body) > HEAVY * data.mass
         yield End(x, frozenset(AXES) - free, heavy)
     for hinge in around.closes.get(beam.name, ()):
         x, turn = data.ends[hinge.outboard_end or "root"]
@@ -186,9 +203,10 @@ def _ends(around: Surroundings, beam: Beam, data: BeamData) -> Iterator[End]:
         if isinstance(element, Load):
             if element.force_per_length is None:
                 turning = any(not m.is_zero for m in element.moment)
-                yield End(x, frozenset(AXES if turning else ()))
+                pulling = any(not f.is_zero for f in element.force)
+                yield End(x, frozenset([*(AXES if turning else ()), *_ALONG[:pulling]]))
         elif isinstance(element, Spring):
-            yield End(x, frozenset(), _is_stiff(element, data))
+            yield End(x, frozenset(_ALONG), _is_stiff(element, data))
         elif isinstance(element, Bushing):
             along, about = element.stiffest
             yield End(x, frozenset(AXES if about else ()), along > HEAVY * _own_stiffness(data))

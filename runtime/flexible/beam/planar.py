@@ -13,6 +13,7 @@ in the plane braces beams in it alone.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,6 +56,11 @@ class Planar:
         if key not in self._known:
             self._known[key] = self._in_plane(n)
         return not self._known[key]
+
+    def stay(self, beam: str, axis: int, hinges: Sequence[Hinge]) -> bool:
+        """Whether hinges move what they join at right angles to the beam's own axis 1 or 2."""
+        n = self._turn[beam][:, axis]
+        return all(self._hinge_stays(hinge, n) for hinge in hinges)
 
     def buckles(self, beam: str, axis: int) -> bool:
         """Whether loads in the plane at right angles to the beam's own axis 1 (y) or 2 (z) can
