@@ -22,6 +22,7 @@ from .loops.mechanism import Mechanism
 from .matrices import Matrices, State, matrices
 from .operating_point.friction import DryFriction
 from .pencil import Pencil
+from .rotors.carrying import Carrying
 from .standing import standing, with_held_springs, without_laws
 
 if TYPE_CHECKING:
@@ -52,6 +53,8 @@ class Equations(Assessed):
             for a tree.
         dry: friction of hinges that rest at the state, which is left out or counts as viscous
             damping; None where all of it is as the laws have it.
+        carrying: the transformation of increments of a spinning rotor to the fixed frame; None
+            where x are those of the coordinates themselves.
     """
 
     model: Compiled
@@ -62,6 +65,7 @@ class Equations(Assessed):
     about: About | None = field(default=None, repr=False)
     mechanism: Mechanism | None = field(default=None, repr=False)
     dry: DryFriction | None = field(default=None, repr=False)
+    carrying: Carrying | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         return (
@@ -130,11 +134,12 @@ class Equations(Assessed):
         return matrices(engine, self.state, list(self.free))
 
     def _second_order(self, found: Matrices) -> Matrices:
-        """From speeds to x': where x' = G x + du, C du = C x' - C G x and M da = M x'' - M G x'."""
+        """From speeds to x': where x' = G x + du, C du = C x' - C G x and M da = M x'' - M G x';
+        then to the fixed frame."""
         g = self.turning
-        if g is None:
-            return found
-        return Matrices(found.M, found.C - found.M @ g, found.K - found.C @ g)
+        if g is not None:
+            found = Matrices(found.M, found.C - found.M @ g, found.K - found.C @ g)
+        return found if self.carrying is None else self.carrying.matrices(found)
 
     @property
     def M(self) -> Array:
@@ -207,6 +212,11 @@ class Equations(Assessed):
     @cached_property
     def _moved(self) -> tuple[Array, Array]:
         """K_driven and C_driven."""
+        if self.drives and self.carrying is not None:
+            raise SceneError(
+                "fixed frame: motions of drives are not inputs there; leave them out, or push by "
+                "efforts and forces"
+            )
         found = [self.driving(((speed, 1.0),)) for speed in self.drives]
         both = [(one.stiffness, one.damping) for one in found]
         wide = np.reshape(both, (len(found), 2, len(self)))
@@ -242,8 +252,10 @@ class Equations(Assessed):
     def pushed(self, channels: Sequence[Channel]) -> Array:
         """(n, channels): what a unit of each push does."""
         if self.mechanism is None:
-            return columns(self.tree, self.state, channels, list(self.free))
-        return self.mechanism.pushed(self.state, channels)
+            found = columns(self.tree, self.state, channels, list(self.free))
+        else:
+            found = self.mechanism.pushed(self.state, channels)
+        return found if self.carrying is None else self.carrying.pushed(found)
 
     def _of_shapes(self, matrix: Callable[..., Array]) -> Array:
         """A matrix of the flexible bodies in its place among all."""
@@ -267,6 +279,10 @@ class Equations(Assessed):
         Raises SceneError for a name that is none of these, for numbers of flexible bodies, and for
         scenes and expressions that are too large.
         """
+        if self.carrying is not None:
+            raise SceneError(
+                "symbolic: linear models in the fixed frame are numbers; take M, C and K"
+            )
         if self.mechanism is not None:
             raise SceneError(
                 "symbolic: linear models of closed loops are numbers; open the loop, or take M, C "
@@ -282,6 +298,8 @@ class Equations(Assessed):
 
     def spread(self, x: NDArray[Any]) -> NDArray[Any]:
         """(nu, ...) increments along all speeds of those of x (n, ...)."""
+        if self.carrying is not None:
+            x = np.linalg.solve(self.carrying.turned, x)
         if self.mechanism is not None:
             return np.asarray(self.mechanism.ways @ x)
         found = np.zeros((self.model.nu, *x.shape[1:]), dtype=x.dtype)

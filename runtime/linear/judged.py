@@ -15,22 +15,19 @@ from mstmm.risk import RUN, Risk, advice
 
 from ..engine.sizes import speed_sizes
 from ..guard.answers import find_state_risks
-from ..run.system import SceneSystem
-from .matrices import State
 from .modes import modes
 from .operating_point.sticking import friction_risks
 from .output.outputs import left_out
+from .rotors.later import SAME, apart, later
 
 if TYPE_CHECKING:
     from .equations import Equations
 
 #: Distance from rest, and acceleration per s^2 of what nothing holds, in sizes of coordinates;
-#: stiffness that counts as none, in parts; matrices that still count as the same, in parts.
-_STILL, _SOFT, SAME = 1e-6, 1e-13, 1e-6
+#: stiffness that counts as none, in parts.
+_STILL, _SOFT = 1e-6, 1e-13
 #: Efforts that are rounding, in parts of those that cancel.
 _CANCELLED = 1e-11
-#: How far matrices are compared along the motion, in rad or sizes.
-_AHEAD = 0.1
 #: Coordinates up to which matrices are made to look at the state, and up to which all motions are.
 _LARGEST, _ALL_MOTIONS = 2000, 400
 
@@ -154,29 +151,3 @@ def _changes(linear: Equations) -> bool:
     """Whether the matrices are others a little further along the motion."""
     there = later(linear)
     return any(apart(getattr(linear, x), getattr(there, x)) > SAME for x in "MCK")
-
-
-def later(linear: Equations) -> Equations:
-    """The equations a little further along the motion."""
-    state, loops = ahead(linear), linear.mechanism
-    loops = None if loops is None else loops.at(state)
-    turning = linear.turning if loops is None else loops.turning
-    return replace(linear, state=state, about=None, mechanism=loops, turning=turning)
-
-
-def ahead(linear: Equations) -> State:
-    """The state a little further along the motion, with the same speeds."""
-    model, state = linear.model, linear.state
-    engine, memory = model.looped, model.looped.start_memory()
-    dt = _AHEAD / float(np.abs(state.u).max())
-    q = state.q + dt * engine.rates(state.t, state.q, state.u, memory)
-    whole = SceneSystem(engine).start(state.t + dt, q, state.u)
-    q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]
-    _, a = engine.accelerations(state.t + dt, q[None].copy(), u[None].copy(), memory[None])
-    return State(state.t + dt, q, u, a[0])
-
-
-def apart(one: Array, other: Array) -> float:
-    """Largest difference, in parts of the largest entry."""
-    scale = float(np.abs(one).max(initial=0))
-    return float(np.abs(one - other).max(initial=0)) / scale if scale else 0.0

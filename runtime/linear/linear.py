@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from .judged import find_linear_risks
 from .modes import modes
 from .motions import Modes
 from .response import FrequencyResponse, frequency_response
+from .rotors.fixed_frame import carrying_at, frame_of
 from .state_space import StateSpace
 
 
@@ -53,6 +55,23 @@ class Linear(StateSpace):
         if count is None:
             refuse_dense(len(self), "the matrix of all motions")
         return modes(self, count, damped)
+
+    @cached_property
+    def frame(self) -> str:
+        """Frame of x and of all frequencies: "rotating" where coordinates turn along with bodies
+        that spin at the state, so that frequencies are those that the rotor sees; else "fixed"."""
+        return frame_of(self)
+
+    def to_fixed_frame(self) -> Linear:
+        """The same model in the fixed frame: increments of an axisymmetric rotor as they are in
+        axes that do not turn, those of its supports as they were; exact.  Coordinates keep their
+        names.  Pushes and outputs are those at the ends of bodies in inertial axes.
+
+        Raises SceneError where a rotor is not axisymmetric or its coefficients change as it turns.
+        """
+        if self.frame == "fixed":
+            return self
+        return replace(self, carrying=carrying_at(self))
 
     def frequency_response(
         self,
@@ -138,7 +157,7 @@ class Linear(StateSpace):
         """Names, state, matrices and risks, for JSON."""
         from .files import dictionary
 
-        return dictionary(self) | self.assessment()
+        return dictionary(self) | {"frame": self.frame} | self.assessment()
 
     def save(self, path: str | Path) -> Path:
         """Matrices by the names of their rows and columns: .nc (extra io), or .csv with a row for

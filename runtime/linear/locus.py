@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 
+from mstmm.arguments import short
 from mstmm.arrays import Array, Integers, numbers
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.risk import RUN, Assessed, DeferredRisks, Risk
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 #: A scene made linear at a value of its parameter.
 At = Callable[[float], "Linear"]
 
+#: What `Model.locus` may be asked for.
+FRAMES = ("auto", "fixed", "rotating")
 #: How near a critical value is found, in parts of the range that is searched.
 _NEAR = 1e-12
 #: Part of its first value to which the slowest frequency falls before a limit point.
@@ -40,11 +43,20 @@ _VANISHING = 0.03
 @dataclass(frozen=True, eq=False)
 class Locus(Assessed):
     """Motions over a parameter: `values` (m,), `eigenvalues` (m, k), a column for each motion; nan
-    where it is not among those of its value; `findings`, the risks at each value."""
+    where it is not among those of its value.
+
+    Attributes:
+        frame: of frequencies and whirl, "fixed" or "rotating", in which coordinates of spinning
+            bodies turn along: a motion that whirls at f in the fixed frame has |f - spin| there.
+        whirl: (m, k) sense of the motions about the spin; see `Modes.whirl`.
+        findings: risks at each value, and of the diagram.
+    """
 
     parameter: str
     values: Array = field(repr=False)
     eigenvalues: Complex = field(repr=False)
+    frame: str = "fixed"
+    whirl: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     findings: Iterable[Risk] = field(default=(), repr=False)
 
     @property
@@ -59,14 +71,17 @@ class Locus(Assessed):
 
     def plot(self, path: str | Path | None = None, orders: ArrayLike = ()) -> Any:
         """`matplotlib.figure.Figure`: frequencies and growth over the parameter, with lines at
-        `orders` times a parameter that is a spin in rad/s; written to `path` where it is given.
+        `orders` times a parameter that is a spin in rad/s, of the same frame; written to `path`
+        where it is given.
 
         Raises EnvironmentFailure without the extra `plot`.
         """
         from .pictures.curves import locus
 
         lines = np.atleast_1d(numbers("orders", orders)).tolist()
-        return locus(self.parameter, self.values, self.eigenvalues, path, lines)
+        return locus(
+            self.parameter, self.values, self.eigenvalues, path, lines, self.frame, self.whirl
+        )
 
     def to_dataset(self) -> Any:
         """`xarray.Dataset` of frequency and growth.  EnvironmentFailure without the extra."""
@@ -74,9 +89,11 @@ class Locus(Assessed):
         arrays: dict[str, Any] = {
             "frequency": (along, self.frequency, {"units": "Hz"}),
             "growth": (along, self.growth, {"units": "1/s"}),
+            "whirl": (along, self.whirl),
         }
         coords = {"value": self.values, "motion": np.arange(1, self.eigenvalues.shape[1] + 1)}
-        return files.xarray().Dataset(arrays, coords, {"parameter": self.parameter})
+        about = {"parameter": self.parameter, "frame": self.frame}
+        return files.xarray().Dataset(arrays, coords, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         """A row for each value."""
@@ -97,25 +114,54 @@ class Locus(Assessed):
         return files.save(path, self.to_dataset, self._rows())
 
 
-def traced(at: At, parameter: str, values: Array, count: int | None, damped: bool | None) -> Locus:
-    """Motions at each value, those that go on in one column."""
-    found: list[Modes] = []
-    for value in values.tolist():
-        found.append(at(value).modes(count, damped))
+def traced(
+    at: At, parameter: str, values: Array, count: int | None, damped: bool | None, frame: str
+) -> Locus:
+    """Motions at each value, those that go on in one column; `frame` as in `Model.locus`."""
+    models, risks = _framed([at(value) for value in values.tolist()], parameter, frame)
+    found = [linear.modes(count, damped) for linear in models]
     width = max(len(one) for one in found)
     if not width:
         raise SceneError("nothing moves in this scene, so it has no motions to follow")
     rows = np.full((len(found), width), np.nan + 0j)
+    turns = np.full(rows.shape, np.nan)
     order: Integers = np.arange(len(found[0]))
-    rows[0, order] = found[0].eigenvalues
+    rows[0, order], turns[0, order] = found[0].eigenvalues, found[0].whirl
     for row, (before, now) in enumerate(pairwise(found), start=1):
         order = _paired(before, now, order, width)
-        rows[row, order] = now.eigenvalues
+        rows[row, order], turns[row, order] = now.eigenvalues, now.whirl
+    rotating = any(one.frame == "rotating" for one in found)
+    frame = "rotating" if rotating else "fixed"
     each = list(zip(values.tolist(), found, strict=True))
     findings = DeferredRisks(
-        lambda: merge_over_values(parameter, [(value, one.risks) for value, one in each])
+        lambda: (*risks, *merge_over_values(parameter, [(x, one.risks) for x, one in each]))
     )
-    return Locus(parameter, values, rows, findings)
+    return Locus(parameter, values, rows, frame, turns, findings)
+
+
+def _framed(
+    models: list[Linear], parameter: str, frame: str
+) -> tuple[list[Linear], tuple[Risk, ...]]:
+    """The models in the frame that is asked for, and what "auto" could not do."""
+    if frame not in FRAMES:
+        raise SceneError(f'frame = {short(frame)}: expected "auto", "fixed" or "rotating"')
+    if frame == "rotating":
+        return models, ()
+    try:
+        return [linear.to_fixed_frame() for linear in models], ()
+    except SceneError as error:
+        if frame == "fixed":
+            raise
+        return models, (_rotating(parameter, str(error)),)
+
+
+def _rotating(parameter: str, why: str) -> Risk:
+    return Risk(
+        "rotating-frame", parameter,
+        f"frequencies are those of the rotating frame, of which critical speeds cannot be read off "
+        f"({why.removeprefix('fixed frame: ')})",
+        'give frame="rotating" if these are what you want, or make the rotor axisymmetric',
+    )  # fmt: skip
 
 
 def _paired(before: Modes, now: Modes, order: Integers, width: int) -> Integers:
@@ -134,8 +180,8 @@ def _paired(before: Modes, now: Modes, order: Integers, width: int) -> Integers:
 @dataclass(frozen=True)
 class Critical(Assessed):
     """The value of a parameter beyond which a motion grows; `kind` is "divergence" (a stiffness is
-    lost, as in buckling) or "flutter", `frequency` in Hz; `findings` are the risks of the last
-    stable state below it."""
+    lost, as in buckling) or "flutter", `frequency` in Hz, in the fixed frame unless `frame` is
+    "rotating"; `findings` are the risks of the last stable state below it."""
 
     parameter: str
     value: float
@@ -143,6 +189,7 @@ class Critical(Assessed):
     frequency: float
     moving: tuple[str, ...]
     findings: Iterable[Risk] = field(default=(), repr=False)
+    frame: str = "fixed"
 
 
 def critical(at: At, parameter: str, low: float, high: float) -> Critical:
@@ -180,13 +227,15 @@ def critical(at: At, parameter: str, low: float, high: float) -> Critical:
     return Critical(
         parameter, (low + high) / 2, kind, abs(value.imag) / (2 * np.pi), names,
         DeferredRisks(lambda: (*lost, *_risks_below(parameter, low, below))),
+        "fixed" if last is None else last.frame,
     )  # fmt: skip
 
 
 def _modes_at(at: At, value: float) -> Modes | None:
     """All motions; None where the scene has no equilibrium."""
     try:
-        modes = at(value).modes()
+        (linear,), _ = _framed([at(value)], "", "auto")
+        modes = linear.modes()
     except NumericalFailure:
         return None
     if not len(modes):

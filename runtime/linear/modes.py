@@ -26,7 +26,7 @@ _ROUNDING = 1e-7
 def modes(linear: Equations, count: int | None, damped: bool | None) -> Modes:
     """See `Linear.modes`."""
     few = count is not None and len(linear) > _DENSE and 4 * count <= len(linear)
-    few = few and linear.mechanism is None
+    few = few and linear.mechanism is None and linear.carrying is None
     if count is None or not few or linear.turning is not None:
         found = _dense(linear, damped)
         return found if count is None else found.first(count)

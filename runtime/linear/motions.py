@@ -18,6 +18,7 @@ from mstmm.risk import Assessed, Risk, advice
 
 from ..engine.sizes import scene_length
 from . import files, shares
+from .rotors.fixed_frame import frame_of, whirl
 
 if TYPE_CHECKING:
     from ..result.view.view import View
@@ -49,7 +50,8 @@ class Modes(Assessed):
     def __repr__(self) -> str:
         if not len(self):
             return "<Modes: none>"
-        return f"<Modes: {len(self)}, {self.omega[0]:.6g} to {self.omega[-1]:.6g} rad/s>"
+        about = f"{len(self)}, {self.omega[0]:.6g} to {self.omega[-1]:.6g} rad/s"
+        return f"<Modes: {about}{', rotating frame' if self.frame == 'rotating' else ''}>"
 
     def __len__(self) -> int:
         return len(self.eigenvalues)
@@ -78,6 +80,17 @@ class Modes(Assessed):
                 f"nothing pushes back {abbreviate(moved)}: motions of frequency 0",
                 "add a stiffness if they are not meant to move freely",
             )  # fmt: skip
+
+    @cached_property
+    def frame(self) -> str:
+        """The frame of the frequencies, "fixed" or "rotating"; see `Linear.frame`."""
+        return frame_of(self.linear)
+
+    @cached_property
+    def whirl(self) -> Array:
+        """(k,) sense of each motion about the axis of the fastest spin, as its frame sees it: 1
+        forward along circles, -1 backward, between these along ellipses, 0 in a plane."""
+        return whirl(self.linear, self.shapes)
 
     @property
     def omega(self) -> Array:
@@ -163,6 +176,7 @@ class Modes(Assessed):
         return {
             "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
             "damping": self.damping.tolist(), "complete": self.complete,
+            "frame": self.frame, "whirl": self.whirl.tolist(),
             "eigenvalues": [[x.real, x.imag] for x in self.eigenvalues.tolist()],
             "coordinates": list(self.linear.coordinates), "units": list(self.linear.units),
             "shapes": {"real": np.real(self.shapes).T.tolist(),
@@ -181,6 +195,7 @@ class Modes(Assessed):
             "frequency": ("mode", self.frequency, {"units": "Hz"}),
             "damping": ("mode", self.damping),
             "growth": ("mode", self.eigenvalues.real, {"units": "1/s"}),
+            "whirl": ("mode", self.whirl),
             "shape": (("coordinate", "mode"), np.real(self.shapes)),
             "shape_imaginary": (("coordinate", "mode"), np.imag(self.shapes)),
             "kinetic": (("body", "mode"), np.array(list(kinetic.values()))),
@@ -190,7 +205,8 @@ class Modes(Assessed):
             "mode": np.arange(1, len(self) + 1), "coordinate": list(self.linear.coordinates),
             "body": list(kinetic), "owner": list(strain),
         }  # fmt: skip
-        return files.xarray().Dataset(arrays, names, {"complete": str(self.complete)})
+        about = {"complete": str(self.complete), "frame": self.frame}
+        return files.xarray().Dataset(arrays, names, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         """A row for each motion."""

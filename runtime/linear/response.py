@@ -340,7 +340,7 @@ def _response(
 ) -> Response | Amplitudes:
     """What solves for amplitudes: of a tree at rest by elimination, else from matrices."""
     state, loops = linear.state, linear.mechanism
-    if loops is not None or linear.turning is not None:
+    if loops is not None or linear.turning is not None or linear.carrying is not None:
         lost = None if loops is None or lossy is None else loops.matrices(lossy, state)
         return Amplitudes(linear.free, Matrices(linear.M, linear.C, linear.K), lost)
     return Response(

@@ -51,7 +51,7 @@ class StateSpace(Equations):
     @property
     def _undriven(self) -> Array:
         """(2 n, 2 n): d/dt (x, x') where drives stand still."""
-        if self.about is not None:
+        if self.about is not None and self.carrying is None:
             found = self.model.slopes.state_matrix(self.about, self.turning is not None)
             if found is not None:
                 return found

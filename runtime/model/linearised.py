@@ -126,18 +126,24 @@ class Linearised(AtStates):
         *,
         damped: bool | None = None,
         friction: Amplitudes = None,
+        frame: str = "auto",
     ) -> Locus:
         """Natural motions at rest over a number of the scene, named as in `with_parameters`: its
         root locus, or Campbell's diagram where it is a spin ("constants.spin" in a drive);
         `friction` as in `linearize`.
 
-        Raises SceneError for an unknown name or values (m,) that make no sense, NumericalFailure
-        where there is no equilibrium.
+        `frame` of the frequencies: "auto" is the fixed frame where all rotors are axisymmetric,
+        else the rotating one of their coordinates, with a warning; "fixed" and "rotating" are
+        these by name.
+
+        Raises SceneError for an unknown name, values (m,) that make no sense and rotors without a
+        fixed frame, NumericalFailure where there is no equilibrium.
         """
         from ..linear.locus import traced
 
         points = one_row("values", values)
-        return traced(self._linear_at(parameter, friction), parameter, points, count, damped)
+        at = self._linear_at(parameter, friction)
+        return traced(at, parameter, points, count, damped, frame)
 
     def waterfall(
         self, parameter: str, values: ArrayLike, omega: ArrayLike, input: str, output: str

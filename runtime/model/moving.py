@@ -13,6 +13,7 @@ from mstmm.errors import NumericalFailure
 
 from ..engine.compiled import Compiled
 from ..engine.shown import COLUMNS, SUMS
+from ..engine.states.steady_motion import move_steadily
 
 if TYPE_CHECKING:
     from ..engine.states.alone import Alone
@@ -142,17 +143,11 @@ class Moving(Compiled):
         return into(out, np.array(rows).reshape(*lead, self.nq))
 
     def _moved(self, q: Array, u: Array, dt: float) -> Array:
-        turned = [slice(first, first + 4) for first in self._quaternions]
-        for four in turned:
-            q[four] /= np.linalg.norm(q[four])
+        for first in self._quaternions:
+            q[first : first + 4] /= np.linalg.norm(q[first : first + 4])
         engine = self.looped.inertia_alone
         rates = engine.rates(0.0, q, u, engine.start_memory())
-        found = q + rates * dt
-        for four in turned:
-            rate = float(np.linalg.norm(rates[four]))
-            if rate > 0:
-                found[four] = np.cos(rate * dt) * q[four] + np.sin(rate * dt) / rate * rates[four]
-        return found
+        return move_steadily(q, rates, dt, self._quaternions)
 
     @cached_property
     def _quaternions(self) -> list[int]:

@@ -109,6 +109,8 @@ def modes(
     if len(found) > _ROWS:
         terminal.say(f"and {len(found) - _ROWS} more: --count N, or --output FILE.csv")
     terminal.say(_counted(found) if len(found) else "nothing moves in this scene")
+    if found.frame == "rotating":
+        terminal.say("frequencies are those of the rotating frame")
     asked.say_where("")
 
 

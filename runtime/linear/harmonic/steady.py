@@ -15,9 +15,10 @@ from mstmm.errors import SceneError
 from mstmm.printable import abbreviate
 
 from ..channels import Channel
-from ..judged import SAME, accelerating, apart, later
+from ..judged import accelerating
 from ..output.outputs import outputs_of, rows_of
 from ..output.seen import Seen
+from ..rotors.later import SAME, apart, later
 
 if TYPE_CHECKING:
     from ..equations import Equations

@@ -139,7 +139,10 @@ def rows_of(linear: Equations, outputs: Sequence[Seen], pushes: Sequence[Channel
     if linear.mechanism is not None:
         drives = {speed for one in pushes for speed, _ in one.moves} | {*linear.drives}
         orders = linear.mechanism.rows(linear.state, orders, drives)
-    return Rows(_with_turning(linear, orders), through)
+    orders = _with_turning(linear, orders)
+    if linear.carrying is not None:
+        orders = linear.carrying.rows(orders, list(linear.free))
+    return Rows(orders, through)
 
 
 def _with_turning(linear: Equations, orders: dict[int, Array]) -> dict[int, Array]:

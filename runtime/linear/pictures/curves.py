@@ -19,6 +19,8 @@ _INSIDE = 4
 _DASHES = ("-", "--", ":", "-.")
 #: Names of curves at their ends are so far apart at least, in parts of the height.
 _APART = 0.035
+#: Whirl beyond which a motion is called forward or backward.
+_WHIRLS = 0.05
 #: Frequencies that reach further than this stand on a logarithmic scale.
 _DECADES = 30.0
 
@@ -29,10 +31,15 @@ def locus(
     eigenvalues: NDArray[Any],
     path: str | Path | None,
     orders: Sequence[float],
+    frame: str,
+    whirl: Array,
 ) -> Any:
     """Frequencies and, where anything grows or decays, growth below; what grows is red."""
     frequencies, growths = np.abs(np.imag(eigenvalues)) / (2 * np.pi), np.real(eigenvalues)
-    parts = [("frequency in Hz", frequencies), ("growth in 1/s", growths)]
+    label = "frequency in Hz"
+    if orders or frame == "rotating":
+        label += f", {frame} frame"
+    parts = [(label, frequencies), ("growth in 1/s", growths)]
     if not np.nan_to_num(growths).any():
         parts = parts[:1]
     made = figure(6.0 if len(parts) > 1 else 4.5)
@@ -55,7 +62,7 @@ def locus(
             )  # fmt: skip
     above.set_ylim(0, 1.05 * top if top > 0 else None)
     for axis, (_, columns) in zip(axes, parts, strict=True):
-        _numbered(axis, x, columns)
+        _numbered(axis, x, columns, whirl)
     for below in axes[1:]:
         below.axhline(0, color="0.7", lw=0.8)
     axes[-1].set_xlabel(parameter)
@@ -69,9 +76,9 @@ def _look(k: int) -> dict[str, Any]:
     return {"color": f"C{k % 10}", "ls": _DASHES[k // 10 % len(_DASHES)]}
 
 
-def _numbered(axis: Any, x: Array, columns: Array) -> None:
-    """The number of every motion, from 1, at the end of its curve; those too near to one that
-    stands already are left out."""
+def _numbered(axis: Any, x: Array, columns: Array, whirl: Array) -> None:
+    """The number of every motion, from 1, at the end of its curve, with F where it whirls forward
+    and B where backward; those too near to one that stands already are left out."""
     low, high = axis.get_ylim()
     taken: list[tuple[float, float]] = []
     for k, column in enumerate(columns.T):
@@ -83,9 +90,13 @@ def _numbered(axis: Any, x: Array, columns: Array) -> None:
             continue
         taken.append((end, y))
         axis.annotate(
-            str(k + 1), (end, y), fontsize=8, color=f"C{k % 10}", va="center", xytext=(4, 0),
-            textcoords="offset points",
+            f"{k + 1}{_sense(whirl[known[-1], k])}", (end, y), fontsize=8, color=f"C{k % 10}",
+            va="center", xytext=(4, 0), textcoords="offset points",
         )  # fmt: skip
+
+
+def _sense(whirl: float) -> str:
+    return " F" if whirl > _WHIRLS else " B" if whirl < -_WHIRLS else ""
 
 
 def _named(made: Any, axis: Any, labels: Sequence[str]) -> None:

@@ -1,0 +1,1 @@
+"""Rotors: the fixed frame of spinning bodies."""
