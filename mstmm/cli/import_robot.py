@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
 from collections import defaultdict
 from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -13,6 +16,7 @@ from mstmm.printable import abbreviate
 from .options import Json, new_file, positive
 
 if TYPE_CHECKING:
+    from mstmm.scene.robots.convert import Imported
     from mstmm.scene.robots.robot import Note
 
 #: So many elements of one note are named.
@@ -68,6 +72,7 @@ def import_robot(
         mimics="held" if hold_mimics else "coupled",
         units={"length": length, "mass": mass},
     )  # fmt: skip
+    found = _with_meshes_beside(found, target)
     write_text(target, found.to_toml())
     if json:
         notes = [{"where": n.where, "element": n.element, "text": n.text} for n in found.notes]
@@ -76,6 +81,30 @@ def import_robot(
     for line in together(found.notes, robot):
         say(line)
     say(f"{target}: {found.scene.summary}")
+
+
+def _with_meshes_beside(found: Imported, target: Path) -> Imported:
+    """The scene with meshes that lie in its folder or below, where those from elsewhere are copied:
+    a scene file names no others."""
+    from mstmm.runtime.host.files import replacing
+
+    home, shapes = target.parent.resolve(), []
+    folder = home / f"{target.stem}_meshes"
+    copied = dict[Path, Path]()
+    for shape in found.tables.get("shape", ()):
+        if "file" in shape:
+            mesh = Path(shape["file"]).resolve()
+            if not mesh.is_relative_to(home):
+                folder.mkdir(exist_ok=True)
+                name = f"{len(copied)}_{mesh.name}"
+                if mesh not in copied:
+                    copied[mesh] = folder / name
+                    with replacing(folder / name) as temporary:
+                        shutil.copyfile(mesh, temporary)
+                mesh = copied[mesh]
+            shape = shape | {"file": str(mesh.relative_to(home))}
+        shapes.append(shape)
+    return replace(found, tables={**found.tables, "shape": shapes})
 
 
 def together(notes: Iterable[Note], file: str) -> list[str]:

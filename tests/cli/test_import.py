@@ -98,3 +98,24 @@ def test_a_dangling_link_of_the_scene_name_is_not_written_through(
     done = mstmm("import", "arm.urdf")
     assert done.code == 2 and "there already" in done.err
     assert not (folder / "elsewhere.toml").exists()
+
+
+def test_meshes_from_elsewhere_are_copied_beside_the_scene(mstmm: Command, folder: Path) -> None:
+    meshes, work = folder / "meshes", folder / "work"
+    meshes.mkdir()
+    work.mkdir()
+    (meshes / "plate.stl").write_text("solid plate\nendsolid plate\n")
+    (folder / "arm.urdf").write_text(
+        '<robot name="arm"><link name="a"><inertial><mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+        '<visual><geometry><mesh filename="meshes/plate.stl"/></geometry></visual></link>'
+        '<link name="b"><inertial><mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        '<joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint></robot>'
+    )
+    assert mstmm("import", "arm.urdf", "-o", "work/arm.toml").code == 0
+    assert (work / "arm_meshes" / "0_plate.stl").is_file()
+    assert 'file = "arm_meshes/0_plate.stl"' in (work / "arm.toml").read_text()
+    assert mstmm("check", "work/arm.toml").code == 0
+    assert mstmm("import", "arm.urdf", "-o", "here.toml").code == 0
+    assert 'file = "meshes/plate.stl"' in (folder / "here.toml").read_text()

@@ -111,3 +111,27 @@ def test_meshes_that_are_none(tmp_path: Path, text: str | None) -> None:
     run = mstmm.compile(scene, engine="looped").simulate(0.0)
     with pytest.raises(SceneError, match='shape "shape1": file'):
         staged(run, "mesh")
+
+
+@pytest.mark.parametrize("how", ["above", "absolute", "link", "missing"])
+def test_a_scene_file_names_meshes_of_its_own_folder_alone(tmp_path: Path, how: str) -> None:
+    folder = tmp_path / "scene"
+    folder.mkdir()
+    (tmp_path / "mesh.stl").write_text("solid x\nendsolid x\n")
+    (folder / "link.stl").symlink_to(tmp_path / "mesh.stl")
+    (folder / "own.stl").write_text("solid x\nendsolid x\n")
+    names = {
+        "above": "../mesh.stl", "absolute": str(tmp_path / "mesh.stl"), "link": "link.stl",
+        "missing": "nowhere.stl",
+    }  # fmt: skip
+    for name, refused in ((names[how], True), ("own.stl", False)):
+        (folder / "scene.toml").write_text(
+            'gravity = [0, 0, 0]\n[[body]]\nname = "b"\nmass = 1.0\n[[hinge]]\nname = "h"\n'
+            'type = "prismatic"\ninboard = "ground"\noutboard = "b"\n[[shape]]\non = "b"\n'
+            f'type = "mesh"\nfile = "{name}"\n'
+        )
+        if refused:
+            with pytest.raises(mstmm.SceneError, match=r"shape.*folder of the scene"):
+                mstmm.load_scene(folder / "scene.toml")
+        else:
+            assert mstmm.load_scene(folder / "scene.toml").shape[0].file == str(folder / name)

@@ -48,6 +48,27 @@ def path(*suffixes: str) -> Rule:
     return Rule(expected, check, {"type": "string"})
 
 
+def path_inside(*suffixes: str) -> Rule:
+    """Path of a regular file in the folder of the scene file that names it, or below; of a scene
+    that was not read from a file, any path."""
+    anywhere = path(*suffixes)
+
+    def check(value: Any) -> str:
+        name: str = anywhere.check(value)
+        if not FOLDER.get():
+            return name
+        home, place = Path(FOLDER.get()).resolve(), Path(name).resolve()
+        if not place.is_relative_to(home):
+            raise refuse(
+                f"expected a file in the folder of the scene, found {found(value)}; copy it there"
+            )
+        if not place.is_file():
+            raise refuse(f"{found(value)}: there is no such file in the folder of the scene")
+        return name
+
+    return Rule(anywhere.expected, check, {"type": "string"})
+
+
 def table_of_numbers(expected: str, columns: int = 0) -> Rule:
     """Rows of finite numbers, each of the same length (`columns` where it is given)."""
 

@@ -23,7 +23,7 @@ from ...rules.values import (
     refuse,
     split,
 )
-from ..elastic_keys import path
+from ..elastic_keys import path_inside
 
 #: What each type is made of.
 _KEYS = {
@@ -62,7 +62,7 @@ class Shape(Table):
     size: Annotated[Vector | None, rules.vector("m")] = None
     radius: Annotated[float | None, rules.number("m", above=0)] = None
     length: Annotated[float | None, rules.number("m", above=0)] = None
-    file: Annotated[str | None, path(".stl", ".obj")] = None
+    file: Annotated[str | None, path_inside(".stl", ".obj")] = None
     scale: Annotated[float | None, rules.number("m per unit of the mesh", above=0)] = None
     position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
     orientation: Annotated[Orientation, turns.orientation()] = (0.0, 0.0, 0.0)
