@@ -102,3 +102,50 @@ def test_a_backslash_is_looked_through_as_a_slash(tmp_path: Path) -> None:
     (tmp_path / "robot.xml").write_text(include("parts\\a.xml"))
     with pytest.raises(mstmm.SceneError, match=r"a\.xml: line 1: a document type or an entity"):
         mstmm.import_robot(tmp_path / "robot.xml")
+
+
+# --- what MuJoCo would be asked for ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("inside", "message"),
+    [
+        ('<worldbody><INCLUDE file="pipe.xml"/></worldbody>', "unknown element <INCLUDE>"),
+        ('<asset><mesh name="x" file="pipe.stl"/></asset>', "<mesh> file 'pipe.stl': this is not"),
+        ('<asset><texture fileright="pipe.stl"/></asset>', "<texture> fileright 'pipe.stl': this"),
+        ('<asset><hfield name="x" file="../x.png"/></asset>', "expected a file in the folder of"),
+        ('<compiler meshdir=".."/><asset><mesh file="x.png"/></asset>', "expected a file in the"),
+        ('<compiler meshdir="in"/><asset><mesh file="p.stl"/></asset>', "this is not a regular"),
+        ('<compiler strippath="true"/><asset><mesh file="no/pipe.stl"/></asset>', "not a regular"),
+        ('<asset><hfield nrow="12000" ncol="12000"/></asset>', "<hfield> holds 144000000 numbers"),
+        ('<asset><texture width="9000" height="9000"/></asset>', "<texture> holds 81000000"),
+        ('<worldbody><replicate count="1000"><replicate count="1000"><geom size="1"/></replicate>'
+         "</replicate></worldbody>", "more than 200000 elements, copies counted"),
+        ('<worldbody><replicate count="190000"><include file="few.xml"/></replicate></worldbody>',
+         "more than 200000 elements, copies counted"),
+        ('<worldbody><flexcomp count="1000 1000 1000"/></worldbody>', "more than 200000 elements"),
+    ],
+)  # fmt: skip
+def test_what_no_robot_needs_is_refused(tmp_path: Path, inside: str, message: str) -> None:
+    folder = tmp_path / "robot"
+    (folder / "in").mkdir(parents=True)
+    (tmp_path / "x.png").write_text("x")
+    (folder / "few.xml").write_text("<mujocoinclude><geom/><geom/></mujocoinclude>")
+    for name in ("pipe.xml", "pipe.stl", "in/p.stl"):
+        os.mkfifo(folder / name)
+    (folder / "robot.xml").write_text(f"<mujoco>\n{inside}</mujoco>")
+    with pytest.raises(mstmm.SceneError) as raised:
+        mstmm.import_robot(folder / "robot.xml")
+    assert message in str(raised.value)
+    assert ".xml: line " in str(raised.value)
+
+
+def test_assets_of_the_own_folder_pass(tmp_path: Path) -> None:
+    (tmp_path / "assets").mkdir()
+    (tmp_path / "assets" / "a.stl").write_text("x")
+    text = (
+        '<mujoco><compiler meshdir="assets"/><asset><mesh file="a.stl"/>'
+        '<hfield nrow="100" ncol="100"/><texture width="512" height="512"/></asset>'
+        '<worldbody><replicate count="50"><geom size="1"/></replicate></worldbody></mujoco>'
+    )
+    assert looked_through(text.encode(), tmp_path / "robot.xml", "robot.xml") == {}

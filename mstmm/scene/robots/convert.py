@@ -83,7 +83,9 @@ def converted(robot: Robot, choices: Choices, folder: Path | None = None) -> Imp
     if choices.merge and not writer.bodies():
         writer = _Writer(robot, tree, replace(choices, merge=False))
     if not writer.bodies():
-        raise SceneError(f'{robot.where}: nothing in it moves or has mass; try base = "free"')
+        urdf = robot.where.lower().endswith(".urdf")
+        way_out = 'try base = "free"' if urdf else "give a body a <freejoint>"
+        raise SceneError(f"{robot.where}: nothing in it moves or has mass; {way_out}")
     data = writer.tables(folder)
     scene, notes = Scene.from_data(data, robot.where), tuple(writer.notes)
     return Imported(scene, writer.links, writer.joints, notes, data)

@@ -66,7 +66,7 @@ def read_mjcf(path: str, where: str, places: Places | None = None) -> Robot:
         raise missing("robot", f"{where}: MJCF", error) from None
     try:
         model = mujoco.MjModel.from_xml_path(path)
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, RuntimeError, MemoryError) as error:
         why = " ".join(str(error).split())
         why = why if len(why) <= _LONGEST else f"{why[:_LONGEST]}..."
         raise SceneError(f"{where}: MuJoCo does not read it: {why}") from None

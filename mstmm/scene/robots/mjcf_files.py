@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import stat
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from ...arguments import short
 from ...errors import SceneError
 from ..files.read import content_of
 from .markup import Element, parsed
+from .mjcf_limits import MOST_ELEMENTS, check_element, count_copies
 
 #: Elements inside each other: bodies are, a long chain of them too.
 _DEEPEST = 2000
-#: Files of one model, and the largest of them in MB.
-_MOST, _LARGEST = 200, 16
+#: Files of one model, and the largest of them in MB, of MJCF and of meshes and pictures.
+_MOST, _LARGEST, _LARGEST_ASSET = 200, 16, 200
 #: What names another file of MJCF.
 _NAMING = ("include", "model")
+#: Keys by which elements name files, and by which a compiler says where these are.
+_FILES = ("file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
+_FOLDERS = ("meshdir", "texturedir", "assetdir")
 
 #: Sections whose elements have names of their own kind, whatever their tags.
 _SECTIONS = ("equality", "tendon", "contact", "actuator", "sensor")
@@ -28,14 +32,26 @@ Places = dict[tuple[str, str], str]
 def looked_through(content: bytes, path: Path, where: str) -> Places:
     """Where the elements with names are, in the file and in those that it includes.
 
-    Raises SceneError for document types and entities, for text that is no XML, and for files that
-    are not in the folder of the model or below it.
+    Raises SceneError for document types and entities, for text that is no XML, for what is too
+    large or too much, and for files, of meshes and pictures too, that are not in the folder of the
+    model or below it, or no regular files.
     """
     folder, found = path.parent.resolve(), Places()
-    waiting, seen = [(content, path, where)], {path.resolve()}
+    waiting, seen, total = [(content, path, where, 1)], {path.resolve()}, 0
+    assets, folders = list[tuple[Element, Path]](), {""}
     while waiting:
-        content, path, where = waiting.pop()
-        for section, one in _all(parsed(content, where, _DEEPEST)):
+        content, path, where, copies = waiting.pop()
+        for section, one, here in _all(parsed(content, where, _DEEPEST), copies):
+            check_element(one)
+            total += here
+            if total > MOST_ELEMENTS:
+                raise SceneError(
+                    f"{one.where}: <{one.tag}>: the model has more than {MOST_ELEMENTS} elements, "
+                    "copies counted; leave some out"
+                )
+            folders.update(one.attributes[key] for key in _FOLDERS if key in one.attributes)
+            if one.tag not in _NAMING:
+                assets.append((one, path.parent))
             if name := one.attributes.get("name"):
                 found.setdefault((section or one.tag, name), one.where)
             if one.tag not in _NAMING or "file" not in one.attributes:
@@ -48,21 +64,41 @@ def looked_through(content: bytes, path: Path, where: str) -> Places:
                     inside = content_of(other, ending, "MJCF")[1]
                     if not inside.strip():
                         raise _refused(one, "the file is empty")
-                    waiting.append((inside, other, shown))
+                    waiting.append((inside, other, shown, here))
         if len(seen) > _MOST:
             raise SceneError(f"{where}: the model has more than {_MOST} files")
+    for one, beside in assets:
+        _check_assets(one, folder, beside, folders)
     return found
 
 
-def _others(one: Element, folder: Path, beside: Path) -> Iterator[Path]:
+def _check_assets(one: Element, folder: Path, beside: Path, folders: Collection[str]) -> None:
+    """SceneError for a mesh or picture from elsewhere, that is no regular file or too large, in any
+    of the `folders` that compilers name."""
+    for key in _FILES:
+        if one.attributes.get(key, "").strip():
+            for other in _others(one, folder, beside, key, folders):
+                if other.stat().st_size > _LARGEST_ASSET * 2**20:
+                    raise _refused(one, f"has more than {_LARGEST_ASSET} MB", key)
+
+
+def _others(
+    one: Element,
+    folder: Path,
+    beside: Path,
+    key: str = "file",
+    folders: Collection[str] | None = None,
+) -> Iterator[Path]:
     """The files that an element may mean: from the folder of the model, and from that of its own
-    file; those that are there.  MuJoCo takes a backslash for a slash."""
-    name = one.attributes["file"]
+    file; those that are there.  MuJoCo takes a backslash for a slash, and may leave out folders."""
+    name = one.attributes[key]
     if not name.strip():
-        raise _refused(one, "expected the name of a file")
-    names = dict.fromkeys((name, name.replace("\\", "/")))
-    for start in dict.fromkeys((folder, beside)):
-        for each in names:
+        raise _refused(one, "expected the name of a file", key)
+    bare = name.replace("\\", "/")
+    names = {name, bare} if folders is None else {name, bare, Path(bare).name}
+    starts = {start / place for start in (folder, beside) for place in folders or ("",)}
+    for start in sorted(starts):
+        for each in sorted(names):
             try:
                 other = (start / each).resolve()
                 mode = other.stat().st_mode if other.is_relative_to(folder) else None
@@ -70,25 +106,26 @@ def _others(one: Element, folder: Path, beside: Path) -> Iterator[Path]:
                 continue
             except (OSError, RuntimeError, ValueError) as error:  # names too long, rings of links
                 why = getattr(error, "strerror", None) or "links to itself"
-                raise _refused(one, f"cannot be read: {why}") from None
+                raise _refused(one, f"cannot be read: {why}", key) from None
             if mode is None:
-                raise _refused(
-                    one, "expected a file in the folder of the model or below it; copy it there"
-                )
+                why = "expected a file in the folder of the model or below it; copy it there"
+                raise _refused(one, why, key)
             if not stat.S_ISREG(mode):
-                raise _refused(one, "this is not a regular file; name one")
+                raise _refused(one, "this is not a regular file; name one", key)
             yield other
 
 
-def _refused(one: Element, why: str) -> SceneError:
-    return SceneError(f"{one.where}: <{one.tag}> file {short(one.attributes['file'])}: {why}")
+def _refused(one: Element, why: str, key: str = "file") -> SceneError:
+    return SceneError(f"{one.where}: <{one.tag}> {key} {short(one.attributes[key])}: {why}")
 
 
-def _all(one: Element) -> Iterator[tuple[str, Element]]:
-    """The element and all that is inside, each with its section if that is one of `_SECTIONS`."""
-    left = [("", one)]
+def _all(one: Element, copies: int) -> Iterator[tuple[str, Element, int]]:
+    """The element and all that is inside, each with its section if that is one of `_SECTIONS`, and
+    how often it is there in the end."""
+    left = [("", one, copies)]
     while left:
-        section, one = left.pop()
-        yield section, one
+        section, one, copies = left.pop()
+        copies *= count_copies(one)
+        yield section, one, copies
         inside = one.tag if one.tag in _SECTIONS else ""
-        left += [(inside, child) for child in reversed(one.children)]
+        left += [(inside, child, copies) for child in reversed(one.children)]
