@@ -22,16 +22,8 @@ def output_matrices(
     """(names, C (outputs, states), D (outputs, pushes)) of y = C z + D v, where `b` (states,
     pushes) is what v adds to d/dt z."""
     named = None if outputs is None else some_names("outputs", outputs)
-    shown, speeds = outputs_of(linear, named), [*linear.free, *linear.drives]
-    rows = rows_of(linear, shown, pushes)
-    c, d = np.zeros((len(shown), len(linear.states))), rows.through
-    for order, wide in rows.orders.items():
-        some = wide[:, speeds]
-        if order < 2:
-            c[:, (linear.positions, linear.velocities)[order]] += some
-        else:  # of accelerations
-            rates = linear.velocities
-            c, d = c + some @ linear.A[rates], d + some @ b[rates]
+    shown = outputs_of(linear, named)
+    c, d = linear.observed(rows_of(linear, shown, pushes), b)
     return tuple(one.name for one in shown), c, d
 
 

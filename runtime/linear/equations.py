@@ -142,6 +142,11 @@ class Equations(Assessed):
         return found if self.carrying is None else self.carrying.matrices(found)
 
     @property
+    def has_stiffness(self) -> bool:
+        """Whether there is a K."""
+        return True
+
+    @property
     def M(self) -> Array:
         """(n, n) mass matrix."""
         return self._whole.M

@@ -37,6 +37,11 @@ def names(linear: StateSpace) -> dict[str, tuple[str, ...]]:
     }  # fmt: skip
 
 
+def _there(linear: StateSpace) -> list[tuple[str, str, str]]:
+    """The matrices that a model has."""
+    return [one for one in MATRICES if linear.has_stiffness or "state" in one[1:]]
+
+
 def dictionary(linear: StateSpace) -> dict[str, Any]:
     """Everything of a linear model that JSON can hold."""
     state = linear.state
@@ -45,7 +50,7 @@ def dictionary(linear: StateSpace) -> dict[str, Any]:
         "coordinates": list(linear.coordinates), "units": list(linear.units),
         "inputs": list(linear.inputs), "disturbances": list(linear.disturbances),
         "driven": list(linear.driven),
-        **{key: getattr(linear, key).tolist() for key, _, _ in MATRICES},
+        **{key: getattr(linear, key).tolist() for key, _, _ in _there(linear)},
     }  # fmt: skip
 
 
@@ -54,7 +59,7 @@ def dataset(linear: StateSpace) -> Any:
     along = names(linear)
     arrays = {
         key: ((row, f"{column}2" if column == row else column), getattr(linear, key))
-        for key, row, column in MATRICES
+        for key, row, column in _there(linear)
     }
     coords = dict(along) | {f"{key}2": along[key] for key in ("coordinate", "state")}
     return xarray().Dataset(
@@ -66,7 +71,7 @@ def entries(linear: StateSpace) -> Iterator[tuple[str, ...]]:
     """Every entry that is not zero: matrix, row, column, value."""
     along = names(linear)
     yield "matrix", "row", "column", "value"
-    for key, row, column in MATRICES:
+    for key, row, column in _there(linear):
         values = getattr(linear, key)
         for i, j in zip(*np.nonzero(values), strict=True):
             yield key, along[row][i], along[column][j], repr(float(values[i, j]))

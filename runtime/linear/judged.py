@@ -39,7 +39,20 @@ def find_linear_risks(linear: Equations) -> Iterator[Risk]:
     yield from _unsteady(linear)
     if len(linear) <= _LARGEST:
         yield from friction_risks(linear)
-    yield from _without_effect(linear)
+    yield from without_effect(linear, linear.V)
+    yield from find_omissions(linear)
+    if len(linear) <= _ALL_MOTIONS:
+        yield from modes(linear, None, None).motion_risks()
+    else:
+        yield advice(
+            "stability-unknown", RUN,
+            f"more than {_ALL_MOTIONS} coordinates: not examined for motions that grow or that "
+            "nothing pushes back", "look at the slowest modes, modes(count=...)",
+        )  # fmt: skip
+
+
+def find_omissions(linear: Equations) -> Iterator[Risk]:
+    """What of the scene a linear model leaves out: controllers, outputs, the time."""
     for one in linear.model.scene.controller:
         yield advice(
             "controller-left-out", f'controller "{one.name}"',
@@ -53,16 +66,8 @@ def find_linear_risks(linear: Equations) -> Iterator[Risk]:
         )  # fmt: skip
     if linear.model.packed.system.timed:
         yield advice(
-            "time-dependent", RUN, f"loads depend on time: linearised at t = {state.t:g} s",
+            "time-dependent", RUN, f"loads depend on time: linearised at t = {linear.state.t:g} s",
             "give the time that is meant, t=...",
-        )  # fmt: skip
-    if len(linear) <= _ALL_MOTIONS:
-        yield from modes(linear, None, None).motion_risks()
-    else:
-        yield advice(
-            "stability-unknown", RUN,
-            f"more than {_ALL_MOTIONS} coordinates: not examined for motions that grow or that "
-            "nothing pushes back", "look at the slowest modes, modes(count=...)",
         )  # fmt: skip
 
 
@@ -91,8 +96,9 @@ def _unsteady(linear: Equations) -> Iterator[Risk]:
         )  # fmt: skip
 
 
-def _without_effect(linear: Equations) -> Iterator[Risk]:
-    for name, column in zip(linear.inputs, linear.V.T, strict=True):
+def without_effect(linear: Equations, effects: Array) -> Iterator[Risk]:
+    """Inputs whose effects, columns (n, inputs), are zero."""
+    for name, column in zip(linear.inputs, effects.T, strict=True):
         if len(linear) and not column.any():
             yield advice(
                 "input-without-effect", f'input "{name}"', f"input {name} has no effect here",

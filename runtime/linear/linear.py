@@ -42,16 +42,9 @@ class Linear(StateSpace):
         Raises SceneError for a count that makes no sense, NumericalFailure where a motion moves no
         inertia or the iteration does not converge.
         """
-        if count is not None and not isinstance(count, (int, np.integer)):
-            raise SceneError(f"count = {count!r}: expected a whole number of motions")
         if damped is not None and not isinstance(damped, bool | np.bool_):
             raise SceneError(f"damped = {short(damped)}: expected True, False or None")
-        if count is not None and not len(self):
-            raise SceneError(f"count = {count!r}: nothing moves in this scene")
-        if count is not None and (isinstance(count, bool) or not 0 < count <= len(self)):
-            raise SceneError(
-                f"count = {count!r}: expected a number of motions from 1 to {len(self)}"
-            )
+        self.check_count(count, len(self))
         if count is None:
             refuse_dense(len(self), "the matrix of all motions")
         return modes(self, count, damped)
@@ -72,6 +65,18 @@ class Linear(StateSpace):
         if self.frame == "fixed":
             return self
         return replace(self, carrying=carrying_at(self))
+
+    @staticmethod
+    def check_count(count: int | None, most: int) -> None:
+        """Raises SceneError for a number of motions that is none from 1 to `most`."""
+        if count is None:
+            return
+        if not isinstance(count, (int, np.integer)):
+            raise SceneError(f"count = {count!r}: expected a whole number of motions")
+        if not most:
+            raise SceneError(f"count = {count!r}: nothing moves in this scene")
+        if isinstance(count, bool) or not 0 < count <= most:
+            raise SceneError(f"count = {count!r}: expected a number of motions from 1 to {most}")
 
     def frequency_response(
         self,

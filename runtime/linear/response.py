@@ -176,7 +176,7 @@ def frequency_response(
     exact: Chosen = False,
 ) -> FrequencyResponse:
     """See `Linear.frequency_response`."""
-    frequencies = _frequencies(omega)
+    frequencies = angular_frequencies(omega)
     beams = None
     if exact is not False:
         refuse_turning(linear)
@@ -191,7 +191,7 @@ def frequency_response(
                     "exact: all coordinates are shapes of beams; name outputs, such as "
                     f'"{beams.names[0]}.tip.y"'
                 )
-    pushes = _pushes(linear, inputs)
+    pushes = chosen_pushes(linear, inputs)
     if beams is not None:
         refuse_distributed(beams, pushes)
     refuse_drives(pushes, beams is not None or given(structural))
@@ -210,7 +210,8 @@ def _ratio(output: str, pushed: str) -> str:
     return f"{output}/({pushed})" if "*" in pushed else f"{output}/{pushed}"
 
 
-def _frequencies(omega: ArrayLike) -> Array:
+def angular_frequencies(omega: ArrayLike) -> Array:
+    """(k,) rad/s.  SceneError for what no angular frequencies are."""
     try:
         found = np.array(omega, dtype=np.float64).reshape(-1)
     except (TypeError, ValueError):
@@ -226,7 +227,8 @@ def _frequencies(omega: ArrayLike) -> Array:
     return found
 
 
-def _pushes(linear: Equations, inputs: Sequence[str] | None) -> Sequence[Channel]:
+def chosen_pushes(linear: Equations, inputs: Sequence[str] | None) -> Sequence[Channel]:
+    """Those that are named, or those of the model, or its disturbances.  SceneError for none."""
     if inputs is not None:
         return [channel(linear.model, name) for name in some_names("inputs", inputs)]
     pushes = linear.controls or linear.others

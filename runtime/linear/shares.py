@@ -33,12 +33,17 @@ def along(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[An
 
 def kinetic(linear: Equations, shapes: NDArray[Any]) -> dict[str, Array]:
     """Body -> (k,): its part of each shape's kinetic energy."""
-    engine, parts = linear.model.apart, [np.real(shapes)]
-    if np.iscomplexobj(shapes):
-        parts.append(np.imag(shapes))
-    energies = np.zeros((shapes.shape[1], engine.packed.topology.count))
+    return kinetic_of_speeds(linear.model, linear.state.q, linear.spread(shapes))
+
+
+def kinetic_of_speeds(model: Compiled, q: Array, speeds: NDArray[Any]) -> dict[str, Array]:
+    """Body -> (k,): its part of the kinetic energy of all speeds (nu, k) at q (nq,)."""
+    engine, parts = model.apart, [np.real(speeds)]
+    if np.iscomplexobj(speeds):
+        parts.append(np.imag(speeds))
+    energies = np.zeros((speeds.shape[1], engine.packed.topology.count))
     for part in parts:
-        energies += engine.kinetic_energies(linear.state.q, linear.spread(part).T)
+        energies += engine.kinetic_energies(q, np.ascontiguousarray(part.T))
     frames = {one.frame for one in engine.packed.system.closures}
     bodies = [place for place in range(energies.shape[1]) if place not in frames]
     names = [engine.body_name(place).partition("/")[0] for place in bodies]

@@ -11,6 +11,7 @@ from mstmm.arrays import Array
 
 from .channels import Channel
 from .equations import Equations
+from .output.outputs import Rows
 
 
 class StateSpace(Equations):
@@ -68,6 +69,19 @@ class StateSpace(Equations):
     def B_disturbances(self) -> Array:
         """(2 n + 2 k, disturbances): what w adds."""
         return self._pushing(self.others, self.W)
+
+    def observed(self, rows: Rows, b: Array) -> tuple[Array, Array]:
+        """C (outputs, states) and D (outputs, pushes) of rows of outputs, where `b` (states,
+        pushes) is what pushes add to d/dt z."""
+        speeds, rates = [*self.free, *self.drives], self.velocities
+        c, d = np.zeros((len(rows.through), len(self.states))), rows.through
+        for order, wide in rows.orders.items():
+            some = wide[:, speeds]
+            if order < 2:
+                c[:, (self.positions, rates)[order]] += some
+            else:  # of accelerations
+                c, d = c + some @ self.A[rates], d + some @ b[rates]
+        return c, d
 
     def _pushing(self, pushes: Sequence[Channel], efforts: Array) -> Array:
         found = np.zeros((len(self.states), len(pushes)))

@@ -65,7 +65,11 @@ class Derivatives:
 
     @property
     def state_matrix(self) -> Array:
-        """A (..., 2 nu, 2 nu): d/dt (dphi, du) = A (dphi, du) of motions near this one."""
+        """A (..., 2 nu, 2 nu): d/dt (dphi, du) = A (dphi, du) of motions near this one.
+
+        At this moment: where A changes along the motion its eigenvalues tell nothing of stability
+        (`Model.linearize` says whether it does).
+        """
         return np.block([[self.rate_q, self.rate_u], [self.q, self.u]])
 
     def kept_in(self, out: Derivatives) -> Derivatives:

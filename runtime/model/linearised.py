@@ -47,7 +47,8 @@ class Linearised(AtStates):
         accelerations of the ground ("ground.acceleration.y"; all three are w where nothing is
         named), inputs of the scene that nothing is driven by (all are v where nothing is named).
         Coordinates that a drive imposes are left out; the others move along with it.  Exact, no
-        differences.
+        differences.  Beside a motion with rolling contacts or rows of speeds it is a
+        `NonholonomicLinear`, which has A and B but no M, C and K.
 
         Dry friction of hinges that rest at the state is left out, and `Linear.warnings` has the
         amplitude below which they stick.  `friction` gives amplitudes V of speed (rad/s or m/s),

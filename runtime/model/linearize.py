@@ -18,6 +18,8 @@ from ..linear.judged import unrest
 from ..linear.linear import Linear
 from ..linear.loops.mechanism import mechanism_at, moving_at
 from ..linear.matrices import State, matrices
+from ..linear.nonholonomic.admissible import has_speed_rows
+from ..linear.nonholonomic.linear_model import nonholonomic_at
 from ..linear.operating_point.friction import Amplitudes, dry_friction
 from ..run.start import initial_state
 from ..run.system import SceneSystem
@@ -74,6 +76,8 @@ class Linearising:
 
     def _of_mechanism(self, bare: Linear) -> Linear:
         model, state, dry = self._model, bare.state, bare.dry
+        if state.u.any() and has_speed_rows(model):
+            return nonholonomic_at(bare, self._slopes)
         if not state.u.any():
             found = replace(bare, mechanism=mechanism_at(model, state, dry))
             if not unrest(found):

@@ -58,7 +58,7 @@ class Freedom:
         any other, by motions in sizes.
         """
         left = self._motions(q) / self.sizes[:, None]
-        return tuple(sorted(_read_off(left, self._free.tolist(), _WELL)[0]))
+        return tuple(sorted(read_off(left, self._free.tolist(), _WELL)[0]))
 
     def settling(
         self, q: Array, shapes: Sequence[int], kept: Sequence[int], wished: Sequence[int]
@@ -70,14 +70,14 @@ class Freedom:
         shape changes apart, of `wished` where these do.
         """
         left = self._motions(q) / self.sizes[:, None]
-        held, left = _read_off(left, kept, _BARELY)
+        held, left = read_off(left, kept, _BARELY)
         _, lengths, ways = np.linalg.svd(left[list(shapes)])
         changing = int((lengths > 1 / _BARELY).sum())
         others = [k for k in self._free.tolist() if k not in {*shapes, *kept, *wished}]
-        more, _ = _read_off(left @ ways[changing:].T, [*wished, *others], _WELL)
+        more, _ = read_off(left @ ways[changing:].T, [*wished, *others], _WELL)
         for place in more:
             left = _without(left, place)
-        return (*held, *more), tuple(sorted(_read_off(left, shapes, _WELL)[0]))
+        return (*held, *more), tuple(sorted(read_off(left, shapes, _WELL)[0]))
 
     def following(self, q: Array, places: Sequence[int]) -> Array:
         """N (nu, n): all speeds for a unit of each of some independent ones.
@@ -117,6 +117,27 @@ class Freedom:
         """q (nq,) after a small motion along speeds (nu,); loops are closed to first order."""
         return self._calls.moved(q, speeds)
 
+    @property
+    def free(self) -> list[int]:
+        """Places of the speeds that nobody imposes."""
+        return list(map(int, self._free))
+
+    @cached_property
+    def rows_of_speeds(self) -> frozenset[int]:
+        """Rows that restrict speeds and keep no position: of discs that roll, couplings of
+        speeds."""
+        records = self._calls.records
+        asked = {one.frame: one.of_speeds for one in self._calls.engine.packed.system.closures}
+        found = {
+            row for one in records.closures for direction, row in one.rows.items()
+            if direction in asked[one.frame]
+        }  # fmt: skip
+        return frozenset(found | {x.row for x in records.couplings if x.coupling.of_speeds})
+
+    def slip(self, q: Array, u: Array) -> Array:
+        """(rows,) J(q) u, but for its sign."""
+        return self._slips(q, u)[1]
+
     def _motions(self, q: Array) -> Array:
         """(nu, n) a basis of the motions at q, orthonormal in sizes."""
         count = min(len(self._free), self._loops.mobility + 1)  # one more shows at a singular pose
@@ -141,7 +162,7 @@ class Freedom:
         return correction - still, slips - asked
 
 
-def _read_off(left: Array, places: Sequence[int], well: float) -> tuple[list[int], Array]:
+def read_off(left: Array, places: Sequence[int], well: float = _WELL) -> tuple[list[int], Array]:
     """Rows of motions (nu, n), orthonormal in sizes, that tell them apart, and what of the motions
     moves none of these; each is the first of `places` that is told apart well."""
     own, found = list(places), list[int]()

@@ -33,7 +33,7 @@ from ..channels import Channel, columns
 from ..drives import Columns, Moves, coordinate, slopes_along
 from ..matrices import Matrices, State, matrices
 from ..operating_point.friction import DryFriction
-from .motion import Motion, refuse_rows_of_speeds
+from .motion import Motion
 
 #: Exact slopes (nu, nu) of the accelerations at a state, by the names of `Derivatives`.
 Slopes = Callable[[State], Mapping[str, Array]]
@@ -169,12 +169,11 @@ def moving_at(
     """The mechanism at a state that moves or does not last, along independent speeds in `places`
     or those that are well chosen there, with viscous dampers for `dry` friction; None for a tree.
 
-    Raises SceneError for rows of speeds and scenes whose accelerations have no slopes,
-    NumericalFailure as `mechanism_at`.
+    Raises SceneError for scenes whose accelerations have no slopes, NumericalFailure as
+    `mechanism_at`.
     """
     if model.freedom is None:
         return None
-    refuse_rows_of_speeds(model, state.u)
     found = _mechanism(model, state, places or model.freedom.chosen(state.q), dry)
     return replace(found, motion=Motion.of(slopes(state), found.places, found.ways), slopes=slopes)
 
@@ -183,16 +182,22 @@ def _mechanism(
     model: Compiled, state: State, places: tuple[int, ...], dry: DryFriction | None
 ) -> Mechanism:
     """Without what its loads and its motion do."""
-    packed, freedom = model.packed, model.freedom
+    freedom = model.freedom
     assert freedom is not None
     ways, n = freedom.following(state.q, places), len(places)
-    system = torn(packed.system)
-    tree = rough = Engine(packed_system(system, packed))
-    if dry:
-        tree = Engine(packed_system(replace(system, laws=dry.replaced(system.laws)), packed))
+    rough, tree = torn_trees(model, dry)
     return Mechanism(
         model, tree, model.free_speeds, places, ways, np.zeros((n, n)), rough=rough, dry=dry
     )
+
+
+def torn_trees(model: Compiled, dry: DryFriction | None) -> tuple[Engine, Engine]:
+    """The scene with its loops open, and the same with viscous dampers for `dry` friction."""
+    packed, system = model.packed, torn(model.packed.system)
+    tree = Engine(packed_system(system, packed))
+    if not dry:
+        return tree, tree
+    return tree, Engine(packed_system(replace(system, laws=dry.replaced(system.laws)), packed))
 
 
 def _along(

@@ -13,23 +13,17 @@ are no integrals of speeds (dphi' = G dphi + du):
     S = (B - G N + N G_x) / 2.
 
 Nothing in this takes a difference.  Rows of speeds that are no rates of any place (discs that roll)
-have no such symmetry.
+have no such symmetry; see `nonholonomic`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from mstmm.arrays import Array
-from mstmm.errors import SceneError
-from mstmm.scene.tables.closures import ROLLING
 
 from ..matrices import Matrices
-
-if TYPE_CHECKING:
-    from ...engine.compiled import Compiled
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,15 +67,3 @@ class Motion:
         if order == 2:
             yield 1, self.bent
             yield 0, self.shifted
-
-
-def refuse_rows_of_speeds(model: Compiled, u: Array) -> None:
-    """SceneError for a state that moves where rows are no rates of any place."""
-    scene = model.packed.described
-    names = [f'constraint "{one.name}"' for one in scene.constraint if one.type == ROLLING]
-    names += [f'coupling "{one.name}"' for one in scene.coupling if one.speeds is not None]
-    if names and u.any():
-        raise SceneError(
-            f"scene: {names[0]} asks for speeds, and a linear model beside a motion does not "
-            "follow that; take u = 0, or the derivatives of model.derivatives(q, u)"
-        )

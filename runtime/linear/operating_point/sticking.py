@@ -70,6 +70,8 @@ def _stuck_below(linear: Equations, left: list[Rubbing]) -> Array:
     """(k,) how far static friction holds each of some speeds against the stiffness there is, all
     other coordinates following; infinite where there is none."""
     ways = np.zeros((len(left), len(linear)))
+    if not linear.has_stiffness:
+        return np.full(len(left), np.inf)
     if linear.mechanism is not None:
         ways = linear.mechanism.ways[[one.speed for one in left]]
     else:

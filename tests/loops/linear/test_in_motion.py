@@ -219,11 +219,3 @@ def test_parts_of_a_motion() -> None:
 def test_a_drive_that_drags_loops_along_leaves_no_rest() -> None:
     (warning, *_) = turned(1.0, 0.9, 0).linearize().warnings
     assert warning.startswith("the state does not last: foot0.angle accelerate")
-
-
-def test_rows_of_speeds_do_not_follow() -> None:
-    scene = governor(0.7)
-    scene["coupling"] = [{"name": "slip", "speeds": "spin.u - 3*swing.u"}]
-    model = compiled(scene)
-    with pytest.raises(mstmm.SceneError, match='"slip" asks for speeds, and a linear model beside'):
-        model.linearize(model.initial_state()[0], np.ones(model.nu))

@@ -1,0 +1,1 @@
+"""Linear models beside motions with rolling contacts and rows of speeds."""

@@ -1,0 +1,182 @@
+"""Admissible perturbations beside a motion whose rows restrict speeds: rolling discs, knife edges.
+
+Rows J(q) u = 0 restrict all speeds; those of them that belong to closed positions, J_h, restrict
+the increments of coordinates too, J_h phi = 0.  Of independent increments x and speeds v
+
+    phi = P x,    du = N v + S x,    J N = 0,    J S x + d(J u)/dq phi = 0,
+
+so that there are more positions than speeds.  The last term is a central difference of eighth
+order, of an expression without loads; everything else is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import TYPE_CHECKING, NoReturn
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import SceneError
+from mstmm.scene.tables.closures import ROLLING
+
+from ...engine.loops.freedom import Freedom, read_off
+from ..loops.mechanism import Mechanism, torn_trees
+
+if TYPE_CHECKING:
+    from ...engine.compiled import Compiled
+    from ..matrices import State
+    from ..operating_point.friction import DryFriction
+
+#: Weights of a central difference by the number of steps, and its steps in sizes of coordinates.
+_WEIGHTS = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
+_STEPS = (1e-2, 1e-3, 1e-4)
+#: Rows that are rounding beside the largest.
+_ROUNDING = 1e-9
+
+
+def has_speed_rows(model: Compiled) -> bool:
+    """Whether rows restrict speeds alone: discs that roll, couplings of speeds."""
+    scene = model.packed.described
+    return any(one.type == ROLLING for one in scene.constraint) or any(
+        one.speeds is not None for one in scene.coupling
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class RollingMechanism(Mechanism):
+    """Independent positions and speeds; `places` and `ways` are those of the positions, P (nu, n).
+
+    Attributes:
+        speed_places: places of the m independent speeds v among all.
+        speed_ways: (nu, m) N, all speeds for a unit of each.
+        swept: (nu, n) S, speeds for a unit of each position at the same v.
+    """
+
+    speed_places: tuple[int, ...] = ()
+    speed_ways: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+    swept: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+
+    @property
+    def basis(self) -> Array:
+        """(2 nu, n + m): (phi, du) for a unit of each of (x, v)."""
+        nothing = np.zeros_like(self.speed_ways)
+        return np.block([[self.ways, nothing], [self.swept, self.speed_ways]])
+
+    @property
+    def own(self) -> list[int]:
+        """Places of (x, v) in (phi, du)."""
+        return [*self.places, *(len(self.ways) + k for k in self.speed_places)]
+
+    def rows(self, state: State, orders: Mapping[int, Array], drives: object) -> dict[int, Array]:
+        """Rows (k, nu) of all increments, speeds and accelerations as they are."""
+        return dict(orders)
+
+    def matrices(self, *_: object) -> NoReturn:
+        refuse_second_order(self)
+
+    def pushed(self, *_: object) -> NoReturn:
+        refuse_second_order(self)
+
+    def driven(self, *_: object) -> NoReturn:
+        raise SceneError(
+            "linear model: motions of drives are no inputs beside a motion with rows of speeds; "
+            "name efforts or forces"
+        )
+
+
+def refuse_second_order(found: RollingMechanism) -> NoReturn:
+    """SceneError for M, C, K and what follows from them."""
+    raise SceneError(
+        f"linear model: rows of speeds leave {len(found.places)} positions and "
+        f"{len(found.speed_places)} speeds here, which have no M, C, K, V and W; take A, B and "
+        "states"
+    )
+
+
+def rolling_at(
+    model: Compiled,
+    state: State,
+    changing: Array | None = None,
+    dry: DryFriction | None = None,
+    own: tuple[tuple[int, ...], tuple[int, ...]] | None = None,
+) -> RollingMechanism:
+    """Admissible perturbations at a state, along positions and speeds in the places `own`, or along
+    those that are well chosen there: of speeds, rather those at which `changing` (nu,) is zero.
+    Viscous dampers take the place of `dry` friction.
+
+    Raises NumericalFailure where loops leave no one set of motions.
+    """
+    freedom = model.freedom
+    assert freedom is not None
+    rows = _Rows(freedom, state.q)
+    basis = rows.allowed(rows.of_positions)
+    if own is None:
+        free = list(model.free_speeds)
+        size = np.abs(state.u).max(initial=0.0) ** 2
+        leaves = np.zeros(model.nu) if changing is None else np.abs(changing) > _ROUNDING * size
+        lasting = sorted(free, key=lambda k: bool(leaves[k]))
+        motions = np.linalg.qr(freedom.following(state.q, freedom.chosen(state.q))
+                               / freedom.sizes[:, None])[0]  # fmt: skip
+        own = (
+            tuple(sorted(read_off(basis, free)[0])),
+            tuple(sorted(read_off(motions, lasting)[0])),
+        )
+    positions, speeds = own
+    ways = basis * freedom.sizes[:, None]
+    ways = ways @ np.linalg.inv(ways[list(positions)])
+    speed_ways = freedom.following(state.q, speeds)
+    swept = rows.swept(ways, state.u)
+    swept -= speed_ways @ swept[list(speeds)]
+    nothing = np.zeros((len(positions), len(positions)))
+    rough, tree = torn_trees(model, dry)
+    return RollingMechanism(
+        model, tree, model.free_speeds, positions, ways, nothing, rough=rough, dry=dry,
+        speed_places=speeds, speed_ways=speed_ways, swept=swept,
+    )  # fmt: skip
+
+
+class _Rows:
+    """J of the rows of one scene at q (nq,), and how J u changes with q."""
+
+    def __init__(self, freedom: Freedom, q: Array) -> None:
+        self._freedom, self._q, self._sizes = freedom, q, freedom.sizes
+        self._J = np.array([freedom.slip(q, one) for one in np.eye(len(self._sizes))]).T
+        of_speeds = freedom.rows_of_speeds
+        self.of_positions = [k for k in range(len(self._J)) if k not in of_speeds]
+
+    def allowed(self, rows: Sequence[int]) -> Array:
+        """(nu, n) a basis of the increments that some rows allow, orthonormal in sizes."""
+        free = self._freedom.free
+        scaled = (self._J * self._sizes)[np.ix_(rows, free)]
+        _, lengths, across = np.linalg.svd(scaled)
+        rank = int((lengths > _ROUNDING * lengths.max(initial=0.0)).sum())
+        found = np.zeros((len(self._sizes), len(free) - rank))
+        found[free] = across[rank:].T
+        return found
+
+    def swept(self, ways: Array, u: Array) -> Array:
+        """(nu, n) speeds by which J u stays zero along increments `ways` (nu, n)."""
+        free = self._freedom.free
+        changes = np.reshape([self._change(way, u) for way in ways.T], (-1, len(self._J))).T
+        scaled = (self._J * self._sizes)[:, free]
+        found = np.zeros_like(ways)
+        found[free] = -np.linalg.lstsq(scaled, changes, rcond=_ROUNDING)[0]
+        return np.asarray(found * self._sizes[:, None])
+
+    def _change(self, way: Array, u: Array) -> Array:
+        """(rows,) d(J u)/dq along increments (nu,), by the step whose neighbour agrees best."""
+        size = float(np.abs(way / self._sizes).max())
+        tried = [self._difference(way, u, step / size) for step in _STEPS]
+        apart = [np.abs(a - b).max(initial=0.0) for a, b in pairwise(tried)]
+        return tried[int(np.argmin(apart))]
+
+    def _difference(self, way: Array, u: Array, step: float) -> Array:
+        found = np.zeros(len(self._J))
+        for count, weight in _WEIGHTS.items():
+            for sign in (1.0, -1.0):
+                q = self._freedom.moved(self._q, sign * count * step * way)
+                found += sign * weight / step * self._freedom.slip(q, u)
+        return found

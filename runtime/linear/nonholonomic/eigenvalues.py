@@ -1,0 +1,76 @@
+"""Eigenvalues of state matrices with many zeros: coordinates on which nothing depends."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arrays import Array
+
+Complex = NDArray[np.complex128]
+
+#: Entries of A that are rounding, in parts of the largest of their row, and the least of these in
+#: parts of the largest of all; parts of eigenvalues that are rounding.
+_NOTHING, _LEAST, _PART = 1e-9, 1e-6, 1e-8
+
+
+def eigenpairs(a: Array) -> tuple[Complex, Complex]:
+    """Eigenvalues (k,) of A (n, n) by rising size, of pairs the one above the real axis, and
+    vectors (n, k).  Coordinates on which nothing depends have eigenvalue 0, exactly."""
+    core, ignorable = core_of(a)
+    values, own = _without_zeros(a[np.ix_(core, core)])
+    vectors = np.zeros((len(a), len(values)), dtype=np.complex128)
+    vectors[core] = own
+    moving = values != 0
+    for place in reversed(ignorable):
+        vectors[place, moving] = (a[place] @ vectors)[moving] / values[moving]
+    values = np.concatenate([np.zeros(len(ignorable)), values])
+    vectors = np.hstack([np.eye(len(a))[:, ignorable], vectors])
+    kept = np.flatnonzero(values.imag >= 0)
+    kept = kept[np.argsort(np.abs(values[kept]), kind="stable")]
+    return values[kept], vectors[:, kept]
+
+
+def _without_zeros(a: Array) -> tuple[Complex, Complex]:
+    """Eigenvalues and vectors of A (n, n): what it leaves at rest is taken out stage by stage, for
+    several zeros that belong together are known to their root of rounding alone."""
+    still, across, lengths = np.eye(0), np.eye(0), np.zeros(0)
+    if len(a):
+        _, lengths, across = np.linalg.svd(_by_rows(a))
+    count = int((lengths <= _NOTHING * lengths.max(initial=0.0)).sum())
+    if not count:
+        values, vectors = np.linalg.eig(a) if len(a) else (np.zeros(0), np.zeros((0, 0)))
+        return _rounded(values.astype(np.complex128)), vectors.astype(np.complex128)
+    rest, still = across[:-count].T, across[-count:].T
+    values, inner = _without_zeros(rest.T @ a @ rest)
+    vectors = rest @ inner
+    moving = values != 0
+    vectors[:, moving] += still @ (still.T @ a @ vectors[:, moving]) / values[moving]
+    return np.concatenate([np.zeros(count), values]), np.hstack([still, vectors])
+
+
+def _by_rows(a: Array) -> Array:
+    """A in parts of the largest of each row: some rows are of stiff parts, others of slow ones."""
+    largest = np.abs(a).max(axis=1, initial=0.0)
+    floor = _LEAST * float(largest.max(initial=0.0)) or 1.0
+    return np.asarray(a / np.maximum(largest, floor)[:, None])
+
+
+def _rounded(values: Complex) -> Complex:
+    """Eigenvalues without parts that are rounding."""
+    rounding = _PART * np.abs(values).max(initial=0.0)
+    values = np.where(np.abs(values.imag) <= rounding, values.real, values)
+    return np.where(np.abs(values.real) <= rounding, 1j * values.imag, values)
+
+
+def core_of(a: Array) -> tuple[list[int], list[int]]:
+    """Places that others depend on, and those on which none of what is left depends, in turn."""
+    core, ignorable, scaled = list(range(len(a))), list[int](), np.abs(_by_rows(a))
+    while True:
+        for place in core:
+            if scaled[core, place].max(initial=0.0) <= _NOTHING:
+                break
+        else:
+            return core, ignorable
+        core.remove(place)
+        ignorable.append(place)

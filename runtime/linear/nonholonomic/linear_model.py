@@ -1,0 +1,397 @@
+"""Linear models beside motions with rolling contacts and rows of speeds: first order, A and B.
+
+Of admissible perturbations (`admissible`) the independent positions x and speeds v make the
+state z = (x, v).  Rates and accelerations are linear in all increments and speeds, d/dt (phi, du) =
+F (phi, du), and (phi, du) = L z, of which z are the rows E.  In frames that the axes of bodies turn
+from by R, at the rate R W (`frames`),
+
+    A = E (W + R F R^T) L,
+
+whose entries last along a steady motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure, SceneError
+from mstmm.printable import abbreviate
+from mstmm.risk import RUN, DeferredRisks, Risk
+
+from ...engine.sizes import speed_sizes
+from ...guard.answers import find_state_risks
+from ...run.system import SceneSystem
+from .. import shares
+from ..channels import Channel, columns, some_names
+from ..harmonic.refused import refuse_in_motion
+from ..judged import find_omissions, find_response_risks, without_effect
+from ..linear import Linear
+from ..matrices import State, matrices
+from ..motions import Modes
+from ..operating_point.sticking import friction_risks
+from ..output.outputs import Rows, outputs_of, rows_of
+from ..response import FrequencyResponse, angular_frequencies, chosen_pushes
+from ..rotors.later import SAME, apart
+from .admissible import RollingMechanism, refuse_second_order, rolling_at
+from .eigenvalues import core_of, eigenpairs
+from .frames import Frames, frames_at, turns_in_space
+
+if TYPE_CHECKING:
+    from ...engine.compiled import Compiled
+    from ..output.seen import Seen
+
+Complex = NDArray[np.complex128]
+#: Exact slopes (nu, nu) at a state, by the names of `Derivatives`.
+Slopes = Callable[[State], Mapping[str, Array]]
+
+#: Accelerations (1/s^2, in sizes; and in parts of the squares of speeds) that are rounding.
+_STILL, _ROUNDING = 1e-6, 1e-9
+#: How far coefficients are compared along the motion, in rad or sizes, and in how many steps.
+_AHEAD, _STEPS = 0.1, 8
+#: The condition of i omega - A at a resonance.
+_SINGULAR = 1e13
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NonholonomicLinear(Linear):
+    """d/dt (x, v) = A (x, v) + B inputs + B_disturbances w beside a motion with rolling contacts or
+    rows of speeds.
+
+    x (n,) are increments of independent positions, v (m,) independent speeds beside those of the
+    state, m below n.  M, C, K, V and W do not exist; they raise SceneError.
+
+    Attributes:
+        frames: in which increments and speeds of turning bodies are given, see `frame_rates`.
+        slopes: gives the slopes of rates and accelerations at a state.
+        rotation: (nu, nu) axes of bodies at the state -> frames; None at the start of both.
+    """
+
+    frames: Frames = field(default_factory=lambda: Frames({}, np.zeros((0, 0))))
+    slopes: Slopes = field(default=lambda _: {})
+    rotation: Array | None = None
+
+    @property
+    def _rolling(self) -> RollingMechanism:
+        assert isinstance(self.mechanism, RollingMechanism)
+        return self.mechanism
+
+    @property
+    def speeds(self) -> tuple[str, ...]:
+        """Names of v."""
+        return tuple(self.model.layout.u_name(k) for k in self._rolling.speed_places)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of (x, v)."""
+        return (*self.coordinates, *self.speeds)
+
+    @property
+    def positions(self) -> list[int]:
+        """Places of x in the state."""
+        return list(range(len(self)))
+
+    @property
+    def velocities(self) -> list[int]:
+        """Places of v in the state."""
+        return list(range(len(self), len(self.states)))
+
+    @property
+    def has_stiffness(self) -> bool:
+        """False: there is no K."""
+        return False
+
+    @property
+    def frame_rates(self) -> dict[str, Array]:
+        """Hinge -> (3,) rad/s: angular velocity of its outboard body beside the frame in which its
+        increments and speeds are given, in axes of the body; left out where that is the body."""
+        return dict(self.frames.rates)
+
+    @cached_property
+    def frame(self) -> str:
+        """ "fixed" where the frames do not turn in space, else "rotating": those of a disc that
+        rolls in a circle follow its heading."""
+        return "rotating" if turns_in_space(self.model, self.state, self.frames) else "fixed"
+
+    def to_fixed_frame(self) -> NonholonomicLinear:
+        """The model itself.  SceneError where its frames turn in space."""
+        if self.frame == "fixed":
+            return self
+        raise SceneError(
+            "to_fixed_frame: beside rolling contacts coefficients last in frames that follow the "
+            "motion alone; take the model as it is"
+        )
+
+    # --- matrices ---------------------------------------------------------------------------------
+
+    @cached_property
+    def _slopes(self) -> Mapping[str, Array]:
+        """Slopes of rates and accelerations, with dry friction as the model has it."""
+        found, rolling = dict(self.slopes(self.state)), self._rolling
+        if self.dry and rolling.rough is not None:
+            free, left = list(rolling.free), np.zeros((self.model.nu, self.model.nu))
+            rough, smooth = (
+                matrices(tree, self.state, free).C for tree in (rolling.rough, rolling.tree)
+            )
+            left[np.ix_(free, free)] = rough - smooth
+            found["u"] = found["u"] + found["efforts"] @ left
+        return found
+
+    @cached_property
+    def _turned(self) -> Array:
+        """(2 nu, 2 nu) R: increments and speeds in axes of bodies -> in frames."""
+        nu = self.model.nu
+        turned = np.eye(nu) if self.rotation is None else self.rotation
+        return np.asarray(block_diag(turned, turned))
+
+    @cached_property
+    def _basis(self) -> Array:
+        """(2 nu, n + m) L in frames."""
+        basis = self._turned @ self._rolling.basis
+        return np.asarray(basis @ np.linalg.inv(basis[self._rolling.own]))
+
+    @cached_property
+    def A(self) -> Array:
+        """(n + m, n + m)."""
+        slopes, turned, basis = self._slopes, self._turned, self._basis
+        both = np.block([[slopes["rate_q"], slopes["rate_u"]], [slopes["q"], slopes["u"]]])
+        rates = self.frames.twice() @ basis + turned @ both @ (turned.T @ basis)
+        return np.asarray(rates[self._rolling.own])
+
+    @cached_property
+    def B(self) -> Array:
+        """(n + m, inputs)."""
+        return self._effect(self.controls)
+
+    @cached_property
+    def B_disturbances(self) -> Array:
+        """(n + m, disturbances): what w adds."""
+        return self._effect(self.others)
+
+    def _effect(self, pushes: Sequence[Channel]) -> Array:
+        """(n + m, pushes): what a unit of each adds to d/dt (x, v)."""
+        if any(one.drive >= 0 for one in pushes):
+            self._rolling.driven()
+        nu, tree = self.model.nu, self._rolling.tree
+        answers = self._slopes["efforts"] @ columns(tree, self.state, pushes, list(range(nu)))
+        found = self._turned @ np.vstack([np.zeros_like(answers), answers])
+        return np.asarray(found[self._rolling.own])
+
+    def _of(self, *_: object) -> NoReturn:
+        refuse_second_order(self._rolling)
+
+    def observed(self, rows: Rows, b: Array) -> tuple[Array, Array]:
+        """C (outputs, states) and D (outputs, pushes) of rows of increments, speeds and
+        accelerations, where `b` (states, pushes) is what pushes add to d/dt (x, v)."""
+        increments, speeds = np.split(self._turned.T @ self._basis, 2)
+        slopes = self._slopes
+        along = (increments, speeds, slopes["q"] @ increments + slopes["u"] @ speeds)
+        c, d = np.zeros((len(rows.through), len(self.states))), rows.through.copy()
+        for order, wide in rows.orders.items():
+            c += wide @ along[order]
+            if order == 2:
+                d += wide @ speeds[:, self.velocities] @ b[self.velocities]
+        return c, d
+
+    # --- what follows -----------------------------------------------------------------------------
+
+    def modes(self, count: int | None = None, damped: bool | None = None) -> NonholonomicModes:
+        """Motions of (x, v): all, or the `count` slowest ones.
+
+        A coordinate on which nothing depends (a place on the road, a heading, the angle of a wheel)
+        is a motion of eigenvalue 0 by itself.
+
+        Raises SceneError for a count that makes no sense, and where damping is to be left out.
+        """
+        if damped is not None and not damped:
+            raise SceneError("damped = False: A beside rolling contacts has no parts; leave it out")
+        self.check_count(count, len(self.states))
+        values, vectors = eigenpairs(self.A)
+        n, k = len(self), np.arange(len(values))
+        shapes = np.where(vectors[:n].any(axis=0), vectors[:n], self.A[:n] @ vectors)
+        largest = shapes[np.abs(shapes).argmax(axis=0), k] if n else np.ones(len(k))
+        scale = np.where(largest == 0, 1.0, largest)
+        increments, speeds = np.split(self._turned.T @ self._basis @ (vectors / scale), 2)
+        moved = np.where(speeds.any(axis=0), speeds, increments)
+        found = NonholonomicModes(self, values, shapes / scale, True, moved)
+        return found if count is None else found.first(int(count))
+
+    def frequency_response(
+        self,
+        omega: ArrayLike,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+        *,
+        structural: Any = 0.0,
+        modal: Any = 0.0,
+        exact: Any = False,
+    ) -> FrequencyResponse:
+        """See `Linear.frequency_response`, of A and B; without damping beyond that of the scene and
+        exact beams.
+
+        Raises SceneError where coefficients, inputs or outputs change along the motion.
+        """
+        refuse_in_motion(self, structural, modal)
+        if exact is not False:
+            raise SceneError("exact: beside rolling contacts beams have shapes alone; leave it out")
+        frequencies, pushes = angular_frequencies(omega), chosen_pushes(self, inputs)
+        shown = outputs_of(self, None if outputs is None else some_names("outputs", outputs))
+        self._refuse_unsteady(pushes, shown)
+        b = self._effect(pushes)
+        c, d = self.observed(rows_of(self, shown, pushes), b)
+        values = np.array([c @ self._solve(one, b) + d for one in frequencies])
+        return FrequencyResponse(
+            frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
+            tuple(one.unit for one in pushes), tuple(one.unit for one in shown), values,
+            DeferredRisks(lambda: find_response_risks(self)),
+        )  # fmt: skip
+
+    def _solve(self, omega: float, b: Array) -> Complex:
+        shifted = 1j * omega * np.eye(len(self.states)) - self.A
+        if not np.linalg.cond(shifted) < _SINGULAR:
+            raise NumericalFailure(
+                f"frequency response: omega = {omega:.9g} rad/s is a resonance without damping; "
+                "add damping, or leave this frequency out"
+            )
+        return np.asarray(np.linalg.solve(shifted, b), dtype=np.complex128)
+
+    # --- whether it lasts -------------------------------------------------------------------------
+
+    @cached_property
+    def findings(self) -> tuple[Risk, ...]:  # type: ignore[override]
+        """Risks of the state, and of what a linear model leaves out."""
+        return tuple(self._find_risks())
+
+    def _find_risks(self) -> Iterator[Risk]:
+        state = self.state
+        yield from find_state_risks(self.model, state.t, state.q, state.u)
+        leaving = self._accelerating()
+        if leaving:
+            yield Risk(
+                "unsteady-state", abbreviate(leaving),
+                f"the state does not last: {abbreviate(leaving)} accelerate there, so that the "
+                "model holds beside the motion through it, and only for a moment",
+                "linearise at an equilibrium or a steady motion",
+            )  # fmt: skip
+        elif self._changes():
+            yield Risk(
+                "changing-coefficients", RUN,
+                "the matrices change along the motion of this state: frequencies and growth of one "
+                "moment are not those of the motion",
+                "simulate the motion, or linearise about a state that keeps its matrices",
+            )  # fmt: skip
+        yield from friction_risks(self)
+        yield from without_effect(self, self.B)
+        yield from find_omissions(self)
+        yield from self.modes().motion_risks()
+
+    def _accelerating(self) -> list[str]:
+        """Speeds that change in the frames."""
+        state, sizes = self.state, speed_sizes(self.model)
+        left = np.abs(state.a + self.frames.generator @ state.u) / sizes
+        bound = _STILL + _ROUNDING * float(np.square(state.u / sizes).max(initial=0.0))
+        return [self.model.layout.u_name(int(k)) for k in np.flatnonzero(left > bound)]
+
+    def _changes(self) -> bool:
+        """Whether A is another one a little further along the motion, but for coordinates on which
+        nothing depends."""
+        later = self._later.A
+        kept = np.ix_(*2 * (sorted({*core_of(self.A)[0], *core_of(later)[0]}),))
+        return apart(self.A[kept], later[kept]) > SAME
+
+    @cached_property
+    def _later(self) -> NonholonomicLinear:
+        """The model a little further along the motion, in the same frames."""
+        model, frames, own = self.model, self.frames, self._rolling
+        state, rotation = _ahead(model, self.state, frames)
+        rolling = rolling_at(model, state, None, self.dry, (own.places, own.speed_places))
+        return replace(self, state=state, mechanism=rolling, rotation=rotation)
+
+    def _refuse_unsteady(self, pushes: Sequence[Channel], shown: Sequence[Seen]) -> None:
+        """SceneError where what is asked changes along the motion."""
+        changing, there = [*self._accelerating()], self._later
+        changing += ["the matrices"] if self._changes() else []
+        now, then = (one._effect(pushes) for one in (self, there))
+        changing += [x.name for k, x in enumerate(pushes) if apart(now[:, k], then[:, k]) > SAME]
+        others = outputs_of(there, [one.name for one in shown])
+        read, later = (
+            one.observed(rows_of(one, some, pushes), b)[0]
+            for one, some, b in ((self, shown, now), (there, others, then))
+        )
+        changing += [x.name for k, x in enumerate(shown) if apart(read[k], later[k]) > SAME]
+        if changing:
+            raise SceneError(
+                f"frequency response: along the motion changes {abbreviate(changing)}, so that "
+                "other frequencies answer too; push and read what keeps its axes, or simulate"
+            )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NonholonomicModes(Modes):
+    """Motions beside a motion with rolling contacts; `moved` (nu, k) are all speeds of each."""
+
+    moved: Complex = field(default_factory=lambda: np.zeros((0, 0), dtype=np.complex128))
+
+    @cached_property
+    def frame(self) -> str:
+        """The frame of the frequencies, see `NonholonomicLinear.frame`."""
+        linear = self.linear
+        assert isinstance(linear, NonholonomicLinear)
+        return linear.frame
+
+    def first(self, count: int) -> NonholonomicModes:
+        """The first of them."""
+        return replace(
+            self, eigenvalues=self.eigenvalues[:count], shapes=self.shapes[:, :count],
+            moved=self.moved[:, :count],
+        )  # fmt: skip
+
+    def kinetic(self) -> dict[str, Array]:
+        """Body -> (k,): its part of the kinetic energy of the speeds of each motion."""
+        return shares.kinetic_of_speeds(self.linear.model, self.linear.state.q, self.moved)
+
+
+def nonholonomic_at(bare: Linear, slopes: Slopes) -> NonholonomicLinear:
+    """The model beside the motion through the state of another one.
+
+    Raises NumericalFailure where loops leave no one set of motions.
+    """
+    model, state, dry = bare.model, bare.state, bare.dry
+    frames = frames_at(model, state)
+    changing = state.a + frames.generator @ state.u
+    return NonholonomicLinear(
+        model, state, bare.controls, bare.others, mechanism=rolling_at(model, state, changing, dry),
+        dry=dry, frames=frames, slopes=slopes,
+    )  # fmt: skip
+
+
+def _ahead(model: Compiled, state: State, frames: Frames) -> tuple[State, Array]:
+    """The state a little further along the motion, whose speeds stand still in the frames, and the
+    rotation (nu, nu) of the axes of bodies there into these."""
+    engine, memory = model.looped, model.looped.start_memory()
+    dt = _AHEAD / float(np.abs(state.u / speed_sizes(model)).max())
+    h, q = dt / _STEPS, state.q
+
+    def speeds(time: float) -> Array:
+        return np.asarray(frames.rotation(time).T @ state.u)
+
+    def rates(time: float, at: Array) -> Array:
+        return np.asarray(engine.rates(state.t + time, at, speeds(time), memory))
+
+    for k in range(_STEPS):  # the classical method of fourth order
+        one = rates(k * h, q)
+        two = rates((k + 0.5) * h, q + h / 2 * one)
+        three = rates((k + 0.5) * h, q + h / 2 * two)
+        four = rates((k + 1) * h, q + h * three)
+        q = q + h / 6 * (one + 2 * two + 2 * three + four)
+    whole = SceneSystem(engine).start(state.t + dt, q, speeds(dt))
+    q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]
+    _, a = engine.accelerations(state.t + dt, q[None].copy(), u[None].copy(), memory[None])
+    return State(state.t + dt, q, u, a[0]), frames.rotation(dt)
