@@ -1,10 +1,10 @@
 """What several runs at different tolerances tell of their errors, and of the one to make next.
 
 The run at the tightest tolerance stands for the truth: how far the others are from it is about
-their error.  Its own error is that of the next looser one, less by a power of the tolerance, about
-the first for explicit methods (local errors are held to it) and less for implicit ones of stiff
-motion.  Of a power that was observed no more than the usual one is believed.  That decides on
-whether another run is made; what is told of one that suffices is more cautious.
+their error.  Its own error is that of the next looser one, less by a power of the tolerance that
+few runs fall short of, times a number that covers the scatter of single runs.  Of a power that was
+observed no more than this one is believed, and of a run by another method less: its errors may be
+larger at the same tolerance.  One estimate decides on whether another run is made, and is told.
 
 Hairer, Norsett, Wanner, Solving ODEs I, II.4 (tolerance and global error).
 """
@@ -65,35 +65,35 @@ class _Usual:
 
 
 _USUAL = {
-    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 2.5e3, 3.0, 0.3, 1.0, 1.0, 0.2, 1.4, 0.7, 3e-6),
-    Kind.IMPLICIT: _Usual((30.0, 3e-5, 3e-2), 1e6, 1.0, 1.0, 0.8, 0.9, 0.6, 1.0, 0.1, 1e-6),
-    Kind.EXPONENTIAL: _Usual((30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.6, 0.6, 0.4, 1.0, 0.1, 1e-4),
+    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 2.5e3, 3.0, 0.3, 0.75, 1.0, 0.2, 2.0, 0.7, 3e-6),
+    Kind.IMPLICIT: _Usual((30.0, 3e-5, 3e-2), 1e6, 1.0, 1.0, 0.6, 0.9, 0.6, 1.5, 0.1, 1e-6),
+    Kind.EXPONENTIAL: _Usual((30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.6, 0.6, 0.4, 1.5, 0.1, 1e-4),
 }
 
 #: Where local errors are not known, their sum is taken for so many times the tolerance.
 _UNKNOWN = 15.0
 
-#: The part of an observed power that is trusted; powers of explicit runs scatter about the first by
-#: chance: one above the second number here counts as the third at least.
-_TRUSTED, _NOISE, _SURE = 0.9, 0.5, 0.75
+#: The part of an observed power that is trusted; powers of explicit runs scatter by chance: one
+#: above the second number here counts as the usual one.
+_TRUSTED, _NOISE = 0.9, 0.5
 
-#: Powers between explicit and implicit runs, and where errors hardly fall; steps of the exponential
+#: Two runs alone may be near each other by chance: their distance counts so many times.
+_TWO_ALONE = 2.0
+
+#: Powers between runs by different methods, and where errors hardly fall; steps of the exponential
 #: method tell nothing of others.
-_CHANGED, _HARDLY = 0.8, 0.25
-
-#: The power by which errors have fallen at least.
-_CAUTIOUS = 0.75
+_CHANGED, _HARDLY = 0.5, 0.25
 
 #: A next tolerance aims at this part of what is wanted once runs have been compared, by explicit
 #: steps, and by others.  A run more costs more than tighter steps of high order.
-_AIM, _AIM_OF_OTHERS = 0.3, 0.6
+_AIM, _AIM_OF_OTHERS = 0.5, 0.6
 
 #: A next tolerance is at most this part of the one before: of the first one, and of later ones.
 _MOST, _LATER = 0.3, 0.1
 
 #: The first explicit tolerance behind runs of other kinds is at least this part of the usual first
 #: one.
-_FOLLOWING = 1e-3
+_FOLLOWING = 1e-4
 
 #: The next tolerance in the one before, where runs have parted: at most, and at least.
 _LEAP, _FAR_LEAP = 1e-1, 1e-2
@@ -113,8 +113,8 @@ _A_RADIAN = 10.0
 #: what is asked, and errors are not taken to fall; and beyond.
 _CALM, _NEAR, _CALM_BEYOND = 0.1, 100.0, 3e-3
 
-#: Errors of implicit methods may stay for a while above this tolerance, as long as vibrations are
-#: not resolved.
+#: Errors may stay for a while above this tolerance: those of implicit methods as long as vibrations
+#: are not resolved, and those of long explicit steps by chance.
 _SLOW = 1e-7
 
 #: Most runs.
@@ -128,6 +128,7 @@ class Look:
     Attributes:
         rtol: its relative tolerance.
         kind: of its method; of several, explicit if all are.
+        method: its name.
         apart: how far it is from the tightest run; 0 for that one, inf where they end elsewhere.
         summed: its local errors added up; None where the method keeps none.
         held: stability, not accuracy, set many of its steps.
@@ -146,6 +147,7 @@ class Look:
     calm: bool = False
     growth: float | None = None
     parted: float = 1.0
+    method: str = ""
 
     def seen(self, way: Array) -> Look:
         """With how far it is from the tightest one at each sample, (n,); empty: they end
@@ -167,16 +169,15 @@ def first_rtol(asked: float, kind: Kind, radians: float = 0.0) -> float:
     return max(min(wanted, _USUAL[kind].reach * asked), TIGHTEST)
 
 
-def estimate(looks: Sequence[Look], cautious: bool = False) -> float | None:
+def estimate(looks: Sequence[Look]) -> float | None:
     """Error of the last of `looks`, which come loose to tight, explicit ones behind others; None
-    for one alone.  `cautious`: where it may have fallen by less than is likely."""
+    for one alone."""
     if len(looks) < 2:
         return None
     before, last = looks[-2:]
-    power = min(_power(looks), _CAUTIOUS) if cautious else _power(looks)
-    fallen = (last.rtol / before.rtol) ** power if last.rtol < before.rtol else 1.0
+    fallen = (last.rtol / before.rtol) ** _power(looks) if last.rtol < before.rtol else 1.0
     usual = _USUAL[last.kind]
-    known = usual.safety * before.apart
+    known = usual.safety * before.apart * (_TWO_ALONE if len(looks) == 2 else 1.0)
     if before.apart < usual.parted:
         stays = last.calm and before.calm and last.rtol >= 0.99 * _CALM * before.rtol
         return known * (1.0 if stays else fallen)
@@ -185,22 +186,13 @@ def estimate(looks: Sequence[Look], cautious: bool = False) -> float | None:
     return known
 
 
-def told(looks: Sequence[Look], asked: float, size: float) -> float | None:
-    """The error of the last of `looks` that is told, of a motion of that size: up to what was asked
-    nothing is lost by being cautious."""
-    likely, cautious = estimate(looks), estimate(looks, cautious=True)
-    if likely is None or cautious is None or likely == math.inf:
-        return None
-    return min(max(likely * size, asked), cautious * size)
-
-
 def next_rtol(looks: Sequence[Look], asked: float, kind: Kind) -> float:
     """Tolerance of the next run, for an error `asked` in the size of the motion (1 for angles and
     parts); `kind` is that of the method by which it is made."""
     last, known, tightest, most = looks[-1], estimate(looks), TIGHTEST, _LATER
     if kind is not last.kind:
         return _changed(last, known, asked, kind)
-    if known is None or looks[-2].kind is not kind:
+    if known is None or (looks[-2].kind, looks[-2].method) != (kind, last.method):
         factor, tightest = _foretold(last, asked), min(_ROUNDING, last.rtol / 2)
         most = _MOST
     elif not looks[-2].apart < _USUAL[kind].parted:
@@ -251,7 +243,7 @@ def hopeless(looks: Sequence[Look]) -> str:
     """Why a further run would lead nowhere; "" if it may."""
     stays = len(looks) > 3 and not _falls(looks) and not _falls(looks[:-1])
     stays = stays and looks[-2].apart < _USUAL[looks[-1].kind].parted
-    if stays and (looks[-1].kind is Kind.EXPLICIT or looks[-1].rtol < _SLOW):
+    if stays and looks[-1].rtol < _SLOW:
         return (
             "the error falls no more with the tolerance (rounding, or jumps of forces at which no "
             "step ends)"
@@ -273,12 +265,12 @@ def _power(looks: Sequence[Look]) -> float:
     """The power by which the error of the last run is believed to have fallen."""
     before, last = looks[-2:]
     seen, usual = _seen(looks), _USUAL[last.kind].power
-    if before.kind is not last.kind:
+    if before.kind is not last.kind or before.method != last.method:
         usual = 0.0 if before.kind is Kind.EXPONENTIAL else _CHANGED
     if seen is None:
         return _HARDLY if last.rtol <= _ROUNDING else usual
     if last.kind is Kind.EXPLICIT and seen > _NOISE:
-        return min(max(seen, _SURE), usual)
+        return usual
     return min(max(_TRUSTED * seen, _HARDLY), usual)
 
 
@@ -292,7 +284,7 @@ def _seen(looks: Sequence[Look]) -> float | None:
     if len(looks) < 3:
         return None
     a, b, last = looks[-3:]
-    if not a.kind is b.kind is last.kind:
+    if not a.kind is b.kind is last.kind or not a.method == b.method == last.method:
         return None
     if not 0 < b.apart < math.inf or not 0 < a.apart < math.inf:
         return None

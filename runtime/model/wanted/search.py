@@ -31,7 +31,7 @@ from ...run.execution import Watch, first_run
 from ..results import certified
 from .asked import Asked
 from .family import Family, damps, held_back, kind_of_run
-from .looks import Kind, Look, estimate, first_rtol, hopeless, next_rtol, told
+from .looks import Kind, Look, estimate, first_rtol, hopeless, next_rtol
 
 if TYPE_CHECKING:
     from ...engine.compiled import Compiled
@@ -50,6 +50,9 @@ _SAMPLES, _LOOKS, _ENOUGH = 201, 101, 50
 #: move by (m), and at most, and the part of it where steps damp it; and where steps do not follow
 #: the fastest motions.
 _SHAPED, _MOST_SHAPED, _DAMPED, _OF_SPEEDS = 5e-3, 20.0, 0.1, 0.2
+
+#: First step of a run in the smallest step of the one before.
+_SHORTER = 0.3
 
 Progress = Callable[[float, float], None]
 
@@ -117,7 +120,10 @@ class Search:
         """Make one run; returned where it did not reach its end."""
         rtol, atol = _short(rtol), _short(_ATOL * rtol)
         most = self._settings.max_steps if self._made else self._family.most_steps(method)
-        settings = replace(self._settings, rtol=rtol, atol=atol, method=method, max_steps=most)
+        settings = replace(
+            self._settings, rtol=rtol, atol=atol, method=method, max_steps=most,
+            first_step=self._first_step(),
+        )  # fmt: skip
         watch = Watch(self._told(), settings)
         begin = time.process_time()
         run = first_run(self._model, settings, self._q, self._u, watch, beginnings=self._beginnings)
@@ -129,6 +135,12 @@ class Search:
         self._made.append(_Made(run, self._numbers(run), spent, kind_of_run(run)))
         self._look()
         return None
+
+    def _first_step(self) -> float:
+        """Length (s) of the first step of the next run, 0 for the usual one of the first run.  The
+        usual one may be the same at all tolerances, and what is compared would share its error."""
+        counted = self._made[-1].run.statistics if self._made else None
+        return _SHORTER * ((counted and counted.smallest_step) or 0.0)
 
     def _numbers(self, run: Trajectory) -> Array:
         """What is compared, of a run: of coordinates no result has to be made."""
@@ -152,7 +164,10 @@ class Search:
         radians = self._family.radians if last.kind is Kind.IMPLICIT else 0.0
         calm = last.kind is Kind.EXPLICIT and self._family.calm(last.run)
         growth = self._growth(last)
-        self._looks.append(Look(rtol, last.kind, 0.0, summed, held, radians, calm, growth))
+        method = last.run.settings.method
+        self._looks.append(
+            Look(rtol, last.kind, 0.0, summed, held, radians, calm, growth, method=method)
+        )
 
     def _growth(self, last: _Made) -> float | None:
         """The error of explicit steps in what local errors sum up to, where it is known: shapes
@@ -201,11 +216,17 @@ class Search:
         start = np.broadcast_to(numbers[:1], numbers.shape)
         return float(self._measure.apart(numbers, start).max(initial=0.0)) or 1.0
 
+    def _known(self) -> float | None:
+        """Estimated error of the last run, in the unit of what is wanted; None where nothing is
+        known of it."""
+        found = estimate(self._looks)
+        return None if found is None or found == math.inf else found * self._size
+
     def _settled(self, lost: Trajectory | None) -> str | None:
         """Nothing where the wanted error is reached, else why it never will be; None where a
         further run may.  `lost` is a run that has just failed."""
-        known = estimate(self._looks)
-        if known is not None and known * self._size <= self._wanted.error:
+        known = self._known()
+        if known is not None and known <= self._wanted.error:
             return ""
         if lost is not None:
             return f"the next run, rtol {lost.settings.rtol:.0e}, failed: {lost.message}"
@@ -247,8 +268,7 @@ class Search:
                     "small errors grow until the motion cannot be told any more, at these "
                     f"tolerances from t = {error.horizon:.4g} s on (end earlier), and {why}"
                 )
-        known = told(self._looks, self._wanted.error, self._size)
-        reached = self._reached(made.run, known, why, self._found())
+        reached = self._reached(made.run, self._known(), why, self._found())
         run = replace(made.run, reached=reached, notes=(*made.run.notes, *self._notes))
         return result_of(self._model, self._as_asked(run), error)
 
