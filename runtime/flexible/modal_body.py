@@ -40,8 +40,9 @@ class ModalBody(Moments):
 
     With `points` (quadrature variant) the mass sits in them and the moments are not used.
     `drag` are the moments of the viscous drag per length (N s/m^2 in place of kg/m; motion of the
-    axis only), None without drag.  `frame` says where the floating frame is: "tangent", "chord",
-    "mean", or one of them per bending plane ("chord/tangent": of y, of z).
+    axis only), None without drag.  `resolved` is the frequency in rad/s up to which the shapes of
+    an elastic body hold, None of beams.  `frame` says where the floating frame is: "tangent",
+    "chord", "mean", or one of them per bending plane ("chord/tangent": of y, of z).
     """
 
     name: str
@@ -58,6 +59,7 @@ class ModalBody(Moments):
     frame: str = ""
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    resolved: float | None = None
 
     @property
     def n(self) -> int:

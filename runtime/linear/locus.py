@@ -250,10 +250,11 @@ def _growing(modes: Modes) -> int | None:
 
 
 def _risks_below(parameter: str, value: float, below: Modes) -> Iterator[Risk]:
-    """Risks of the last stable state; that its loads take away a stiffness is the answer itself."""
+    """Risks of the last stable state; that its loads take away a stiffness is the answer itself,
+    and motions that are fast have no part in it."""
     own = (
         risk for risk in below.risks
-        if risk.name not in ("unstable", "unrestrained")
+        if risk.name not in ("unstable", "unrestrained", "frequency-range")
         and not (risk.name == "buckling" and risk.figure is not None and risk.figure < 0)
     )  # fmt: skip
     return merge_over_values(parameter, [(value, own)])

@@ -17,6 +17,7 @@ from mstmm.printable import abbreviate
 from mstmm.risk import Assessed, Risk, advice
 
 from ..engine.sizes import scene_length
+from ..guard.shape_range import motion_range_risks, shape_limits
 from . import files, shares
 from .rotors.fixed_frame import frame_of, whirl
 
@@ -58,9 +59,19 @@ class Modes(Assessed):
 
     @property
     def findings(self) -> Iterator[Risk]:  # type: ignore[override]
-        """Risks of the linear model, and motions that grow or are free."""
+        """Risks of the linear model, motions that grow or are free, and such beyond the shapes."""
         yield from self.linear.risks
         yield from self.motion_risks()
+        yield from self._range_risks()
+
+    def _range_risks(self) -> Iterator[Risk]:
+        """Motions faster than those that the shapes of flexible bodies hold."""
+        model = self.linear.model
+        slowest = min(shape_limits(model).values(), default=np.inf)
+        fast = np.flatnonzero(self.omega > slowest)
+        if len(fast):
+            some = replace(self, eigenvalues=self.eigenvalues[fast], shapes=self.shapes[:, fast])
+            yield from motion_range_risks(model, some.omega, some.strain())
 
     def motion_risks(self) -> Iterator[Risk]:
         """Motions that grow, and motions that nothing pushes back."""

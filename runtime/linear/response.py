@@ -23,6 +23,7 @@ from mstmm.risk import Assessed, DeferredRisks, Risk
 
 from ..engine.response import Response
 from ..engine.sizes import speed_sizes
+from ..guard.shape_range import response_range_risks
 from . import files
 from .channels import Channel, channel, some_names
 from .harmonic.amplitudes import Amplitudes
@@ -198,10 +199,16 @@ def frequency_response(
     shown = outputs_of(linear, None if outputs is None else some_names("outputs", outputs))
     refuse_unsteady(linear, pushes, shown)
     values = _Sweep(linear, pushes, shown, structural, modal, beams).values(frequencies)
+    exact_names = () if beams is None else beams.names
+
+    def find_risks() -> Iterator[Risk]:
+        yield from find_response_risks(linear)
+        yield from response_range_risks(linear.model, frequencies, exact_names)
+
     return FrequencyResponse(
         frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
         tuple(one.unit for one in pushes), tuple(one.unit for one in shown), values,
-        DeferredRisks(lambda: find_response_risks(linear)),
+        DeferredRisks(find_risks),
     )  # fmt: skip
 
 

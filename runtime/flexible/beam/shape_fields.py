@@ -15,7 +15,8 @@ from .shapes import Shape
 
 #: Directions in the order of the modal coordinates.
 DIRECTIONS = ("y", "z", "twist", "axial")
-_ROW = {"axial": 0, "y": 1, "z": 2, "twist": 3}
+#: Row of a direction in `ShapeFields.rows`.
+ROW = {"axial": 0, "y": 1, "z": 2, "twist": 3}
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class ShapeFields:
         """Derivative number d of s, v, w, psi per mode: (4, n, m)."""
         values = np.zeros((4, self.n, len(x)))
         for k, mode in enumerate(self.modes):
-            values[_ROW[mode.direction], k] = mode.shape(x, d)
+            values[ROW[mode.direction], k] = mode.shape(x, d)
         return values
 
     def carried(self, slopes: Array, twist: Array) -> Array:

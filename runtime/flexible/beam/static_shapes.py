@@ -39,9 +39,9 @@ def bending_statics(
     All interfaces (x in m) are otherwise held in place and direction; so is `base`.
     """
     nodes = np.array(sorted({*data.breaks, base, *others}))
-    held = [_at(nodes, x) for x in (base, *others)]
+    held = [node_at(nodes, x) for x in (base, *others)]
     fixed = [dof for i in held for dof in (2 * i, 2 * i + 1)]
-    k, _ = _bending_matrices(data, direction, nodes)
+    k, _ = bending_matrices(data, direction, nodes)
     return [
         _cubic(nodes, _displaced(k, fixed, dof, size))
         for i in held[1:]
@@ -52,8 +52,8 @@ def bending_statics(
 def end_slope(data: BeamData, direction: str, x: float) -> Piecewise:
     """Unit rotation times the length at the end x; both ends supported, the other free to turn."""
     nodes = np.array(data.breaks)
-    turned = 2 * _at(nodes, x) + 1
-    k, _ = _bending_matrices(data, direction, nodes)
+    turned = 2 * node_at(nodes, x) + 1
+    k, _ = bending_matrices(data, direction, nodes)
     fixed = [0, len(k) - 2, turned]
     return _cubic(nodes, _displaced(k, fixed, turned, 1.0 / data.length))
 
@@ -75,15 +75,15 @@ def bending_eigenfunctions(
     """The first `count` eigenfunctions after `skip` of the stepped beam with sections clamped or
     simply supported; scaled to a mean square of one."""
     clamped, supported = list(clamped), list(supported)
-    nodes = _divided(data, count + skip, (*clamped, *supported))
-    k, m = _bending_matrices(data, direction, nodes)
-    fixed = [2 * _at(nodes, x) for x in (*clamped, *supported)]
-    fixed += [2 * _at(nodes, x) + 1 for x in clamped]
+    nodes = divided(data, count + skip, (*clamped, *supported))
+    k, m = bending_matrices(data, direction, nodes)
+    fixed = [2 * node_at(nodes, x) for x in (*clamped, *supported)]
+    fixed += [2 * node_at(nodes, x) + 1 for x in clamped]
     vectors = _eigenvectors(k, m, fixed, skip + count)[:, skip:]
     return [_cubic(nodes, _scaled(nodes, u)) for u in vectors.T]
 
 
-def _bending_matrices(data: BeamData, direction: str, nodes: Array) -> tuple[Array, Array]:
+def bending_matrices(data: BeamData, direction: str, nodes: Array) -> tuple[Array, Array]:
     """Stiffness and mass of cubic elements; coordinates v, v' per node."""
     size = 2 * len(nodes)
     k, m = np.zeros((size, size)), np.zeros((size, size))
@@ -129,7 +129,7 @@ def rod_statics(
 ) -> list[Piecewise]:
     """Unit twist or axial displacement of every other interface in turn, the rest held."""
     nodes = np.array(sorted({*data.breaks, base, *others}))
-    held = [_at(nodes, x) for x in (base, *others)]
+    held = [node_at(nodes, x) for x in (base, *others)]
     compliance = (
         np.diff(nodes) / stiffness_of(data, direction)[data.piece((nodes[1:] + nodes[:-1]) / 2)]
     )
@@ -150,7 +150,14 @@ def rod_eigenfunctions(
 ) -> list[Piecewise]:
     """The first `count` eigenfunctions after `skip` of the stepped rod, by parabolic elements."""
     fixed = list(fixed)
-    ends = _divided(data, count + skip, fixed)
+    ends = divided(data, count + skip, fixed)
+    nodes, k, m = rod_matrices(data, direction, ends)
+    vectors = _eigenvectors(k, m, [node_at(nodes, x) for x in fixed], skip + count)[:, skip:]
+    return [_parabola(ends, _scaled(ends, u)) for u in vectors.T]
+
+
+def rod_matrices(data: BeamData, direction: str, ends: Array) -> tuple[Array, Array, Array]:
+    """Places of the unknowns, stiffness and mass of parabolic elements between `ends`."""
     nodes = np.empty(2 * len(ends) - 1)
     nodes[0::2], nodes[1::2] = ends, (ends[1:] + ends[:-1]) / 2
     at = data.piece(nodes[1::2])
@@ -162,8 +169,7 @@ def rod_eigenfunctions(
             [[7, -8, 1], [-8, 16, -8], [1, -8, 7]]
         )  # fmt: skip
         m[cut, cut] += mass[at[i]] * h / 30 * np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]])
-    vectors = _eigenvectors(k, m, [_at(nodes, x) for x in fixed], skip + count)[:, skip:]
-    return [_parabola(ends, _scaled(ends, u)) for u in vectors.T]
+    return nodes, k, m
 
 
 def _parabola(ends: Array, u: Array) -> Piecewise:
@@ -176,7 +182,7 @@ def _parabola(ends: Array, u: Array) -> Piecewise:
 # --- what both need -------------------------------------------------------------------------------
 
 
-def _divided(data: BeamData, count: int, places: Iterable[float]) -> Array:
+def divided(data: BeamData, count: int, places: Iterable[float]) -> Array:
     """Nodes at all breaks and `places`, fine enough for `count` half-waves."""
     longest = data.length / (_PER_WAVE * (count + 2))
     marks = sorted({*data.breaks, *places})
@@ -187,7 +193,8 @@ def _divided(data: BeamData, count: int, places: Iterable[float]) -> Array:
     return np.append(np.concatenate(parts), data.length)
 
 
-def _at(nodes: Array, x: float) -> int:
+def node_at(nodes: Array, x: float) -> int:
+    """The node at a place, or nearest to it."""
     return int(np.argmin(np.abs(nodes - x)))
 
 

@@ -27,7 +27,7 @@ from ..modal_body import ModalBody
 from ..modal_port import ModalPort
 from ..support import Supports
 from .checks import checked
-from .craig_bampton import Reduction, Release, reduce
+from .craig_bampton import Reduction, Release, reduce, resolution
 from .matrices import from_arrays, load_matrices, save_matrices
 from .mesh import Material, box_mesh, mesh_model, read_mesh, refuse_large
 from .model import ElasticModel
@@ -302,7 +302,7 @@ def elastic_body(
         eta=_start(model, start, "eta", len(K)), etad=_start(model, start, "etad", len(K)),
         skin=skin(model, reduction.shapes),
         frame=frame, notes=(*notes, *_notes(model, reduction, stiffening), found.how),
-        warnings=model.warnings,
+        warnings=model.warnings, resolved=resolution(reduction, release),
     )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 
+from ..resolution import resolved_frequency, ritz_frequencies
 from .model import ElasticModel
 from .ports import Port
 from .sections import Clamped, Sections, moved_to
@@ -129,6 +130,30 @@ def reduce(
         sections, held, frame, shapes[:, kept], frequencies[kept], found.shape[1] - modes, modes,
         frequencies[~kept], release is not None,
     )  # fmt: skip
+
+
+def resolution(reduction: Reduction, release: Release | None) -> float:
+    """rad/s up to which the shapes hold, with all ends but the held one free.
+
+    Beside the shapes the richer model has their deflections under their own inertia, one step of
+    inverse iteration.
+    """
+    sections, held, model = reduction.sections, reduction.held, reduction.sections.model
+    at_origin = model.rigid @ moved_to(-held.position)
+    motions = at_origin @ (np.zeros((6, 0)) if release is None else release.twists)
+    shapes = reduction.shapes - at_origin @ reduction.motion(held)
+    coupling = motions.T @ model.mass
+    follow = np.linalg.solve(coupling @ motions, coupling @ shapes)
+    loads = sections.expand.T @ (model.mass @ (shapes - motions @ follow))
+    richer = sections.expand @ sections.clamped([held]).statics(np.asarray(loads))
+
+    def frequencies(columns: Array) -> Array:
+        carried = coupling @ columns
+        mass = columns.T @ (model.mass @ columns)
+        mass -= carried.T @ np.linalg.solve(coupling @ motions, carried)
+        return ritz_frequencies(columns.T @ (model.stiffness @ columns), mass)
+
+    return resolved_frequency(frequencies(shapes), frequencies(np.hstack([shapes, richer])))
 
 
 def _released_shapes(
