@@ -10,6 +10,16 @@ from typing import Any
 from .errors import SceneError
 
 
+def number_in(text: Any) -> float:
+    """The number that a text says, without the underscores that Python allows in one.
+
+    Raises ValueError or TypeError for anything else.
+    """
+    if isinstance(text, str) and "_" in text:
+        raise ValueError(f"{text!r} is not a number")
+    return float(text)
+
+
 def path_of(what: str, value: Any) -> Path:
     """The path of a file, a text or a `Path`; SceneError for anything else."""
     if isinstance(value, str | os.PathLike) and isinstance(os.fspath(value), str) and str(value):

@@ -53,7 +53,8 @@ def cache(
 
 
 def _list(folder: Path, json: bool, verify: bool) -> None:
-    from mstmm.runtime.libraries.upkeep import limit, listed, unfinished
+    from mstmm.runtime.libraries.folder import limit
+    from mstmm.runtime.libraries.upkeep import listed, unfinished
 
     from . import output
 

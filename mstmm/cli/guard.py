@@ -16,7 +16,7 @@ from mstmm import interrupts
 from mstmm.errors import Interrupted
 
 from . import output
-from .explain import DONE, ENVIRONMENT, INTERRUPTED, explain
+from .explain import DONE, INTERRUPTED, explain
 
 
 def leave(arguments: Sequence[str]) -> NoReturn:
@@ -53,11 +53,12 @@ def run(arguments: Sequence[str]) -> int:
             return DONE
         if interrupts.seen() and not isinstance(error, Interrupted):
             error = KeyboardInterrupt()  # whatever became of it in the code that it met
+        message, code = explain(error)
         try:
-            return _report(error, "--json" in arguments)
+            _report(error, message, code, "--json" in arguments)
         except OSError:  # not even the message could be written
             output.discard()
-            return ENVIRONMENT
+        return code
 
 
 def _command(arguments: list[str]) -> int:
@@ -72,13 +73,11 @@ def debugging() -> bool:
     return os.environ.get("MSTMM_DEBUG", "0") not in ("", "0")
 
 
-def _report(error: BaseException, as_json: bool) -> int:
+def _report(error: BaseException, message: str, code: int, as_json: bool) -> None:
     if debugging():
         traceback.print_exception(error)
-    message, code = explain(error)
     output.complain(message)
     if as_json:
         problem = {"type": type(error).__name__, "message": message, "exit_code": code}
         output.emit_json({"error": problem})
         output.flush()
-    return code

@@ -104,7 +104,7 @@ def _cache() -> Iterator[Finding]:
     from ..runtime.libraries import upkeep as cache_upkeep
 
     try:
-        place, allowed = cache_folder.private_folder(), cache_upkeep.limit()
+        place, allowed = cache_folder.private_folder(), cache_folder.limit()
         with tempfile.TemporaryFile(dir=place) as file:
             file.write(b"\0" * 4096)
     except EnvironmentFailure as error:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mstmm.arguments import number_in
 from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def quoted(text: Any) -> str:
 def finite(text: Any) -> float:
     """A finite number."""
     try:
-        value = float(text)
+        value = number_in(text)
     except (TypeError, ValueError):
         raise typer.BadParameter(f"{quoted(text)} is not a number") from None
     if not math.isfinite(value):
@@ -143,7 +144,7 @@ def with_inputs(scene: Scene, texts: Sequence[str]) -> Scene:
 
 def _number_or_name(text: str) -> float | str:
     try:
-        return float(text)
+        return number_in(text)
     except ValueError:
         return text
 

@@ -13,6 +13,8 @@ from typing import Any
 
 from pydantic import ConfigDict, ValidationError, model_validator
 
+from ..arguments import short
+from ..errors import SceneError
 from ..ir.spec import ElementSpec
 from ..markup import Displayed
 from ..markup import table as html_table
@@ -57,6 +59,8 @@ class Scene(SceneTables, Displayed):
     @classmethod
     def from_data(cls, data: Mapping[str, Any], where: str = "scene") -> Scene:
         """Scene from the keys of a file; `where` begins every message."""
+        if not isinstance(data, Mapping) or not all(isinstance(key, str) for key in data):
+            raise SceneError(f"{where}: expected the keys of a scene, found {short(data)}")
         token = _source.set(where)
         try:
             return cls(**data)
@@ -108,6 +112,8 @@ class Scene(SceneTables, Displayed):
         `known_types` maps (kind, name), kind one of hinge, body, force, to the definition.  From
         then on hinges of users' types have the facts of theirs.
         """
+        if not isinstance(known_types, Mapping):
+            raise SceneError(f"known_types: expected a table, found {short(known_types)}")
         problems = types.problems(self, known_types)
         if not problems:
             with written.known(self.constants, self.channels):

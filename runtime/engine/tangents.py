@@ -76,7 +76,8 @@ class Tangents:
         self, port: str, output: str, states: Mapping[str, Array], directions: Array
     ) -> Array:
         length = self.structure.nq if output == "qdot" else self.structure.nu
-        count = max(len(directions), *map(len, states.values()))
+        sizes = [len(directions), *map(len, states.values())]
+        count = max(sizes) if min(sizes) else 0
         found = np.zeros((count, directions.shape[1], length))
         if (port, output) not in self._tapes:
             kernel = self._kernel(port, output)

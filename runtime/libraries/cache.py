@@ -24,7 +24,7 @@ from mstmm.errors import EnvironmentFailure
 from . import processor, toolchain
 from .build import Built, Order, fetched, found, remove
 from .entry import FORMAT, Damaged
-from .folder import VARIABLE, private_folder
+from .folder import VARIABLE, limit, private_folder
 
 __all__ = ["Built", "Recipe", "find", "library", "opened"]
 
@@ -71,8 +71,10 @@ def library(recipe: Recipe, *, timeout: float | None = None) -> Built:
 
     `timeout` limits the compiler, s (300 by default, $MSTMM_COMPILE_TIMEOUT overrides the default).
     Raises EnvironmentFailure, one line with a way out: no compiler; one that fails, hangs or is
-    killed; a cache folder that cannot be written, is not ours, or is full.
+    killed; a cache folder that cannot be written, is not ours, or is full;
+    a $MSTMM_CACHE_SIZE that is no size.
     """
+    limit()  # a wrong one is told before a compiler runs
     place, order = _placed(recipe)
     built = fetched(place, order, toolchain.time_limit() if timeout is None else timeout)
     if built.how == "compiled":

@@ -15,6 +15,10 @@ from mstmm.errors import EnvironmentFailure
 
 VARIABLE = "MSTMM_CACHE"
 
+#: Megabytes that the cache may hold; $MSTMM_CACHE_SIZE overrides.
+LIMIT_VARIABLE = "MSTMM_CACHE_SIZE"
+DEFAULT_LIMIT = 512.0
+
 #: The user who may put a library where all can read it.
 _ROOT = 0
 
@@ -32,6 +36,20 @@ def folder() -> Path:
     if not place.is_absolute():  # no home folder: "~/.cache" would land where we happen to be
         raise EnvironmentFailure(f"this user has no home folder for a cache; {_WAY_OUT}")
     return place
+
+
+def limit() -> int:
+    """Bytes that the cache may hold.  EnvironmentFailure if the variable is no number."""
+    text = os.environ.get(LIMIT_VARIABLE)
+    try:
+        megabytes = float(text) if text else DEFAULT_LIMIT
+    except ValueError:
+        megabytes = -1.0
+    if not 0 <= megabytes < 1e9:
+        raise EnvironmentFailure(
+            f"{LIMIT_VARIABLE}={text!r}: expected the size of the cache in megabytes, such as 512"
+        )
+    return int(megabytes * 1e6)
 
 
 def private_folder() -> Path:

@@ -9,16 +9,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from mstmm.errors import EnvironmentFailure
-
 from ..host.lock import held_by_nobody
 from . import entry as entries
 from .build import LOCK, UNFINISHED, remove, remove_leftovers, tree_size
 from .entry import Damaged
-
-#: Megabytes that the cache may hold; $MSTMM_CACHE_SIZE overrides.
-LIMIT_VARIABLE = "MSTMM_CACHE_SIZE"
-DEFAULT_LIMIT = 512.0
+from .folder import limit
 
 #: What was used within this time, s, is being opened by somebody and stays.
 _IN_USE = 60.0
@@ -33,20 +28,6 @@ class Listed:
     used: float
     problem: str
     about: dict[str, object]
-
-
-def limit() -> int:
-    """Bytes that the cache may hold.  EnvironmentFailure if the variable is no number."""
-    text = os.environ.get(LIMIT_VARIABLE)
-    try:
-        megabytes = float(text) if text else DEFAULT_LIMIT
-    except ValueError:
-        megabytes = -1.0
-    if not 0 <= megabytes < 1e9:
-        raise EnvironmentFailure(
-            f"{LIMIT_VARIABLE}={text!r}: expected the size of the cache in megabytes, such as 512"
-        )
-    return int(megabytes * 1e6)
 
 
 def _folders(parent: Path) -> Iterator[Path]:
@@ -90,10 +71,7 @@ def tidy(parent: Path, keep: Path) -> None:
     """After a build: leftovers of killed processes go, and the least recently used entries
     beyond the limit.  `keep` stays.  Never raises."""
     remove_leftovers(parent)
-    try:
-        allowed = limit()
-    except EnvironmentFailure:  # said by mstmm doctor; no reason to lose a library
-        return
+    allowed = limit()
     sizes = {place: (_last_used(place), tree_size(place)) for place in _folders(parent)}
     total = sum(size for _, size in sizes.values())
     for place, (used, size) in sorted(sizes.items(), key=lambda one: one[1]):

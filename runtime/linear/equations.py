@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mstmm.arguments import texts_of
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.risk import Assessed
@@ -293,7 +294,8 @@ class Equations(Assessed):
                 "symbolic: linear models of closed loops are numbers; open the loop, or take M, C "
                 "and K as they are"
             )
-        found: Symbolic = self.model.fusion.symbolic(self, keep)
+        names = texts_of("keep", keep, "rod1.mass")
+        found: Symbolic = self.model.fusion.symbolic(self, names)
         return found
 
     @cached_property

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from mstmm.arrays import real
 from mstmm.markup import Displayed, table
 from mstmm.risk import Risk, order_risks, sentences
 
@@ -80,7 +81,8 @@ class Certificate(Displayed):
         """May the numbers be used?  Within `accuracy` (error in rad; of coordinates that are no
         angles as a part of how far they went) and `balance` (relative, of energy and momentum; None
         for what the run's own tolerance or step leaves)."""
-        return _verdict(self, accuracy, balance)
+        given = None if balance is None else real("balance", balance, "a part")
+        return _verdict(self, real("accuracy", accuracy, "rad, or a part of the motion"), given)
 
     @property
     def trusted(self) -> bool:

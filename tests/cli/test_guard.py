@@ -150,3 +150,13 @@ def test_an_interrupted_command_says_so(
     done = mstmm("simulate", "pendulum.toml", *options)
     assert (done.code, done.err) == (130, "mstmm: interrupted\n")
     assert not options or json.loads(done.out)["error"]["exit_code"] == 130
+
+
+def test_a_message_that_nobody_reads_does_not_change_the_exit_code(folder: Path) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [sys.executable, "-m", "mstmm", "nonsense"], stdout=writing, stderr=writing, check=False
+    )
+    os.close(writing)
+    assert done.returncode == 2

@@ -145,3 +145,11 @@ def test_disk_that_is_full_before_anything(
         patch.setattr(tempfile, "mkdtemp", full)
         assert "no room" in refusal()
     assert_tidy(cache_folder, 1)
+
+
+def test_a_size_that_is_none_is_told_before_anything_is_compiled(
+    cache_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MSTMM_CACHE_SIZE", "abc")
+    with pytest.raises(EnvironmentFailure, match="MSTMM_CACHE_SIZE='abc': expected the size"):
+        cache.library(Kernel().recipe)

@@ -118,6 +118,8 @@ def test_a_file_of_columns_is_read_with_the_scene(
         ("0,1\n", 3, ("there is no column 3", "it has 2")),
         ("t,v\n", 2, ("there is no row of numbers in it", "expected times in s")),
         ("", 2, ("there is no row of numbers in it",)),
+        ("0,1\n1_0,2\n", 2, ("row 2", "expected a number", "'1_0'")),
+        ("0,1_0\n", 2, ("row 1", "'1_0'")),
         ("0,nan\n", 2, ("expected a number", "'nan'")),
         ("0,1e300\n1e-300,-1e300\n", 2, ("row 1 on its rate",)),
     ],

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...arguments import path_of, text_of, texts_of
+from ...arguments import path_of, short, text_of, texts_of
 from ...errors import SceneError
 from . import words
 from .curves import curves
@@ -38,6 +38,8 @@ def report(
     `Result.plot` chooses, and the energy; `trails` as in `Result.view`.  SceneError for a path that
     does not end in .html and for names that there are not; EnvironmentFailure without the extras.
     """
+    if not hasattr(result, "certificate"):
+        raise SceneError(f"report: expected a result, found {short(result)}")
     path = path_of("report", path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise SceneError(f'report "{path}": expected a name ending in .html')

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mstmm.arguments import number_in
 from mstmm.errors import MstmmError
 
 from ..extras import need_for
@@ -155,7 +156,7 @@ def assigned(option: str, texts: Sequence[str], example: str) -> dict[str, float
                 f"{option} {text}: {name} is set to {found[name]:g} already; set each number once"
             )
         try:
-            found[name] = float(value)
+            found[name] = number_in(value)
         except ValueError:
             message = f'{option} {text}: expected NAME=VALUE, such as "{example}"'
             raise MstmmError(message) from None

@@ -131,11 +131,8 @@ def _json(text: str, where: str) -> dict[str, Any]:
             table[key] = value
         return table
 
-    def constant(name: str) -> Any:
-        raise SceneError(f"{where}: {name} is not a finite number; write a number")
-
     try:
-        data = json.loads(text, object_pairs_hook=unique, parse_constant=constant)
+        data = json.loads(text, object_pairs_hook=unique, parse_constant=float)
     except json.JSONDecodeError as error:
         raise SceneError(f"{where}: not valid JSON: {error}") from None
     except RecursionError:

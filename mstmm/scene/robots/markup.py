@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
+from ...arguments import number_in
 from ...errors import SceneError
 
 #: Elements inside each other; robots nest ten deep.
@@ -46,7 +47,7 @@ class Element:
         if text is None:
             return default
         try:
-            found = tuple(map(float, text.replace(",", " ").split()))
+            found = tuple(map(number_in, text.replace(",", " ").split()))
         except ValueError:
             found = ()
         if len(found) != len(default) or not all(abs(x) < float("inf") for x in found):

@@ -7,6 +7,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from ...arguments import number_in
 from .values import found, refuse
 
 #: Largest file in MB.
@@ -58,7 +59,7 @@ def _separator(line: str) -> str:
 
 def _number(cell: str) -> float | None:
     try:
-        return float(cell)
+        return number_in(cell)
     except ValueError:
         return None
 

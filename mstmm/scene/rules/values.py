@@ -296,8 +296,8 @@ def numbers(expected: str, *lengths: int, minimum: float | None = None, of: str 
     return Rule(expected, check, forms[0] if len(forms) == 1 else {"anyOf": forms})
 
 
-#: Entries of vectors: products of two of them must be numbers as well.
-_LARGEST = 1e150
+#: Entries of vectors and moments of inertia: products of two of them must be numbers as well.
+LARGEST = 1e150
 
 
 def vector(of: str) -> Rule:
@@ -307,9 +307,9 @@ def vector(of: str) -> Rule:
     def check(value: Any) -> tuple[float, ...]:
         result: tuple[float, ...] = inner.check(value)
         for i, entry in enumerate(result):
-            if abs(entry) > _LARGEST:
+            if abs(entry) > LARGEST:
                 raise refuse(
-                    f"expected a number{_unit(of)} of {_LARGEST:g} at most in size, found "
+                    f"expected a number{_unit(of)} of {LARGEST:g} at most in size, found "
                     f"{found(entry)}; its square is beyond what numbers hold",
                     i,
                 )

@@ -12,6 +12,7 @@ from ..rules import turns
 from ..rules import values as rules
 from ..rules.inertia import without_dust
 from ..rules.values import (
+    LARGEST,
     NAME,
     Location,
     Numbers,
@@ -98,6 +99,11 @@ class BodyTable(Table):
         if self.type == "rigid" and self.parameters:
             way_out = "give the type of your own body"
             problems.append((("parameters",), f"a rigid body has no parameters; {way_out}"))
+        moment = float(self.mass) * sum(float(x) ** 2 for x in self.center_of_mass)
+        if not max(float(self.mass), moment, *(abs(float(x)) for x in self.inertia)) <= LARGEST:
+            limit = f"at most {LARGEST:g} kg and kg m^2, beyond which products overflow"
+            of = "mass, mass times the square of center_of_mass, and inertia"
+            problems.append((("mass",), f"expected {of}: {limit}"))
         if problems:
             raise Refused(*problems)
         return self

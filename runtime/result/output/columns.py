@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mstmm.arguments import path_of
+from mstmm.arguments import number_in, path_of
 from mstmm.arrays import Array, Integers
 from mstmm.errors import SceneError
 from mstmm.scene.rules.messages import near
@@ -151,7 +151,7 @@ def read_csv(path: Path) -> Columns:
     numbers = np.empty((len(rows) - 1, len(header)))
     for k, row in enumerate(rows[1:]):
         try:
-            numbers[k] = [float(entry) for entry in row]
+            numbers[k] = [number_in(entry) for entry in row]
         except ValueError as error:
             raise _refused(path, f"line {k + 2}: {error}; expected numbers") from None
     known = [_heading(text) for text in header]
