@@ -134,6 +134,10 @@ class Freedom:
         }  # fmt: skip
         return frozenset(found | {x.row for x in records.couplings if x.coupling.of_speeds})
 
+    def without_slip(self, q: Array, u: Array) -> Array:
+        """The nearest speeds to u (nu,) that no row refuses, with imposed ones as they are."""
+        return np.asarray(u + self._calls.correction(self._calls.slip, q, u)[0])
+
     def slip(self, q: Array, u: Array) -> Array:
         """(rows,) J(q) u, but for its sign."""
         return self._slips(q, u)[1]

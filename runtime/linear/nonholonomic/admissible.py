@@ -70,6 +70,17 @@ class RollingMechanism(Mechanism):
         """Places of (x, v) in (phi, du)."""
         return [*self.places, *(len(self.ways) + k for k in self.speed_places)]
 
+    def kept_speeds(self, q: Array, u: Array, rotation: Array) -> Array:
+        """Speeds (nu,) at q (nq,) that no row refuses, of which the independent ones are those of u
+        (nu,) in frames that the axes of bodies turn from by `rotation` (nu, nu) there."""
+        freedom, places = self.model.freedom, list(self.speed_places)
+        assert freedom is not None
+        wished = rotation.T @ u
+        found = freedom.without_slip(q, wished)
+        ways = rotation @ freedom.following(q, places)
+        missed = (rotation @ (wished - found))[places]
+        return np.asarray(found + rotation.T @ (ways @ np.linalg.solve(ways[places], missed)))
+
     def rows(self, state: State, orders: Mapping[int, Array], drives: object) -> dict[int, Array]:
         """Rows (k, nu) of all increments, speeds and accelerations as they are."""
         return dict(orders)

@@ -45,7 +45,6 @@ from .eigenvalues import core_of, eigenpairs
 from .frames import Frames, frames_at, turns_in_space
 
 if TYPE_CHECKING:
-    from ...engine.compiled import Compiled
     from ..output.seen import Seen
 
 Complex = NDArray[np.complex128]
@@ -144,12 +143,15 @@ class NonholonomicLinear(Linear):
             found["u"] = found["u"] + found["efforts"] @ left
         return found
 
+    @property
+    def turned(self) -> Array:
+        """(nu, nu) R: increments or speeds in axes of bodies -> in frames."""
+        return np.eye(self.model.nu) if self.rotation is None else self.rotation
+
     @cached_property
     def _turned(self) -> Array:
-        """(2 nu, 2 nu) R: increments and speeds in axes of bodies -> in frames."""
-        nu = self.model.nu
-        turned = np.eye(nu) if self.rotation is None else self.rotation
-        return np.asarray(block_diag(turned, turned))
+        """(2 nu, 2 nu): the same of increments and speeds."""
+        return np.asarray(block_diag(self.turned, self.turned))
 
     @cached_property
     def _basis(self) -> Array:
@@ -293,11 +295,15 @@ class NonholonomicLinear(Linear):
         yield from self.modes().motion_risks()
 
     def _accelerating(self) -> list[str]:
-        """Speeds that change in the frames."""
-        state, sizes = self.state, speed_sizes(self.model)
-        left = np.abs(state.a + self.frames.generator @ state.u) / sizes
-        bound = _STILL + _ROUNDING * float(np.square(state.u / sizes).max(initial=0.0))
-        return [self.model.layout.u_name(int(k)) for k in np.flatnonzero(left > bound)]
+        """Independent speeds that change in the frames, here or a little further along."""
+        found, sizes = list[str](), speed_sizes(self.model)
+        for one in (self, self._later):
+            state, places = one.state, [*self._rolling.speed_places]
+            left = (one.turned @ (state.a + self.frames.generator @ state.u))[places]
+            bound = _STILL + _ROUNDING * float(np.square(state.u / sizes).max(initial=0.0))
+            leaving = np.flatnonzero(np.abs(left) > bound * sizes[places])
+            found += [self.model.layout.u_name(places[k]) for k in leaving]
+        return list(dict.fromkeys(found))
 
     def _changes(self) -> bool:
         """Whether A is another one a little further along the motion, but for coordinates on which
@@ -309,8 +315,8 @@ class NonholonomicLinear(Linear):
     @cached_property
     def _later(self) -> NonholonomicLinear:
         """The model a little further along the motion, in the same frames."""
-        model, frames, own = self.model, self.frames, self._rolling
-        state, rotation = _ahead(model, self.state, frames)
+        model, own = self.model, self._rolling
+        state, rotation = _ahead(self)
         rolling = rolling_at(model, state, None, self.dry, (own.places, own.speed_places))
         return replace(self, state=state, mechanism=rolling, rotation=rotation)
 
@@ -372,18 +378,19 @@ def nonholonomic_at(bare: Linear, slopes: Slopes) -> NonholonomicLinear:
     )  # fmt: skip
 
 
-def _ahead(model: Compiled, state: State, frames: Frames) -> tuple[State, Array]:
-    """The state a little further along the motion, whose speeds stand still in the frames, and the
-    rotation (nu, nu) of the axes of bodies there into these."""
-    engine, memory = model.looped, model.looped.start_memory()
+def _ahead(linear: NonholonomicLinear) -> tuple[State, Array]:
+    """The state a little further along the motion, with the same independent speeds in the frames,
+    and the rotation (nu, nu) of the axes of bodies there into these."""
+    model, state, frames = linear.model, linear.state, linear.frames
+    engine, memory, rolling = model.looped, model.looped.start_memory(), linear._rolling
     dt = _AHEAD / float(np.abs(state.u / speed_sizes(model)).max())
     h, q = dt / _STEPS, state.q
 
-    def speeds(time: float) -> Array:
-        return np.asarray(frames.rotation(time).T @ state.u)
+    def speeds(time: float, at: Array) -> Array:
+        return rolling.kept_speeds(at, state.u, frames.rotation(time))
 
     def rates(time: float, at: Array) -> Array:
-        return np.asarray(engine.rates(state.t + time, at, speeds(time), memory))
+        return np.asarray(engine.rates(state.t + time, at, speeds(time, at), memory))
 
     for k in range(_STEPS):  # the classical method of fourth order
         one = rates(k * h, q)
@@ -391,7 +398,7 @@ def _ahead(model: Compiled, state: State, frames: Frames) -> tuple[State, Array]
         three = rates((k + 0.5) * h, q + h / 2 * two)
         four = rates((k + 1) * h, q + h * three)
         q = q + h / 6 * (one + 2 * two + 2 * three + four)
-    whole = SceneSystem(engine).start(state.t + dt, q, speeds(dt))
+    whole = SceneSystem(engine).start(state.t + dt, q, speeds(dt, q))
     q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]
     _, a = engine.accelerations(state.t + dt, q[None].copy(), u[None].copy(), memory[None])
     return State(state.t + dt, q, u, a[0]), frames.rotation(dt)
