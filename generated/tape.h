@@ -46,6 +46,41 @@
     each(29, (a == 0)) /* not */ \
     each(30, (fabs(a) > 0 ? b : c)) /* select */
 
+/* Their names. */
+enum {
+    MSTMM_OP_NEG = 0,
+    MSTMM_OP_ADD = 1,
+    MSTMM_OP_SUB = 2,
+    MSTMM_OP_MUL = 3,
+    MSTMM_OP_DIV = 4,
+    MSTMM_OP_POW = 5,
+    MSTMM_OP_SQRT = 6,
+    MSTMM_OP_SIN = 7,
+    MSTMM_OP_COS = 8,
+    MSTMM_OP_TAN = 9,
+    MSTMM_OP_ASIN = 10,
+    MSTMM_OP_ACOS = 11,
+    MSTMM_OP_ATAN = 12,
+    MSTMM_OP_ATAN2 = 13,
+    MSTMM_OP_SINH = 14,
+    MSTMM_OP_COSH = 15,
+    MSTMM_OP_TANH = 16,
+    MSTMM_OP_EXP = 17,
+    MSTMM_OP_LOG = 18,
+    MSTMM_OP_ABS = 19,
+    MSTMM_OP_SIGN = 20,
+    MSTMM_OP_FLOOR = 21,
+    MSTMM_OP_MIN = 22,
+    MSTMM_OP_MAX = 23,
+    MSTMM_OP_LT = 24,
+    MSTMM_OP_LE = 25,
+    MSTMM_OP_EQ = 26,
+    MSTMM_OP_AND = 27,
+    MSTMM_OP_OR = 28,
+    MSTMM_OP_NOT = 29,
+    MSTMM_OP_SELECT = 30
+};
+
 /* cdef begin */
 typedef struct {
     int n_inputs;

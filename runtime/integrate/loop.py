@@ -433,6 +433,12 @@ class Run:
         )
 
     @property
+    def unseen(self) -> tuple[int, float] | None:
+        """(event, or switch behind the events, time in s): the first that may have been missed."""
+        c = self._run.count
+        return (int(c.unseen), float(self._run.real.unseen_time)) if c.unseen >= 0 else None
+
+    @property
     def chatter(self) -> tuple[int, float] | None:
         """(switch, time in s): the last one that switched without end and is not watched since."""
         c = self._run.count

@@ -75,6 +75,17 @@ def unresolved(run: Trajectory) -> tuple[Risk, ...]:
     ),)  # fmt: skip
 
 
+def unseen(system: SceneSystem, number: int, since: float) -> Risk:
+    """That an event, or behind the events a switch, changes too fast to be followed in a step."""
+    n = len(system.event_names)
+    what = system.event_names[number] if number < n else system.switches[number - n].what
+    return Risk(
+        "switches", what,
+        f"the condition of {what} changes so fast from t = {since:.9g} s on that it may have held "
+        "between two looks at it", "write it with something wider, or give max_step",
+    )  # fmt: skip
+
+
 def endless(system: SceneSystem, chatter: tuple[int, float]) -> Risk:
     """A switch that holds the motion where it is: which one, and since when."""
     what, since = system.switches[chatter[0]].what, chatter[1]

@@ -21,7 +21,7 @@ from ..integrate.steppers.implicit import Alpha
 from ..pack.loops.refusal import refuse_method, refuse_of_speeds
 from .endings import message_of
 from .method_choice import Choice
-from .notes import endless, unresolved
+from .notes import endless, unresolved, unseen
 from .system import SceneSystem
 from .trajectory import Trajectory
 
@@ -156,7 +156,8 @@ def trajectory(
         None if failure is None else failure.time,
     )  # fmt: skip
     held = () if run.chatter is None else (endless(system, run.chatter),)
-    risks = (*held, *unresolved(found))
+    missed = () if run.unseen is None else (unseen(system, *run.unseen),)
+    risks = (*held, *missed, *unresolved(found))
     return replace(found, risks=risks) if risks else found
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from mstmm.arrays import Array
 from mstmm.border.failures import Failed
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.ir.tape import Tape
+from mstmm.ir.tape import INSTRUCTION_WIDTH, OUTPUT_WIDTH, Tape
 from mstmm.scene import Scene
 
 from ..engine.calls import Probe
@@ -158,6 +158,14 @@ class SceneSystem:
         scratch = int(engine.lib.MSTMM_PROBE_NUMBERS) + engine.nq + engine.nu
         numbers = np.zeros(6 * len(probes) + scratch)
         run.probes, run.n_probes = records, len(probes)
+        read = np.array([*_components_read(tape), 0], dtype=np.int32)
+        bounds = ffi.new("mstmm_bounds[]", tape.slots)
+        run.read, run.n_read = ffi.from_buffer("int[]", read), len(read) - 1
+        run.bounds = bounds
+        if _reads_velocities(tape):
+            later = np.zeros(engine.nq + engine.nu + 1)
+            run.later = engine.pointer(later)
+            self.kept.append(later)
         run.probe_values = engine.pointer(numbers)
         table = ffi.new("mstmm_event_action[]", max(1, len(actions)))
         for record, (action, release) in zip(table, actions, strict=False):
@@ -167,7 +175,7 @@ class SceneSystem:
         run.events, run.n_events = table, len(actions)
         run.closes = int(engine.packed.system.closes and _read_states(engine.packed.scene))
         run.n_switches = min(len(self.switches), MOST)
-        self.kept += [records, numbers, table]
+        self.kept += [records, numbers, table, bounds, read]
 
     def _bounce(self, record: Any, bounce: Bounce) -> None:
         engine, ffi = self.engine, self.engine.ffi
@@ -240,6 +248,25 @@ class SceneSystem:
     def components(self) -> StateNames:
         """A name per component of the state."""
         return StateNames(self.engine.packed.layout, self.with_power)
+
+
+def _components_read(tape: Tape) -> list[int]:
+    """Which components of q and u, in that order, an event tape reads."""
+    time, n_q, n_u, *_ = tape.input_lengths
+    return sorted(slot - time for slot in _slots_read(tape) if time <= slot < time + n_q + n_u)
+
+
+def _reads_velocities(tape: Tape) -> bool:
+    """Whether an event tape reads velocities of ends."""
+    first = sum(tape.input_lengths[:3])
+    points = range(first, first + tape.input_lengths[3])
+    return any(slot in points and (slot - first) % 6 >= 3 for slot in _slots_read(tape))
+
+
+def _slots_read(tape: Tape) -> set[int]:
+    width = INSTRUCTION_WIDTH
+    rows = [tape.instructions[i : i + width] for i in range(0, len(tape.instructions), width)]
+    return {slot for row in rows for slot in row[2:]} | set(tape.outputs[2::OUTPUT_WIDTH])
 
 
 def _read_states(scene: Scene) -> bool:

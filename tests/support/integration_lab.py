@@ -67,7 +67,9 @@ class Lab:
     def __init__(self, folder: Path, *flags: str) -> None:
         sources = [*sorted(INTEGRATION.glob("*.c")), *TEST_SYSTEMS]
         self.ffi: Any = cffi.FFI()
-        declared = [cdef(INTEGRATION / f"{name}.h") for name in ("implicit", "integrate", "lanes")]
+        declared = [
+            cdef(INTEGRATION / f"{name}.h") for name in ("bounds", "implicit", "integrate", "lanes")
+        ]
         self.ffi.cdef("\n".join([*declared, TEST_DECLARATIONS]))
         options = ("-O2", f"-I{INTEGRATION}", f"-I{TESTS}", *flags)
         self.lib: Any = self.ffi.dlopen(str(compile_library(sources, folder / "lab.so", *options)))

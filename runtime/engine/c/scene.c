@@ -3,6 +3,7 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "between.h"
 #include "bounce.h"
 #include "control.h"
 #include "kernel_calls.h"
@@ -378,6 +379,7 @@ void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system)
     system->events = scene_events;
     system->fire = scene_fire;
     system->lets_through = scene_lets_through;
+    mstmm_enclose_events(run, system);
     system->n_memory = model->n_memory;
     system->memory = run->memory;
 }

@@ -100,6 +100,11 @@ typedef struct {
     int n_probes;
     const mstmm_probe *probes;
     real *probe_values; /* n_probes x 6, MSTMM_PROBE_NUMBERS of scratch, and nq + nu of a state */
+    /* Of the tape's inputs: components of the state that it reads, bounds of all its slots */
+    int n_read;         /* 0: nothing is known between two looks */
+    const int *read;
+    mstmm_bounds *bounds;
+    real *later; /* nq + nu: scratch; NULL where it reads no velocities of probes */
     int closes;         /* events read states inside a step, whose loops must be closed first */
     int n_controllers;
     const struct mstmm_controller *controllers; /* see control.h */

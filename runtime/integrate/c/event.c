@@ -7,6 +7,9 @@
 /* Where in a step the events are looked at.  A step that starts with a fired event is looked at
  * soon after its start too, since the event may become true again quickly (a small bounce). */
 static const double places[] = {0x1p-20, 0x1p-14, 0x1p-9, 0x1p-5, 0.125, 0.25, 0.5, 0.75, 1.0};
+/* A condition is narrow where its bounds above values nearby are so far, as part of those of the
+ * whole step. */
+static const double NARROW = 1e-6, FINEST = 0x1p-40; /* part of a step, at least */
 enum { N_PLACES = sizeof places / sizeof *places, FIRST_REGULAR = 5 };
 
 int mstmm_event_values(const mstmm_work *work, double t, const double *y, double *g) {
@@ -39,6 +42,22 @@ static void take_sides(const mstmm_work *work, double *g) {
 static int values(const mstmm_work *work, double t, double *g) {
   mstmm_dense(work, t, work->y_stage);
   return mstmm_event_values(work, t, work->y_stage, g);
+}
+
+/* The same, and what the conditions read there, to row `place` of what is seen. */
+enum { LEFT, RIGHT, MIDDLE };
+static double *seen_at(const mstmm_work *work, int place) {
+  return work->seen + place * work->seen_row;
+}
+static int look_at(const mstmm_work *work, double t, double *g, int place) {
+  const int status = values(work, t, g);
+  if (status || !work->system->n_seen) return status;
+  mstmm_dense_rates(work, t, work->rates);
+  work->system->see(work->system->context, t, work->y_stage, work->rates, seen_at(work, place));
+  return 0;
+}
+static void move_seen(const mstmm_work *work, int from, int to) {
+  memcpy(seen_at(work, to), seen_at(work, from), (size_t)work->seen_row * sizeof(double));
 }
 
 /* Distance of neighbouring numbers around the step: what "located to rounding" means */
@@ -127,16 +146,110 @@ static int search_maximum(const mstmm_work *work, int i, const double *at, const
   return 0;
 }
 
+/* ---- between two looks ---- */
+
+/* An end of a part of a step: its time, and the value of event or switch i there */
+typedef struct border {
+  double t, g;
+} border;
+
+enum { NOTHING_THERE, ONE_CROSSING, OPEN };
+
+/* What lies between two ends that are known to be `bounded` in this way, the left one false */
+static int judge(const mstmm_work *work, int i, const mstmm_bounds *bounded, const border *left,
+                 const border *right, double *highest) {
+  const double h = right->t - left->t;
+  const int turned = i >= work->system->n_events && work->side[i] < 0.0;
+  const double s0 = turned ? -bounded->slope_hi : bounded->slope_lo;
+  const double s1 = turned ? -bounded->slope_lo : bounded->slope_hi;
+  *highest = turned ? -bounded->lo : bounded->hi;
+  if (isfinite(s0) && isfinite(s1) && s1 > s0) { /* lines from both ends with these slopes meet */
+    const double at = (right->g - left->g - s0 * h) / (s1 - s0);
+    *highest = fmin(*highest, left->g + s1 * fmin(fmax(at, 0.0), h));
+  }
+  if (reached(work, i, right->g)) return s0 >= 0.0 ? ONE_CROSSING : OPEN;
+  return *highest < 0.0 || s0 >= 0.0 || s1 <= 0.0 ? NOTHING_THERE : OPEN;
+}
+
+/* Looks that a part of a step may take between others, until something may have passed unseen and
+ * from then on */
+enum { MOST_LOOKS = 4000, FEW_LOOKS = 64 };
+
+/* What is not looked at more closely may have passed there. */
+static void note_unseen(mstmm_run *run, int i, double t) {
+  if (run->count.unseen >= 0) return;
+  run->count.unseen = i;
+  run->real.unseen_time = t;
+}
+
+/* Halves what is open between left and right until nothing is, and locates the first time at which
+ * event or switch i holds; *root stays if it nowhere does.  Rows LEFT and RIGHT of what is seen are
+ * those of the two ends. */
+static int search(const mstmm_work *work, int i, border left, border right, double *root) {
+  const mstmm_system *system = work->system;
+  const double fine = fmax(4.0 * resolution(work->run), FINEST * (right.t - left.t));
+  border ends[MSTMM_DEPTH + 1] = {right};
+  mstmm_bounds kept;
+  double highest, first_width = INFINITY;
+  int at = MIDDLE, top = 0; /* the row of the left end; ends[k] is seen in row MIDDLE + 1 + k */
+  move_seen(work, LEFT, MIDDLE);
+  move_seen(work, RIGHT, MIDDLE + 1);
+  const int most = work->run->count.unseen < 0 ? MOST_LOOKS : FEW_LOOKS;
+  for (int taken = 0; top >= 0;) {
+    const border *to = &ends[top];
+    const double width = to->t - left.t;
+    system->enclose(system->context, width, seen_at(work, at), seen_at(work, MIDDLE + 1 + top),
+                    work->bounds);
+    kept = work->bounds[i];
+    if (first_width == INFINITY) first_width = kept.hi - kept.lo;
+    const int found = judge(work, i, &kept, &left, to, &highest);
+    const int closed = width <= fine || top == MSTMM_DEPTH - 1;
+    const int enough = found == OPEN && !closed && taken >= most;
+    const int crosses = reached(work, i, to->g);
+    if (crosses && (found == ONE_CROSSING || closed || enough)) {
+      if (enough) note_unseen(work->run, i, left.t);
+      return locate(work, i, left.t, left.g, to->t, to->g, root);
+    }
+    if (found == NOTHING_THERE || closed || enough) {
+      const double above = fmax(left.g, to->g);
+      if (found == OPEN && (enough || highest - above > NARROW * first_width))
+        note_unseen(work->run, i, left.t);
+      left = *to;
+      move_seen(work, MIDDLE + 1 + top, at);
+      top--;
+      continue;
+    }
+    const double middle = left.t + 0.5 * width;
+    const int status = look_at(work, middle, work->g_trial, MIDDLE + 2 + top);
+    if (status) return status;
+    taken++;
+    ends[++top] = (border){middle, work->g_trial[i]};
+  }
+  return 0;
+}
+
 /* Numbers `first` to `last` of what is watched, between `left` (values g_left, and g_before at
  * `before`) and `right` (values g_right): sets the earliest. */
 static int first_among(const mstmm_work *work, int first, int last, const double *at) {
   mstmm_run *run = work->run;
+  mstmm_bounds *bounds = work->first_bounds;
+  if (work->system->n_seen && last > first)
+    work->system->enclose(work->system->context, at[2] - at[1], seen_at(work, LEFT),
+                          seen_at(work, RIGHT), bounds);
   for (int i = first; i < last; i++) {
     const double g[3] = {work->g_before[i], work->g_left[i], work->g_right[i]};
     double root = INFINITY;
     int status = 0;
     if (work->truth[i] != UNTRUE) continue;
-    if (reached(work, i, g[2]))
+    if (work->system->n_seen) {
+      double highest;
+      const border left = {at[1], g[1]}, right = {at[2], g[2]};
+      const int found = judge(work, i, &bounds[i], &left, &right, &highest);
+      if (found == ONE_CROSSING)
+        status = locate(work, i, at[1], g[1], at[2], g[2], &root);
+      else if (found == OPEN)
+        status = search(work, i, left, right, &root);
+    } else if (reached(work, i, g[2]))
       status = locate(work, i, at[1], g[1], at[2], g[2], &root);
     else if (at[0] < at[1] && g[0] < 0.0 && g[1] < 0.0)
       status = search_maximum(work, i, at, g, &root);
@@ -152,7 +265,7 @@ static int first_among(const mstmm_work *work, int first, int last, const double
 /* At t_scan itself: an event that another one, fired here without effect, had hidden. */
 static int pending(const mstmm_work *work) {
   mstmm_run *run = work->run;
-  const int status = values(work, run->real.t_scan, work->g_left);
+  const int status = look_at(work, run->real.t_scan, work->g_left, LEFT);
   for (int i = 0; i < work->system->n_events && !status; i++)
     if (work->truth[i] == UNTRUE && work->g_left[i] >= 0.0) {
       run->real.t_stop = run->real.t_scan;
@@ -189,12 +302,13 @@ static int look(const mstmm_work *work, int first, int last, double left, double
                                           : run->real.t + places[j] * run->real.h;
     const double right = fmin(place, end), at[3] = {before, left, right};
     if (right <= left) continue;
-    status = values(work, right, work->g_right);
+    status = look_at(work, right, work->g_right, RIGHT);
     if (!status) status = first_among(work, first, last, at);
     if (status || run->count.event >= 0) break;
     learn(work, work->g_right);
     memcpy(work->g_before, work->g_left, bytes);
     memcpy(work->g_left, work->g_right, bytes);
+    if (work->system->n_seen) move_seen(work, RIGHT, LEFT);
     before = left;
     left = right;
     if (first == 0) run->real.t_scan = right;
@@ -206,7 +320,7 @@ static int look(const mstmm_work *work, int first, int last, double left, double
 static int find_switch(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const int n = work->system->n_events;
-  int status = values(work, run->real.t, work->g_left);
+  int status = look_at(work, run->real.t, work->g_left, LEFT);
   if (!status) {
     take_sides(work, work->g_left);
     status = look(work, n, mstmm_n_watched(work->system), run->real.t, run->real.t_new,

@@ -10,6 +10,7 @@
 
 #include <stdint.h>
 
+#include "bounds.h"
 #include "implicit.h"
 
 /* cdef begin */
@@ -33,6 +34,14 @@ typedef struct mstmm_system {
   /* Whether (t, y) moves on into event i, which held before the step and has value g there, though
    * the event throws back what comes to it.  NULL: none does. */
   int (*lets_through)(void *context, int event, double t, const double *y, double g);
+  /* What is watched between two times of a step, n_seen > 0 if it is known.  `see`, called right
+   * after `events` at the same (t, y), keeps n_seen numbers of what the conditions read, given the
+   * rates of y; `enclose` gives bounds of all that is watched from those at two times h apart.
+   * They hold for what is as smooth in between as the dense output. */
+  int n_seen;
+  void (*see)(void *context, double t, const double *y, const double *rates, double *seen);
+  void (*enclose)(void *context, double h, const double *left, const double *right,
+                  mstmm_bounds *bounds);
   int n_memory;
   double *memory; /* constant within a step; changed by accept and fire alone */
   /* The right-hand side at `lanes` states side by side (2, 4 or 8; 0: there is none):
@@ -139,6 +148,7 @@ typedef struct mstmm_run_real {
   double h_cut;        /* > 0: the step is to be no longer, so that it ends before a switch */
   double pace_time;    /* t so many steps ago: how fast the run gets on */
   double chatter_time; /* since then switch `chatter` is not watched */
+  double unseen_time;  /* of the first time that `unseen` is about */
   /* implicit methods: the last accepted step (0: none since a restart), and where the tangent of
    * Newton's iteration was taken, besides the state kept in the workspace */
   double h_previous;
@@ -160,6 +170,7 @@ typedef struct mstmm_run_count {
   int64_t crossings, crossings_here; /* of switches; those of one without time passing */
   int64_t next_switch; /* the one at t_switch, counted behind the events */
   int64_t chatter; /* the last switch that crossed without end, -1: none */
+  int64_t unseen; /* the first of what is watched that may have passed unseen, -1: none */
   int64_t steps, rejected, evaluations, events_fired;
   /* how many steps were about as long as stability allows, and whether that is a good part */
   int64_t stability_limited_steps, stability_limited;

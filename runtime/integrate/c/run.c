@@ -90,6 +90,11 @@ static int64_t cut(double *base, mstmm_work *work, int64_t *kept) {
   work->g_right = take(&at, ne);
   work->g_trial = take(&at, ne);
   work->memory = take(&at, system->n_memory);
+  work->seen_row = (system->n_seen + GROUP - 1) / GROUP * GROUP;
+  work->seen = take(&at, system->n_seen ? (3 + MSTMM_DEPTH) * work->seen_row : 0);
+  work->rates = take(&at, system->n_seen ? row : 0);
+  work->bounds = (mstmm_bounds *)take(&at, system->n_seen ? 4 * ne : 0);
+  work->first_bounds = (mstmm_bounds *)take(&at, system->n_seen ? 4 * ne : 0);
   if (implicit) cut_implicit(&at, work);
   return at.used;
 }
@@ -116,6 +121,7 @@ static int sizes_are_sound(const mstmm_system *system, const mstmm_tableau *tabl
   const int lanes = system->lanes;
   return system->n_state >= 0 && system->n_error >= 0 && system->n_error <= system->n_state &&
          system->n_events >= 0 && system->n_switches >= 0 && system->n_memory >= 0 &&
+         (system->n_seen == 0 || (system->n_seen > 0 && system->see && system->enclose)) &&
          system->rhs && implicit_is_sound(system, tableau) && (!system->n_events || system->fire) &&
          (!mstmm_n_watched(system) || system->events) &&
          (!system->n_memory || system->memory) &&
@@ -187,6 +193,7 @@ static void clear(mstmm_run *run) {
   run->count.component = -1;
   run->count.event = -1;
   run->count.chatter = -1;
+  run->count.unseen = -1;
   run->count.restarted = 1; /* an event that holds may come to hold again in no time */
   run->real.t = run->t_start;
   run->real.contraction = -1.0;

@@ -86,3 +86,18 @@ MSTMM_WIDE void mstmm_dense(const mstmm_work *work, double t, double *y) {
   if (work->implicit)
     (void)mstmm_step_impose(work, t, y); /* who needs what fails here fails by it */
 }
+
+MSTMM_WIDE void mstmm_dense_rates(const mstmm_work *work, double t, double *rates) {
+  const int64_t row = work->row;
+  const double h = work->run->real.h, theta = (t - work->run->real.t) / h;
+  for (int64_t i = 0; i < row; i += WIDE) {
+    wide sum = {0.0}, slope = {0.0};
+    for (int j = work->tableau->n_dense - 1; j >= 0; j--) {
+      const double factor = j % 2 ? 1.0 - theta : theta, sign = j % 2 ? -1.0 : 1.0;
+      sum += *(const wide *)(work->dense + j * row + i);
+      slope = sign * sum + factor * slope;
+      sum *= factor;
+    }
+    *(wide *)(rates + i) = slope / h;
+  }
+}

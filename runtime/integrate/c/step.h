@@ -35,6 +35,8 @@ int mstmm_first_stage(const mstmm_work *work);
 int mstmm_stages(const mstmm_work *work);
 int mstmm_build_dense(const mstmm_work *work);
 void mstmm_dense(const mstmm_work *work, double t, double *y);
+/* Slopes of the dense output. */
+void mstmm_dense_rates(const mstmm_work *work, double t, double *rates);
 /* Scaled RMS error of the trial step; *absolute receives it unscaled. */
 double mstmm_error_norm(const mstmm_work *work, double *absolute);
 int64_t mstmm_worst_component(const mstmm_work *work);

@@ -9,6 +9,7 @@
 #include "phi.h"
 #include "wide.h"
 
+#define MSTMM_DEPTH 40 /* times that a part of a step is halved in search of an event */
 #define MSTMM_SAME_STEP 1e-9 /* relative difference of two steps that are of one length */
 
 /* The workspace cut into named arrays.  First lies what must be kept between steps: the state, the
@@ -30,6 +31,10 @@ typedef struct mstmm_work {
   double *lanes_y, *lanes_k;         /* iterated methods: 8 rows each, see iterate.c */
   double *g_before, *g_left, *g_right, *g_trial; /* events and switches */
   double *memory;                                /* n_memory: saved while an event is tried */
+  int64_t seen_row;
+  double *seen;         /* 3 + MSTMM_DEPTH rows: what is seen at left, right and between */
+  double *rates;        /* a row */
+  mstmm_bounds *bounds, *first_bounds; /* events and switches */
   /* Implicit methods, NULL and nothing for others.  Rows of the state are longer then: behind the
    * n_state components stand the accelerations, and with the family of Newmark what else a step
    * leaves to the next, see alpha.c. */

@@ -71,6 +71,20 @@ class Equations:
             raise Ended(Status.EVENT_FAILED, text)
         return values
 
+    def see(self, t: float, y: Array, rates: Array) -> Any:
+        """What the conditions read at the state that was `watched` last, for `enclose`."""
+        found = self.ffi.new("double[]", max(1, int(self.calls.n_seen)))
+        state, slopes = (np.ascontiguousarray(x, dtype=np.float64) for x in (y, rates))
+        self.calls.see(self.calls.context, t, self._c(state), self._c(slopes), found)
+        return found
+
+    def enclose(self, left: float, seen_left: Any, right: float, seen_right: Any) -> Array:
+        """(n, 4) of all that is watched between two times (s): low, high and those of the slope."""
+        found = np.empty((self.calls.n_events + self.calls.n_switches, 4))
+        bounds = self.ffi.cast("mstmm_bounds *", self._c(found))
+        self.calls.enclose(self.calls.context, right - left, seen_left, seen_right, bounds)
+        return found
+
     def lets_through(self, event: int, t: float, y: Array, value: float) -> bool:
         """Whether a state moves on into an event that throws back, whose value there is given."""
         state = self._c(np.ascontiguousarray(y, dtype=np.float64))

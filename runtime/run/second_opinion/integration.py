@@ -21,12 +21,13 @@ from mstmm.errors import SceneError
 from ...host.interruptible import Interrupt, interruptible
 from ...integrate.loop import Failure, Samples, Statistics, Status, failure_text
 from ...integrate.settings import Settings
-from ..crossings import Crossings, Sight, dip, just_before
+from ..crossings import Crossings, Sight, just_before
 from ..endings import busiest, cause_of, end_of_curve, rest_of
-from ..notes import endless
+from ..notes import endless, unseen
 from ..simulate import split, tolerances
 from ..trajectory import Trajectory
 from . import sundials
+from .between import Between, Look
 from .call_backs import Ended, Equations
 
 if TYPE_CHECKING:
@@ -113,6 +114,7 @@ class _Loop:
         self.closes = self.system.engine.packed.system.closes
         self.truth = np.zeros(self.n_events, dtype=bool)
         self.crossings = Crossings(int(calls.n_switches), settings.t_end - settings.t_start)
+        self.unseen: tuple[int, float] | None = None
         self.sight = Sight(settings.t_start, settings.t_end)
         self.known = self.system.engine.packed.time_map(settings.t_start, settings.t_end)
 
@@ -138,7 +140,9 @@ class _Loop:
             (self.t, self.last),
         )  # fmt: skip
         chatter = self.crossings.chatter
-        return replace(found, risks=() if chatter is None else (endless(scene, chatter),))
+        risks = [] if chatter is None else [endless(scene, chatter)]
+        risks += [] if self.unseen is None else [unseen(scene, *self.unseen)]
+        return replace(found, risks=tuple(risks))
 
     def piece(self, y: Array, stop: float) -> Array:
         """From self.t to the next break, with a new integrator after every event.
@@ -327,9 +331,14 @@ class _Loop:
 
     def events(self, t: float, y: Array) -> Array:
         """Conditions at a state; one that is not a number ends the run."""
-        found = self.system.events(t, y)
-        if np.isnan(found).any():
-            name = self.system.scene.event_names[int(np.argmax(np.isnan(found)))]
+        return self.watched(t, y)[: self.n_events]
+
+    def watched(self, t: float, y: Array) -> Array:
+        """The same, and behind them the margins of switches."""
+        found = self.system.watched(t, y)
+        no_number = np.isnan(found[: self.n_events])
+        if no_number.any():
+            name = self.system.scene.event_names[int(np.argmax(no_number))]
             text = f"the condition of {name} is not a number at t = {t:.9g} s"
             at = f"last good state at t = {self.t:.9g} s"
             raise Ended(Status.EVENT_FAILED, f"{text}; {at}")
@@ -370,39 +379,19 @@ class _Loop:
         """(number behind the events, time) of the first switch that crosses in the step."""
         if not self.crossings.n:
             return None
-        n, dense = self.n_events, solver.dense_output()
-        times = [float(solver.t_old)]
-        rows = [self.system.watched(times[0], dense(times[0]))[n:]]
-        for right in solver.t_old + _LOOKS * (solver.t - solver.t_old):
-            margins = self.system.watched(right, dense(right))[n:]
-            ends = {i: (times[-1], right, margins[i])
-                    for i in self.crossings.changed(rows[-1], margins)}  # fmt: skip
-            times.append(float(right))
-            rows.append(np.where(margins == 0.0, rows[-1], margins))
-            ends |= self.dips(dense, times[-3:], rows[-3:])
-            if ends:
-                found = [(self.locate(dense, n + i, *ends[i]), n + i) for i in ends]
-                time, number = min(found)
-                return number, time
+        between, n = self.between(solver), self.n_events
+        left = between.look(float(solver.t_old))
+        signs = -np.sign(left.values)  # of what is to become true; 0 until a switch leaves zero
+        for place in solver.t_old + _LOOKS * (solver.t - solver.t_old):
+            right = between.look(float(place))
+            numbers = np.flatnonzero(self.crossings.watched) + n
+            watched = [i for i in numbers.tolist() if signs[i]]
+            found = self.first_of(between, watched, signs, left, right)
+            if found is not None:
+                return found
+            signs = np.where(signs == 0, -np.sign(right.values), signs)
+            left = right
         return None
-
-    def dips(
-        self, dense: Any, times: list[float], rows: list[Array]
-    ) -> dict[int, tuple[float, float, float]]:
-        """Switch -> (left, right, margin there) where one crosses and is back at the next look."""
-        found: dict[int, tuple[float, float, float]] = {}
-        n = self.n_events
-        for i in self.crossings.near(rows) if len(rows) == 3 else ():
-            side = float(np.sign(rows[1][i]))
-
-            def height(t: float, i: int = i, side: float = side) -> float:
-                return side * float(self.system.watched(t, dense(t))[n + i])
-
-            at = dip(height, list(times), [side * float(row[i]) for row in rows])
-            if at is not None:
-                left = times[1] if at > times[1] else times[0]
-                found[i] = (left, at, -side)
-        return found
 
     def first_event(
         self, solver: Any, switch: tuple[int, float] | None
@@ -410,32 +399,32 @@ class _Loop:
         """(event, time) of the first one that becomes true in the step, or the switch in it."""
         if not len(self.truth):
             return switch
-        dense, left = solver.dense_output(), solver.t_old
+        between, n = self.between(solver), self.n_events
+        left = between.look(float(solver.t_old))
         end = solver.t if switch is None else switch[1]
-        false = (self.events(left, dense(left)) < 0) | ~self.truth
-        for right in solver.t_old + _LOOKS * (end - solver.t_old):
-            values = self.events(right, dense(right))
-            risen = [int(i) for i in np.flatnonzero((values >= 0) & false)]
-            if risen:
-                time, event = min((self.locate(dense, i, left, right), i) for i in risen)
-                return event, time
-            left, false = right, values < 0
+        false = (left.values[:n] < 0) | ~self.truth
+        for place in solver.t_old + _LOOKS * (end - solver.t_old):
+            right = between.look(float(place))
+            found = self.first_of(between, np.flatnonzero(false).tolist(), np.ones(n), left, right)
+            if found is not None:
+                return found
+            left, false = right, right.values[:n] < 0
         return switch
 
-    def locate(
-        self, dense: Any, number: int, left: float, right: float, behind: float = 0.0
-    ) -> float:
-        """The first number at which an event holds, or a switch has the sign of `behind`, by
-        bisection."""
-        while True:
-            middle = left + (right - left) / 2
-            if not left < middle < right:
-                return right
-            value = self.system.watched(middle, dense(middle))[number]
-            if value * behind > 0 or (not behind and value >= 0):
-                right = middle
-            else:
-                left = middle
+    def between(self, solver: Any) -> Between:
+        """Conditions within the last step."""
+        start, end = float(solver.t_old), float(solver.t)
+        dense = solver.dense_output()
+        return Between(self.system, self.watched, dense, start, end, self.unseen)
+
+    def first_of(
+        self, between: Between, numbers: list[int], signs: Array, left: Look, right: Look
+    ) -> tuple[int, float] | None:
+        """(number, time) of the first of what is watched to become true between two looks."""
+        times = {i: between.first(i, float(signs[i]), left, right) for i in numbers}
+        found = [(time, i) for i, time in times.items() if time is not None]
+        self.unseen = between.unseen
+        return min(found)[::-1] if found else None
 
     # --- samples --------------------------------------------------------------------------------
 
