@@ -22,7 +22,16 @@ def absent(extra: str) -> list[str]:
 
 
 def missing(name: str, what: str, error: ImportError) -> EnvironmentFailure:
-    """A package of an extra is missing: which one, what for, and how to get it."""
+    """A package of an extra is missing or does not load: which one, what for, and how to get it."""
+    package = (error.name or "").partition(".")[0]
+    if not isinstance(error, ModuleNotFoundError) or (
+        package in sys.modules and find_spec(package)
+    ):
+        return EnvironmentFailure(
+            f"{what} needs the package {error.name or 'of an extra'}, which does not load "
+            f"({error}); give the process more memory, or install it anew: "
+            f"pip install 'mstmm[{name}]'"
+        )
     return EnvironmentFailure(
         f"{what} needs the package {error.name or 'of an extra'}, which is not installed; "
         f"install it with: pip install 'mstmm[{name}]'"

@@ -9,6 +9,7 @@ The codes:
 
 from __future__ import annotations
 
+import mmap
 import traceback
 
 from mstmm import interrupts
@@ -16,6 +17,9 @@ from mstmm.errors import EnvironmentFailure, MstmmError
 
 DONE, DEFECT, BAD_INPUT = 0, 1, MstmmError.exit_code
 ENVIRONMENT, INTERRUPTED = EnvironmentFailure.exit_code, interrupts.CODE
+
+#: Bytes that a process can always get where it is not short of memory.
+_SPARE = 2**27
 
 
 def explain(error: BaseException) -> tuple[str, int]:
@@ -28,7 +32,7 @@ def explain(error: BaseException) -> tuple[str, int]:
         return _usage(error), BAD_INPUT
     if isinstance(error, (KeyboardInterrupt, typer.Abort)):
         return "interrupted", INTERRUPTED
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or _is_short_of_memory():
         return "there is not enough memory for this; ask for fewer samples", ENVIRONMENT
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("mstmm"):
         return f"the package {error.name} is missing; install it: pip install {error.name}", 3
@@ -46,6 +50,15 @@ def explain(error: BaseException) -> tuple[str, int]:
         "The same command with MSTMM_DEBUG=1 in the environment shows where it happened.",
         DEFECT,
     )
+
+
+def _is_short_of_memory() -> bool:
+    """Whether the process can hardly get memory, of which its libraries fail in many ways."""
+    try:
+        mmap.mmap(-1, _SPARE).close()
+    except (OSError, MemoryError, ValueError):
+        return True
+    return False
 
 
 def _in_a_users_file(error: BaseException) -> str | None:

@@ -44,7 +44,8 @@ def module() -> tuple[Any, Any]:
         kernels: Any = import_module("mstmm.generated._kernels")
     except ImportError as error:
         raise EnvironmentFailure(
-            f"the compiled kernels cannot be loaded ({error}); install mstmm again: "
+            f"the compiled kernels cannot be loaded ({error}); give the process more memory, or "
+            "install mstmm again: "
             "pip install -e . (a C compiler is needed)"
         ) from error
     _refuse_stale(kernels)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 from cli.commands import Command
 from mstmm import errors
 from mstmm.cli.explain import explain
+from mstmm.extras import missing
 
 PROGRAM = [sys.executable, "-m", "mstmm"]
 
@@ -160,3 +162,24 @@ def test_a_message_that_nobody_reads_does_not_change_the_exit_code(folder: Path)
     )
     os.close(writing)
     assert done.returncode == 2
+
+
+def test_a_lack_of_memory_is_no_defect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Libraries fail in many ways where memory is short."""
+    odd = RuntimeError("error in a library")
+    assert explain(odd)[1] == 1
+    limits = resource.getrlimit(resource.RLIMIT_AS)
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + 2**24, limits[1]))
+    try:
+        message, code = explain(odd)
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, limits)
+    assert "not enough memory" in message and code == 3
+
+
+def test_a_package_that_does_not_load_is_told_from_one_that_is_missing() -> None:
+    broken = missing("io", "a file", ImportError("failed to map segment", name="xarray"))
+    assert "does not load (failed to map segment); give the process more memory" in str(broken)
+    absent = missing("io", "a file", ModuleNotFoundError("no", name="not_there"))
+    assert "not_there, which is not installed" in str(absent)
