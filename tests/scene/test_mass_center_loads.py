@@ -96,6 +96,14 @@ def test_a_force_where_a_body_turns_about_has_a_warning(load: Tables, moves: boo
         assert not told.doubt
 
 
+@pytest.mark.parametrize(("on", "told"), [("rope[0]", 1), ("rope[1]", 0), ("rope[last].tip", 0)])
+def test_forces_on_members_of_chains(on: str, told: int) -> None:
+    body = ROD | {"ends": {"tip": [1, 0, 0]}}
+    rope = {"name": "rope", "count": 3, "inboard": "ground", "body": body, "hinge": {"type": "pin"}}
+    one = mstmm.Scene(gravity=[0, 0, 0], chain=[rope], load=[{"on": on, "force": [0, 1, 0]}])
+    assert [risk.name for risk in one.risks].count("idle-load") == told
+
+
 def test_a_force_on_a_fixed_body_has_none() -> None:
     """It asks for the loads of its weld."""
     held = {"name": "w", "type": "fixed", "inboard": "ground", "outboard": "rod"}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from ...numbers.rotations import Vector, apply, cross, norm, product, transpose
 from ...risk import Risk
 from ..rules.values import GROUND, split
+from ..tables.chain import HINGE
 from ..tables.hinge_frames import start_motion
 from ..tables.loads import MASS_CENTER
 
@@ -27,12 +28,11 @@ def risks(scene: SceneTables) -> Iterator[Risk]:
     """Loads whose force acts at a point of a moving body that stands still in any motion."""
     if not scene.load:
         return
-    bodies = {body.name: body for body in scene.body if body.type == "rigid"}
-    holders: dict[str, list[Hinge]] = {}
+    held: dict[str, list[Hinge]] = {}
     for hinge in scene.hinge:
-        holders.setdefault(hinge.outboard_body, []).append(hinge)
+        held.setdefault(hinge.outboard_body, []).append(hinge)
     for load in scene.load:
-        pivot = _pivot_of(load, bodies, holders)
+        pivot = _pivot_of(load, scene, held)
         if pivot is not None:
             body = split(load.on)[0]
             yield Risk(
@@ -44,22 +44,24 @@ def risks(scene: SceneTables) -> Iterator[Risk]:
             )  # fmt: skip
 
 
-def _pivot_of(
-    load: Load, bodies: Mapping[str, Body], holders: Mapping[str, list[Hinge]]
-) -> Hinge | None:
+def _pivot_of(load: Load, scene: SceneTables, held: Mapping[str, list[Hinge]]) -> Hinge | None:
     """The hinge about which the body turns where the force acts; None where that point moves, or
     where nothing moves."""
     name, end = split(load.on)
+    bodies, hinges = scene.bodies.by_name, scene.hinges.by_name
     pushed = any(not entry.is_zero for entry in load.force)
     if not pushed or any(not entry.is_zero for entry in load.moment) or name not in bodies:
         return None
     body, pivot = bodies[name], None
     point = body.center_of_mass if load.at is not None else body.end_position(end)
     for _ in range(_DEEPEST):
-        held = holders.get(name, [])
-        if len(held) != 1 or not _keeps(held[0], bodies[name], point):
+        member = f"{name}.{HINGE}"
+        holders = [hinges[member]] if member in hinges else held.get(name, [])
+        if bodies[name].type != "rigid" or len(holders) != 1:
             return None
-        hinge = held[0]
+        hinge = holders[0]
+        if not _keeps(hinge, bodies[name], point):
+            return None
         if not hinge.is_weld:
             pivot = pivot or hinge
         if hinge.inboard_body == GROUND:
