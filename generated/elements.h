@@ -231,6 +231,36 @@ int mstmm_classical_pin_spatial_transfer(const real *restrict U, const real *res
     const real *restrict a, const real *restrict u, const real *restrict omega_I,
     const real *restrict a_n, const real *restrict tau_n, real *restrict U_h, real *restrict margin);
 
+extern const mstmm_element mstmm_force_bearing3;
+int mstmm_force_bearing3_wrench(const real *restrict p, const real *restrict t,
+    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
+    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
+    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T, real *restrict F,
+    real *restrict M, real *restrict V, real *restrict P);
+int mstmm_force_bearing3_wrench_slope(const real *restrict p, const real *restrict t,
+    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
+    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
+    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T,
+    const real *restrict d_t, const real *restrict d_effort, const real *restrict d_A_F,
+    const real *restrict d_x_F, const real *restrict d_v_F, const real *restrict d_w_F,
+    const real *restrict d_A_T, const real *restrict d_x_T, const real *restrict d_v_T,
+    const real *restrict d_w_T, real *restrict d_F, real *restrict d_M);
+
+extern const mstmm_element mstmm_force_bearing6;
+int mstmm_force_bearing6_wrench(const real *restrict p, const real *restrict t,
+    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
+    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
+    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T, real *restrict F,
+    real *restrict M, real *restrict V, real *restrict P);
+int mstmm_force_bearing6_wrench_slope(const real *restrict p, const real *restrict t,
+    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
+    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
+    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T,
+    const real *restrict d_t, const real *restrict d_effort, const real *restrict d_A_F,
+    const real *restrict d_x_F, const real *restrict d_v_F, const real *restrict d_w_F,
+    const real *restrict d_A_T, const real *restrict d_x_T, const real *restrict d_v_T,
+    const real *restrict d_w_T, real *restrict d_F, real *restrict d_M);
+
 extern const mstmm_element mstmm_force_bushing6;
 int mstmm_force_bushing6_wrench(const real *restrict p, const real *restrict t,
     const real *restrict effort, const real *restrict A_F, const real *restrict x_F,

@@ -41,6 +41,8 @@ const mstmm_element *const mstmm_elements[] = {
     &mstmm_classical_hinge_spring_planar_rigid_beam,
     &mstmm_classical_hinge_spring_planar_rigid_rigid,
     &mstmm_classical_pin_spatial,
+    &mstmm_force_bearing3,
+    &mstmm_force_bearing6,
     &mstmm_force_bushing6,
     &mstmm_force_spring,
     &mstmm_hinge_ball,
@@ -78,4 +80,4 @@ const mstmm_element *const mstmm_elements[] = {
     NULL,
 };
 
-const int mstmm_element_count = 71;
+const int mstmm_element_count = 73;

@@ -56,7 +56,8 @@ class Bushing(ForceElement):
         return sp.Matrix([*x, *rotation_vector(rotation)])
 
     def potential(self, deflection: sp.Matrix, p: Symbols) -> sp.Expr:
-        preload = sp.Matrix(list(p)[-6:])
+        first = 2 * len(_PAIRS)
+        preload = sp.Matrix(list(p)[first : first + 6])
         return deflection.dot(_symmetric(p, 0) * deflection / 2 - preload)
 
     def defined_within(self, x: sp.Matrix, rotation: sp.Matrix, p: Symbols) -> sp.Basic:

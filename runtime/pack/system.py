@@ -25,7 +25,9 @@ from .layout import Group
 
 Numbers = tuple[float, ...]
 #: Force elements whose laws do not go by time.
-_BUILT_IN: tuple[Key, ...] = (("force", "spring"), ("force", "bushing6"))
+_BUILT_IN: tuple[Key, ...] = (
+    ("force", "spring"), ("force", "bushing6"), ("force", "bearing6"), ("force", "bearing3"),
+)  # fmt: skip
 #: Places among the values of the scene's expressions, -1 for the constant zero.
 Places = tuple[int, ...]
 

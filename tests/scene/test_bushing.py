@@ -45,6 +45,22 @@ def skew(entry: float) -> Any:
     return matrix.tolist()
 
 
+def test_matrices_of_bearings() -> None:
+    """Any matrix, in six rows, as 36 numbers, or two rows across the axis x."""
+    across = [[3.0, 1.0], [-2.0, 4.0]]
+    (one,) = Scene(**mounted(stiffness=across, damping=skew(1.0), conservative=False)).bushing
+    known = np.zeros((6, 6))
+    known[1:3, 1:3] = across
+    np.testing.assert_array_equal(full(one.stiffness), known)
+    np.testing.assert_array_equal(full(one.damping), skew(1.0))
+    assert one.element == "bearing6"
+    scene = Scene(**mounted(stiffness=known, conservative=False))
+    assert scene.bushing[0].element == "bearing3"
+    assert Scene.from_data(tomllib.loads(scene.to_toml())) == scene
+    (gaining,) = Scene(**mounted(stiffness=[-1.0, *SIX[1:]], conservative=False)).bushing
+    assert full(gaining.stiffness)[0][0] == -1
+
+
 BAD = [
     (mounted(to="rod1"), 'to: both ends are on "rod1", so it does nothing; join two bodies'),
     (mounted(to="rod2", position=[1, 0, 0]), "only a bushing on the ground takes a position"),
@@ -55,6 +71,9 @@ BAD = [
     (mounted(stiffness=[*SIX[:5], "soft"]), "stiffness[5]: expected a number, found 'soft'"),
     (mounted(damping=[SIX] * 5 + [SIX[:4]]), "damping[5]: expected 6 numbers"),
     (mounted(damping=skew(1.0)), "expected a symmetric matrix, found 1 at [0][4] and 0 at [4][0]"),
+    (mounted(stiffness=[[1, 2], [3, 4]]), "give conservative = false if it is meant"),
+    (mounted(stiffness=[[1, 2], [3]], conservative=False), "stiffness[1]: expected 6 numbers"),
+    (mounted(conservative=1), "conservative: expected true or false"),
     (mounted(stiffness=[-1.0, *SIX[1:]]), "gains energy (along x); correct its signs"),
     (mounted(stiffness=(FULL - 3 * np.eye(6)).tolist()), "expected a matrix without negative"),
     (mounted(damping=(FULL - np.diag([0, 0, 0, 8, 0, 0])).tolist()), "gains energy (about x)"),

@@ -1,9 +1,8 @@
-"""Symmetric matrices of six rows: how they may be written, and that they store or spend energy."""
+"""Matrices of six rows: how they may be written, and whether they store or spend energy."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 from .values import NUMBER, Rule, collect, counted, entries_of, finite, found, plain, refuse
@@ -19,55 +18,76 @@ _AXES = ("along x", "along y", "along z", "about x", "about y", "about z")
 
 Triangle = tuple[float, ...]
 
+#: Entries of two rows of two, along y and z, among those of six rows of six.
+_ACROSS = (7, 8, 13, 14)
+_WHOLE = 36
 
-def symmetric(linear: str, angular: str) -> Rule:
-    """Six numbers (the diagonal), 21 (the upper triangle row by row) or six rows of six; the result
-    has 6 or 21.  The matrix must have no negative eigenvalue.
+
+def six_by_six(linear: str, angular: str) -> Rule:
+    """Six numbers (the diagonal), 21 (the upper triangle row by row), six rows of six or all their
+    36 entries, or two rows of two along y and z; the result has 6 or 21 numbers, or 36 where the
+    matrix is not symmetric.
 
     The units are those of the diagonal, along and about the axes.
     """
     expected = (
-        f"6 numbers, three in {linear} and three in {angular}, or a symmetric matrix: 6 rows of 6, "
-        "or the 21 of its upper triangle"
+        f"6 numbers, three in {linear} and three in {angular}, or a matrix: 6 rows of 6, the 21 of "
+        "the upper triangle of a symmetric one, or 2 rows of 2 along y and z"
     )
 
     def check(value: Any) -> Triangle:
         entries = entries_of(value, expected)
-        if len(entries) == 6 and all(isinstance(plain(row), (list, tuple)) for row in entries):
-            given = _upper(collect(entries, expected, lambda row, i: _row(row, i, expected)))
-        elif len(entries) in (6, len(PAIRS)):
-            given = collect(entries, expected, lambda x, i: finite(plain(x), "a number", i))
-        else:
+        nested = all(isinstance(plain(row), (list, tuple)) for row in entries)
+        if len(entries) in (2, 6) and nested:
+            n = len(entries)
+            rows = collect(entries, expected, lambda row, i: _row(row, i, n, expected))
+            flat = tuple(x for row in rows for x in row)
+            return _shortest(flat if n == 6 else _across(flat))
+        if len(entries) not in (6, len(PAIRS), _WHOLE):
             raise refuse(f"expected {expected}, found {counted(len(entries))}")
-        _refuse_negative(given)
-        return given
+        given = collect(entries, expected, lambda x, i: finite(plain(x), "a number", i))
+        return _shortest(given) if len(given) == _WHOLE else given
 
     array = {"type": "array", "items": {**NUMBER}}
-    rows = {"type": "array", "items": {**array, "minItems": 6, "maxItems": 6}}
-    forms = [array | {"minItems": n, "maxItems": n} for n in (6, len(PAIRS))]
-    return Rule(expected, check, {"anyOf": [*forms, rows | {"minItems": 6, "maxItems": 6}]})
+    forms = [array | {"minItems": n, "maxItems": n} for n in (6, len(PAIRS), _WHOLE)]
+    for n in (6, 2):
+        rows = {"type": "array", "items": {**array, "minItems": n, "maxItems": n}}
+        forms.append(rows | {"minItems": n, "maxItems": n})
+    return Rule(expected, check, {"anyOf": forms})
 
 
-def _row(row: Any, i: int, expected: str) -> tuple[float, ...]:
+def _row(row: Any, i: int, n: int, expected: str) -> tuple[float, ...]:
     entries = plain(row)
-    if len(entries) != 6:
+    if len(entries) != n:
         raise refuse(f"expected {expected}, found a row of {counted(len(entries))}", i)
     return tuple(finite(plain(x), "a number", i, j) for j, x in enumerate(entries))
 
 
-def _upper(rows: Sequence[Sequence[float]]) -> Triangle:
+def _across(flat: Triangle) -> Triangle:
+    found = [0.0] * _WHOLE
+    for place, entry in zip(_ACROSS, flat, strict=True):
+        found[place] = entry
+    return tuple(found)
+
+
+def _shortest(flat: Triangle) -> Triangle:
+    """All 36 entries, or those of the upper triangle where the matrix is symmetric."""
+    return flat if _skew(flat) else tuple(flat[6 * i + j] for i, j in PAIRS)
+
+
+def _skew(flat: Triangle) -> tuple[int, int] | None:
+    """The first pair of entries that differ."""
     for i, j in PAIRS:
-        one, other = rows[i][j], rows[j][i]
+        one, other = flat[6 * i + j], flat[6 * j + i]
         if abs(one - other) > _ROUNDING * max(abs(one), abs(other)):
-            raise refuse(
-                f"expected a symmetric matrix, found {found(one)} at [{i}][{j}] and {found(other)} "
-                f"at [{j}][{i}]; a matrix that is not symmetric has no potential",
-            )
-    return tuple(rows[i][j] for i, j in PAIRS)
+            return i, j
+    return None
 
 
 def full(given: Triangle) -> list[list[float]]:
-    """The matrix of its diagonal or of its upper triangle."""
+    """The matrix of its diagonal, of its upper triangle or of all its entries."""
+    if len(given) == _WHOLE:
+        return [list(given[6 * i : 6 * i + 6]) for i in _SIX]
     matrix = [[0.0] * 6 for _ in _SIX]
     pairs = PAIRS if len(given) == len(PAIRS) else [(i, i) for i in _SIX]
     for (i, j), entry in zip(pairs, given, strict=True):
@@ -76,17 +96,38 @@ def full(given: Triangle) -> list[list[float]]:
 
 
 def triangle(given: Triangle) -> Triangle:
-    """Its upper triangle, row by row."""
+    """Upper triangle of its symmetric part, row by row."""
     matrix = full(given)
-    return tuple(matrix[i][j] for i, j in PAIRS)
+    return tuple(
+        matrix[i][j] if matrix[i][j] == matrix[j][i] else (matrix[i][j] + matrix[j][i]) / 2
+        for i, j in PAIRS
+    )
 
 
-def _refuse_negative(given: Triangle) -> None:
+def antisymmetric(given: Triangle) -> Triangle:
+    """(15,) of its antisymmetric part above the diagonal, row by row."""
+    matrix = full(given)
+    return tuple((matrix[i][j] - matrix[j][i]) / 2 for i, j in PAIRS if i != j)
+
+
+def refuse_nonconservative(given: Triangle, what: str) -> None:
+    """SceneError for a matrix that is not symmetric or has a negative eigenvalue."""
+    pair = _skew(given) if len(given) == _WHOLE else None
+    if pair is not None:
+        i, j = pair
+        raise refuse(
+            f"expected a symmetric matrix, found {found(given[6 * i + j])} at [{i}][{j}] and "
+            f"{found(given[6 * j + i])} at [{j}][{i}]; a matrix that is not symmetric has no "
+            "potential: give conservative = false if it is meant, as of a bearing",
+            what,
+        )
     axis = _gaining(full(given))
     if axis is not None:
         raise refuse(
             "expected a matrix without negative eigenvalues, found one from which a motion gains "
-            f"energy ({_AXES[axis]}); correct its signs, or the entries off its diagonal"
+            f"energy ({_AXES[axis]}); correct its signs, or the entries off its diagonal, or give "
+            "conservative = false if it is meant",
+            what,
         )
 
 

@@ -10,11 +10,13 @@ from ...numbers.rotations import Matrix, Vector, from_orientation
 from ..rules import text as texts
 from ..rules import turns
 from ..rules import values as rules
-from ..rules.symmetric import full, symmetric, triangle
+from ..rules.symmetric import antisymmetric, full, refuse_nonconservative, six_by_six, triangle
 from ..rules.values import GROUND, Numbers, Orientation, Shorthand, Table, refuse, split
 from .body import End, as_end
 
 _NOTHING = (0.0,) * 6
+#: Entries along axes in the upper triangle of a matrix of six rows.
+_ALONG = (0, 1, 2, 6, 7, 11)
 
 
 class Bushing(Table):
@@ -25,7 +27,8 @@ class Bushing(Table):
     `orientation`.  The deflection e is how `to` has moved from where it is at `rest`, x, y, z in m,
     and its rotation vector in rad, by less than 170 degrees; `rest` is the pose of the end `to` in
     the bushing's axes, by itself that of `from`.  `position` (m) is the place of the end that is on
-    the ground.
+    the ground.  With `conservative` false the matrices may be any, as those of a journal bearing or
+    a seal: the load -N e of the antisymmetric part N of K has no potential and counts as work.
     """
 
     name: Annotated[str, texts.name("the bushing's name")] = ""
@@ -39,11 +42,13 @@ class Bushing(Table):
             "[x, y, z] in m, or a table with position and orientation", as_end, {"type": "array"}
         ),
     ] = End(position=(0.0, 0.0, 0.0))
-    stiffness: Annotated[Numbers, symmetric("N/m", "N m/rad")] = _NOTHING
-    damping: Annotated[Numbers, symmetric("N s/m", "N m s/rad")] = _NOTHING
+    stiffness: Annotated[Numbers, six_by_six("N/m", "N m/rad")] = _NOTHING
+    damping: Annotated[Numbers, six_by_six("N s/m", "N m s/rad")] = _NOTHING
     preload: Annotated[Numbers, rules.numbers("three forces in N and three moments in N m", 6)] = (
         _NOTHING
     )
+
+    conservative: Annotated[bool, texts.flag()] = True
 
     @model_validator(mode="after")
     def _check(self) -> Bushing:
@@ -59,6 +64,9 @@ class Bushing(Table):
             )
         if not any((*self.stiffness, *self.damping, *self.preload)):
             raise refuse("missing; a bushing needs stiffness, damping or a preload", "stiffness")
+        if self.conservative:
+            refuse_nonconservative(self.stiffness, "stiffness")
+            refuse_nonconservative(self.damping, "damping")
         return self
 
     @property
@@ -69,7 +77,25 @@ class Bushing(Table):
     @property
     def numbers(self) -> Numbers:
         """Parameters of its force element."""
-        return (*triangle(self.stiffness), *triangle(self.damping), *self.preload)
+        both, preload = (self.stiffness, self.damping), self.preload
+        symmetric, skew = (
+            tuple(x for one in both for x in part(one)) for part in (triangle, antisymmetric)
+        )
+        if self.element == "bearing3":
+            symmetric = tuple(one[k] for one in map(triangle, both) for k in _ALONG)
+            skew = tuple(one[k] for one in map(antisymmetric, both) for k in (0, 1, 5))
+            preload = preload[:3]
+        found = (*symmetric, *preload)
+        return found if self.conservative else (*found, *skew)
+
+    @property
+    def element(self) -> str:
+        """Its force element: without moments, so that its ends may spin, where it needs none."""
+        if self.conservative:
+            return "bushing6"
+        moments = (matrix[i][j] for matrix in map(full, (self.stiffness, self.damping))
+                   for i in range(6) for j in range(6) if max(i, j) > 2)  # fmt: skip
+        return "bearing6" if any((*moments, *self.preload[3:])) else "bearing3"
 
     @property
     def stiffest(self) -> tuple[float, float]:
@@ -84,5 +110,6 @@ class Bushing(Table):
 
 def _largest(given: Numbers) -> tuple[float, float]:
     matrix = full(given)
-    along, about = [matrix[i][i] for i in range(3)], [matrix[i][i] for i in range(3, 6)]
+    along, about = ([abs(matrix[i][j]) for i in part for j in part]
+                    for part in (range(3), range(3, 6)))  # fmt: skip
     return max(along), max(about)

@@ -16,7 +16,6 @@ import numpy as np
 from mstmm.arrays import real
 from mstmm.errors import SceneError
 from mstmm.scene.rules.messages import near
-from mstmm.scene.rules.symmetric import full
 
 from ...engine.engine import Engine
 from ...pack.pack import packed_system
@@ -38,6 +37,8 @@ if TYPE_CHECKING:
 #: Loss factors of all that is elastic, or by the names of hinges, chains, flexible bodies, springs.
 Losses = float | Mapping[str, float]
 
+#: Rows of the matrices of bushings and bearings.
+_SIZES = {"bushing6": 6, "bearing6": 6, "bearing3": 3}
 #: Places of stiffnesses among the numbers of a law; a rotation's are the three behind shifts.
 _STIFF = {
     "linear": (0,), "full": (0, 9), "rotation": (0, 1, 2), "six": (0, 1, 2, 9, 10, 11),
@@ -127,7 +128,7 @@ def _stiffer_law(law: LawNumbers, factor: float) -> LawNumbers:
 def _stiffer_force(
     engine: Engine, force: ForceNumbers, state: State, factor: float
 ) -> ForceNumbers:
-    if force.element == ("force", "bushing6") and factor:
+    if force.element[1] in _SIZES and force.element[0] == "force" and factor:
         return _stiffer_bushing(engine, force, state, factor)
     return _stiffer_spring(engine, force, state, factor)
 
@@ -136,10 +137,21 @@ def _stiffer_bushing(
     engine: Engine, force: ForceNumbers, state: State, factor: float
 ) -> ForceNumbers:
     """A stiffer bushing whose load at the state is the same, by more preload."""
-    stiffness, damping, preload = force.p[:21], force.p[21:42], np.array(force.p[42:])
-    more = factor * np.array(full(stiffness)) @ bushing_deflection(engine, force, state)
-    stiffer_ones = ((1 + factor) * k for k in stiffness)
-    return replace(force, p=(*stiffer_ones, *damping, *(preload + more).tolist()))
+    n = _SIZES[force.element[1]]
+    pairs, above = n * (n + 1) // 2, n * (n - 1) // 2
+    ends = np.cumsum([pairs, pairs, n, above])
+    stiffness, damping, preload, circulatory, gyroscopic = np.split(np.array(force.p), ends)
+    matrix = np.zeros((n, n))
+    matrix[np.triu_indices(n)] = stiffness
+    matrix += np.triu(matrix, 1).T
+    if len(circulatory):
+        skew = np.zeros((n, n))
+        skew[np.triu_indices(n, 1)] = circulatory
+        matrix += skew - skew.T
+    more = factor * matrix @ bushing_deflection(engine, force, state)[:n]
+    stiffer_ones, turned = ((1 + factor) * part for part in (stiffness, circulatory))
+    p = np.concatenate([stiffer_ones, damping, preload + more, turned, gyroscopic])
+    return replace(force, p=tuple(p.tolist()))
 
 
 def _stiffer_spring(

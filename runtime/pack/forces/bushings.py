@@ -17,7 +17,7 @@ def bushing_of(frames: Frames, bushing: Bushing) -> ForceNumbers:
     other, own, end = _end(frames, bushing, bushing.to)
     alike = product(own, transpose(bushing.rest.rotation))
     ends = ((body, _flat(turned), rest), (other, _flat(alike), end))
-    return ForceNumbers(("force", "bushing6"), ends, bushing.numbers, None)
+    return ForceNumbers(("force", bushing.element), ends, bushing.numbers, None)
 
 
 def _end(frames: Frames, bushing: Bushing, reference: str) -> tuple[int, Matrix, Vector]:

@@ -14,7 +14,7 @@ from ..system import BodyNumbers, System
 #: How far entries of a rotation may be off that a turn about z leaves zero: rounding.
 _ROUNDING = 1e-14
 #: Force elements that act alike whichever axes all their numbers are told in.
-_ALIKE = {("force", "spring"), ("force", "bushing6")}
+_ALIKE = {("force", "spring"), ("force", "bushing6"), ("force", "bearing6"), ("force", "bearing3")}
 
 
 def plane_of(system: System, elements: Elements) -> Array | None:

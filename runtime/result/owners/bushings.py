@@ -36,14 +36,14 @@ _OF_ONE = (*triangle((1.0,) * 6), *triangle((0.0,) * 6), *(0.0,) * 6)
 
 
 @cache
-def _wrench() -> KernelIR:
-    text = files("mstmm.generated").joinpath("force_bushing6.json").read_text(encoding="utf-8")
+def _wrench(element: str) -> KernelIR:
+    text = files("mstmm.generated").joinpath(f"force_{element}.json").read_text(encoding="utf-8")
     return kernel_from_json(text, "wrench")
 
 
 def load(observed: Observed, bushing: Bushing) -> Array:
     """(n, 6): force and moment on the end `to`, inertial axes."""
-    return _load(_ends(observed, bushing), bushing.numbers)
+    return _load(_ends(observed, bushing), bushing.numbers, bushing.element)
 
 
 def deflection(observed: Observed, bushing: Bushing) -> Array:
@@ -54,7 +54,7 @@ def deflection(observed: Observed, bushing: Bushing) -> Array:
 def deflection_of(ends: tuple[Array, Array]) -> Array:
     """(n, 6) of the motion (n, 24) of the place of rest and of the end `to`."""
     own = ends[0][:, 15:24].reshape(-1, 3, 3)
-    pulled = -_load(ends, _OF_ONE).reshape(-1, 2, 3)
+    pulled = -_load(ends, _OF_ONE, "bushing6").reshape(-1, 2, 3)
     return np.einsum("nij,nki->nkj", own, pulled).reshape(-1, 6)
 
 
@@ -85,7 +85,7 @@ def _ends(observed: Observed, bushing: Bushing) -> tuple[Array, Array]:
     return points[:, 0], points[:, 1]
 
 
-def _load(ends: tuple[Array, Array], numbers: tuple[float, ...]) -> Array:
+def _load(ends: tuple[Array, Array], numbers: tuple[float, ...], element: str) -> Array:
     """(n, 6); nan where a state cannot be evaluated."""
     known = np.asarray(np.isfinite(np.hstack(ends)).all(axis=1))
     given: dict[str, Array] = {
@@ -96,7 +96,7 @@ def _load(ends: tuple[Array, Array], numbers: tuple[float, ...]) -> Array:
     for letter, end in zip("FT", ends, strict=True):
         given[f"A_{letter}"] = end[known, 15:24].reshape(-1, 3, 3)
         given |= {f"{name}_{letter}": end[known, place] for name, place in columns.items()}
-    found = vectorized.evaluate(_wrench(), given)
+    found = vectorized.evaluate(_wrench(element), given)
     loads = np.full((len(known), 6), np.nan)
     loads[known] = np.hstack([found["F"], found["M"]])
     return loads
