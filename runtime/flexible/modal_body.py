@@ -22,6 +22,7 @@ from mstmm.arrays import Array, Integers
 from .beam.ports import BeamShapes
 from .modal_port import MassPoint, ModalPort
 from .moments import Moments
+from .truncation import Truncation
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,9 @@ class ModalBody(Moments):
     With `points` (quadrature variant) the mass sits in them and the moments are not used.
     `drag` are the moments of the viscous drag per length (N s/m^2 in place of kg/m; motion of the
     axis only), None without drag.  `resolved` is the frequency in rad/s up to which the shapes of
-    an elastic body hold, None of beams.  `frame` says where the floating frame is: "tangent",
-    "chord", "mean", or one of them per bending plane ("chord/tangent": of y, of z).
+    an elastic body hold, `truncation` what they miss of its deflections, both None of beams.
+    `frame` says where the floating frame is: "tangent", "chord", "mean", or one of them per bending
+    plane ("chord/tangent": of y, of z).
     """
 
     name: str
@@ -60,6 +62,7 @@ class ModalBody(Moments):
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     resolved: float | None = None
+    truncation: Truncation | None = None
 
     @property
     def n(self) -> int:

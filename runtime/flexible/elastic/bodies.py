@@ -33,7 +33,7 @@ from .mesh import Material, box_mesh, mesh_model, read_mesh, refuse_large
 from .model import ElasticModel
 from .moments import moments
 from .ports import Port, port, refuse_shared
-from .prestress import SecondOrder, second_order
+from .prestress import SecondOrder, second_order, truncation
 from .skin import skin
 
 if TYPE_CHECKING:
@@ -303,6 +303,7 @@ def elastic_body(
         skin=skin(model, reduction.shapes),
         frame=frame, notes=(*notes, *_notes(model, reduction, stiffening), found.how),
         warnings=model.warnings, resolved=resolution(reduction, release),
+        truncation=truncation(reduction, ports),
     )  # fmt: skip
 
 

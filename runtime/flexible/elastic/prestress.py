@@ -24,6 +24,7 @@ import numpy as np
 
 from mstmm.arrays import Array
 
+from ..truncation import Truncation
 from .craig_bampton import Reduction
 from .ports import Port
 
@@ -57,6 +58,21 @@ def second_order(reduction: Reduction, ports: list[Port]) -> SecondOrder:
     for port, drawn in zip(moving, families[12:].reshape(-1, 3, n, n), strict=True):
         ends[port.name][:3] = drawn
     return SecondOrder(families[:3], families[3:12].reshape(3, 3, n, n), ends)
+
+
+def truncation(reduction: Reduction, ports: list[Port]) -> Truncation:
+    """What the shapes miss of the deflections under the loads that the body may have."""
+    sections, shapes = reduction.sections, reduction.shapes
+    inertia = -sections.expand.T @ (sections.model.mass @ shapes)
+    wrenches = [sections.rows[port.name].toarray().T for port in ports]
+    loads = np.hstack([*wrenches, _body_loads(reduction)[:, 3:], inertia])
+    loads = sections.relieved(loads, sections.rigid)
+    moved = sections.clamped([reduction.held]).statics(loads)
+    pushed = sections.unknowns(shapes).T @ loads
+    modal = sections.model.inertia[0, 0] * reduction.frequencies**2
+    kept = pushed.T @ (pushed / modal[:, None])
+    ends = 6 * len(ports)
+    return Truncation(tuple(port.name for port in ports), loads[:, :ends].T @ moved, kept[:ends])
 
 
 def _body_loads(reduction: Reduction) -> Array:

@@ -89,6 +89,16 @@ class Sections:
         found[6 * len(self._stiff) :] = model.rigid[rest]
         return found
 
+    def unknowns(self, shapes: Array) -> Array:
+        """(w, k) of displacements (u, k) whose rigid ports move as sections."""
+        taken = [port.unknowns(self.model) for port in self._stiff]
+        rest = np.setdiff1d(np.arange(len(shapes)), np.concatenate([*taken, []]))
+        moved = [
+            np.linalg.lstsq(port.section(self.model), shapes[own], rcond=None)[0]
+            for port, own in zip(self._stiff, taken, strict=True)
+        ]
+        return np.concatenate([*moved, shapes[rest]])
+
     def relieved(self, loads: Array, motions: Array) -> Array:
         """Loads (w, k) with the inertia of the rigid motions (w, f) that they cause, so that they
         do no work on those."""

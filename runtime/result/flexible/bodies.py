@@ -105,6 +105,13 @@ class FlexibleBodies:
                 found[port] = load
         return found
 
+    def held_load(self, name: str) -> tuple[Array, Array]:
+        """Force and moment (n, 3) of the hinge that holds a body on its held end, at the section's
+        point, inertial axes."""
+        place = self.observed.engine.packed.hinge_position[self._holders[name].name]
+        load = self.observed.columns("loads", (place,))
+        return load[:, :3], load[:, 3:]
+
     def point_loads(self, name: str) -> list[PointLoad]:
         """What acts at sections of a beam, but for the end that is held."""
         body, lines = self.known[name], {load.name for load in self._spread(name)}

@@ -13,11 +13,12 @@ from mstmm.arrays import Array
 from mstmm.scene.checks.welded import lines
 
 from ...flexible.parts import slices
+from ...flexible.sizes import radius_of_gyration
 from . import estimators as e
 from .coupling import couplings
 from .energy import frequencies, modal_energy, strain_energy
 from .loads import section_loads
-from .motion import elastic_moment
+from .motion import elastic_moment, tilde
 from .sideways import rule, sideways
 
 if TYPE_CHECKING:
@@ -49,8 +50,8 @@ class Flexibility:
         spin_ratio: largest spin across the body over its first frequency.
         gamma: (smallest, largest) eigenvalue of K^-1 K_g of the loads; None if not known.
         last_share: largest share of the energy that the last shape of a family held, which one.
-        tail: part of the bending energy of the true section loads that the shapes miss; None where
-            it is not known.
+        tail: part of the bending energy of the true section loads that the shapes miss, of an
+            elastic body of the deflection of its ends; None where it is not known.
         coupling: share chi of the inertia at its hinge that the mode with the most energy holds,
             and this mode.
         shear: largest error of a bending frequency without shear (and rotary inertia), times the
@@ -62,6 +63,7 @@ class Flexibility:
             where it has all shapes.
         said: what is known of the body's model before it moves, and a way out, one sentence each.
         one_way: it responds to a rigid run, linearly, and is no part of it.
+        tail_of: what `tail` is a part of.
     """
 
     name: str
@@ -81,6 +83,7 @@ class Flexibility:
     sideways: float | None = None
     said: tuple[str, ...] = ()
     one_way: bool = False
+    tail_of: str = e.BENDING_ENERGY
 
     @property
     def frame_error(self) -> float:
@@ -127,6 +130,8 @@ def _one(
     first = float(frequencies(body)[0])
     known = shapes is not None and name not in flexible.unbalanced
     tail, aside = _from_sections(flexible, name, some, line) if known else (None, None)
+    if body.truncation is not None and name not in flexible.unbalanced:
+        tail = missed_by_loads(flexible, name, some)
     return Flexibility(
         name, len(body.modes), body.frame,
         e.is_stiffened(body) and name not in flexible.one_way,
@@ -134,7 +139,7 @@ def _one(
         _gamma(flexible, name, some), e.last_shape_share(motion) if slope > _STRAIGHT else None,
         tail if slope > _STRAIGHT else None, _leading(motion, coupling),
         e.shear_error(motion, line), e.largest_strain(bent_all), aside, body.warnings,
-        name in flexible.one_way,
+        name in flexible.one_way, e.BENDING_ENERGY if shapes else e.DEFLECTION,
     )  # fmt: skip
 
 
@@ -208,6 +213,28 @@ def missed(motion: Motion, places: Array, weights: Array, moment: Array) -> floa
     return float(lost[k] / true[k]) if true[k] > 0 else None
 
 
+def missed_by_loads(flexible: FlexibleBodies, name: str, some: NDArray[np.int64]) -> float | None:
+    """Part of the deflection of an elastic body's ends, under what they carry, its spin and the
+    inertia of its shapes, that the shapes miss when they are strained most; None without any."""
+    motion = flexible.motion(name).some(some)
+    truncation, held = motion.body.truncation, flexible.held_end(name)
+    strained = strain_energy(motion)
+    if truncation is None or not len(some) or not strained.max() > 0:
+        return None
+    loads = flexible.end_loads(name) | {held: flexible.held_load(name)}
+    none = np.zeros((len(some), 3))
+    given = []
+    for port in truncation.ports:
+        force, moment = (part[some] for part in loads[port]) if port in loads else (none, none)
+        given += [motion.inward(force), motion.inward(moment)]
+    spin = tilde(motion.frame_spin)
+    turning = tilde(motion.frame_spin_rate) + spin @ spin
+    given += [-np.swapaxes(turning, 1, 2).reshape(-1, 9), motion.etadd]
+    length = radius_of_gyration(motion.body)
+    missed = truncation.missed(np.concatenate(given, axis=1), length)
+    return float(missed[int(np.argmax(strained))])
+
+
 # --- rows -----------------------------------------------------------------------------------------
 
 #: Bodies that get rows of their own in the certificate; of more only the extremes are shown.
@@ -255,7 +282,7 @@ def _rows_of(one: Flexibility) -> list[tuple[str, str]]:
     if one.last_share is not None and one.last_share[1]:
         kept.append(f"{one.last_share[1]} holds {one.last_share[0]:.1e} of the energy")
     if one.tail is not None:
-        kept.append(f"{one.tail:.1e} of the bending energy missed")
+        kept.append(f"{one.tail:.1e} of the {one.tail_of} missed")
     if one.coupling is not None:
         kept.append(f"coupling {one.coupling[0]:.2g} ({one.coupling[1]})")
     if one.shear is not None:

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from ...flexible.modal_body import ModalBody
 
 
+#: What the part that shapes miss is a part of: of a beam, and of an elastic body.
+BENDING_ENERGY, DEFLECTION = "bending energy", "deflection of its ends"
+
 #: Sections of a beam that are looked at.
 SECTIONS = 33
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 from mstmm.risk import Risk
 
+from .estimators import BENDING_ENERGY
+
 if TYPE_CHECKING:
     from .certify import Flexibility
 
@@ -91,11 +93,13 @@ def _turned(one: Flexibility) -> Risk | None:
 def _missed(one: Flexibility) -> Risk | None:
     if one.tail is None or one.tail <= TAIL:
         return None
+    beam = one.tail_of == BENDING_ENERGY
+    carries = 'basis = "static+fixed-interface"' if beam else "static_shapes at its ends"
     return Risk(
         "shapes", f'"{one.name}"',
-        f'the shapes of "{one.name}" miss {one.tail:.0%} of its bending energy',
-        'take more modes, or basis = "static+fixed-interface", which carries the loads of its '
-        "hinges", one.tail, TAIL,
+        f'the shapes of "{one.name}" miss {one.tail:.0%} of {"its" if beam else "the"} '
+        f"{one.tail_of}",
+        f"take more modes, or {carries}, which carries the loads of its hinges", one.tail, TAIL,
     )  # fmt: skip
 
 
