@@ -9,27 +9,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.errors import NumericalFailure
 from mstmm.printable import abbreviate
 from mstmm.risk import RUN, Risk, advice
 
-from ..engine.sizes import speed_sizes
 from ..guard.answers import find_state_risks
+from .channels import GROUND
 from .modes import modes
+from .operating_point.changes import MATRICES, find_changes
+from .operating_point.departure import LARGEST, Departure, find_departure
+from .operating_point.later import LaterStates
 from .operating_point.sticking import friction_risks
 from .output.outputs import left_out
-from .rotors.later import SAME, apart, later
 
 if TYPE_CHECKING:
     from .equations import Equations
 
-#: Distance from rest, and acceleration per s^2 of what nothing holds, in sizes of coordinates;
-#: stiffness that counts as none, in parts.
-_STILL, _SOFT = 1e-6, 1e-13
 #: Efforts that are rounding, in parts of those that cancel.
 _CANCELLED = 1e-11
-#: Coordinates up to which matrices are made to look at the state, and up to which all motions are.
-_LARGEST, _ALL_MOTIONS = 2000, 400
+#: Coordinates up to which all motions are looked for.
+_ALL_MOTIONS = 400
 
 
 def find_linear_risks(linear: Equations) -> Iterator[Risk]:
@@ -37,7 +35,7 @@ def find_linear_risks(linear: Equations) -> Iterator[Risk]:
     state = linear.state
     yield from find_state_risks(linear.model, state.t, state.q, state.u)
     yield from _unsteady(linear)
-    if len(linear) <= _LARGEST:
+    if len(linear) <= LARGEST:
         yield from friction_risks(linear)
     yield from without_effect(linear, linear.V)
     yield from find_omissions(linear)
@@ -78,22 +76,54 @@ def find_response_risks(linear: Equations) -> Iterator[Risk]:
 
 
 def _unsteady(linear: Equations) -> Iterator[Risk]:
-    """A state that does not last, or along whose motion the matrices change."""
-    leaving = accelerating(linear)
-    if leaving:
-        yield Risk(
-            "unsteady-state", abbreviate(leaving),
-            f"the state does not last: {abbreviate(leaving)} accelerate there, so that the model "
-            "holds beside the motion through it, and only for a moment",
-            "linearise at an equilibrium or a steady motion",
-        )  # fmt: skip
-    elif len(linear) <= _LARGEST and linear.state.u.any() and _changes(linear):
+    """A state that does not last, or along whose motion matrices and inputs change."""
+    later = LaterStates(linear)
+    leaving = find_departure(linear, later)
+    if leaving is not None:
+        yield departure_risk(linear.state.t, leaving, later.cause)
+    if len(linear) > LARGEST:
+        if later.sparse:
+            yield advice(
+                "stability-unknown", RUN,
+                f"more than {LARGEST} coordinates: not examined for matrices that change along "
+                "the motion or with time", "look at a smaller part of the scene",
+            )  # fmt: skip
+        return
+    asked = (*linear.controls, *(() if linear.disturbances == GROUND else linear.others))
+    changing = find_changes(linear, later, asked)
+    if MATRICES in changing:
         yield Risk(
             "changing-coefficients", RUN,
-            "the matrices change along the motion of this state: frequencies and growth of one "
-            "moment are not those of the motion",
+            "the matrices change along the motion of this state or with time: frequencies and "
+            "growth of one moment are not those of the motion",
             "simulate the motion, or linearise about a state that keeps its matrices",
         )  # fmt: skip
+    yield from (changing_risk(linear, name) for name in changing if name != MATRICES)
+
+
+def changing_risk(linear: Equations, name: str) -> Risk:
+    """An input or output whose column or row changes."""
+    return Risk(
+        "changing-input", f'input "{name}"',
+        f"{name} changes its effect along the motion of this state or with time: the model has "
+        f"that of t = {linear.state.t:g} s", "take efforts and speeds of hinges, or simulate",
+    )  # fmt: skip
+
+
+def departure_risk(t: float, leaving: Departure, cause: str) -> Risk:
+    """A state at t (s) that does not last."""
+    names = abbreviate(leaving.coordinates)
+    if leaving.t == t:
+        means = (
+            f"the state does not last: {names} accelerate there, so that the model holds beside "
+            "the motion through it, and only for a moment"
+        )
+    else:
+        means = f"the state of t = {t:g} s does not last: {cause}, {leaving} moves {names}"
+    return Risk(
+        "unsteady-state", names, means, "take an equilibrium or a steady motion, or simulate",
+        abs(leaving.effort), None, leaving.unit,
+    )  # fmt: skip
 
 
 def without_effect(linear: Equations, effects: Array) -> Iterator[Risk]:
@@ -108,7 +138,7 @@ def without_effect(linear: Equations, effects: Array) -> Iterator[Risk]:
 
 def unrest(linear: Equations) -> bool:
     """Whether closed loops are at a state that does not last, so that accelerations turn rows."""
-    if linear.mechanism is None or not accelerating(linear):
+    if linear.mechanism is None or find_departure(linear) is None:
         return False
     return not _balanced(linear, linear.mechanism.ways)
 
@@ -120,40 +150,3 @@ def _balanced(linear: Equations, ways: Array) -> bool:
     efforts = tree.inverse_dynamics(state.t, state.q, state.u, 0 * state.a, tree.start_memory())
     left, whole = np.abs(ways.T @ efforts), np.abs(ways).T @ np.abs(efforts)
     return bool((left <= _CANCELLED * whole).all())
-
-
-def accelerating(linear: Equations) -> list[str]:
-    """Coordinates that leave the state: those further from rest than a small part of their sizes,
-    and those that accelerate though nothing holds them."""
-    free = list(linear.free)
-    a, sizes = linear.state.a[free], speed_sizes(linear.model)[free]
-    if not a.any():
-        return []
-    if len(linear) > _LARGEST:
-        away, left = _displacement_by_sweep(linear, a) / sizes, np.zeros(len(a))
-    else:
-        stiffness = linear.K * np.outer(sizes, sizes)
-        pushed = (linear.M @ a) * sizes
-        away = np.asarray(np.linalg.lstsq(stiffness, pushed, rcond=_SOFT)[0], dtype=np.float64)
-        missing = (pushed - stiffness @ away) / sizes
-        left = np.asarray(np.linalg.solve(linear.M, missing) / sizes, dtype=np.float64)
-    leaves = (np.abs(away) > _STILL) | (np.abs(left) > _STILL)
-    return [linear.coordinates[k] for k in np.flatnonzero(leaves)]
-
-
-def _displacement_by_sweep(linear: Equations, a: Array) -> Array:
-    """(n,) distance from rest, K^-1 M a, without matrices; infinite where K is singular."""
-    if linear.mechanism is not None or linear.turning is not None:
-        return np.where(a == 0, 0.0, np.inf)
-    pencil = linear.pencil
-    try:
-        pencil.factor(0.0)
-    except NumericalFailure:
-        return np.where(a == 0, 0.0, np.inf)
-    return np.asarray(pencil.solve(pencil.mass(a)), dtype=np.float64)
-
-
-def _changes(linear: Equations) -> bool:
-    """Whether the matrices are others a little further along the motion."""
-    there = later(linear)
-    return any(apart(getattr(linear, x), getattr(there, x)) > SAME for x in "MCK")

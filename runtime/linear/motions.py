@@ -59,8 +59,9 @@ class Modes(Assessed):
 
     @property
     def findings(self) -> Iterator[Risk]:  # type: ignore[override]
-        """Risks of the linear model, motions that grow or are free, and such beyond the shapes."""
-        yield from self.linear.risks
+        """Risks of the linear model but for those of its inputs, motions that grow or are free, and
+        such beyond the shapes."""
+        yield from (risk for risk in self.linear.risks if risk.name != "changing-input")
         yield from self.motion_risks()
         yield from self._range_risks()
 

@@ -37,7 +37,7 @@ from .harmonic.exact import (
 from .harmonic.losses import Losses, stiffer
 from .harmonic.prescribed import Ratios, modal_damping
 from .harmonic.refused import given, refuse_drives, refuse_in_motion, refuse_ratios
-from .harmonic.steady import refuse_turning, refuse_unsteady
+from .harmonic.steady import find_time_risks, refuse_turning, refuse_unsteady
 from .judged import find_response_risks
 from .matrices import Matrices
 from .output.outputs import outputs_of, read_by, rows_of
@@ -203,6 +203,7 @@ def frequency_response(
 
     def find_risks() -> Iterator[Risk]:
         yield from find_response_risks(linear)
+        yield from find_time_risks(linear, pushes, shown)
         yield from response_range_risks(linear.model, frequencies, exact_names)
 
     return FrequencyResponse(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from mstmm.arguments import yes_or_no
@@ -128,14 +129,23 @@ class Model(Linearised, Displayed):
         missing at the start is applied in parts.  Hinges that nothing counts turns of end within
         half a turn of the start.
 
+        Drives are where they are at t (s), loads what they are then.  Where drives move there, what
+        is found is the rest beside them, which has to last: as long as they go on, no effort may be
+        missing.  Where loads or drives change later alone, `warnings` says so.
+
         Raises NumericalFailure naming the coordinates that nothing determines, or, with the efforts
-        that are left, if there is no equilibrium near the start.
+        that are left, if there is no equilibrium near the start, and where drives that move on do
+        not leave it at rest.
         """
         from .equilibrium import equilibrium
+        from .lasting import check_lasting
 
         instead = "call equilibrium for each of several"
         start = self.initial_state()[0] if q is None else one("q", q, self.nq, instead)
-        return equilibrium(self, start, real("t", t, "a time in s"), real("tolerance", tolerance))
+        t = real("t", t, "a time in s")
+        found = equilibrium(self, start, t, real("tolerance", tolerance))
+        linearise = partial(self.linearize, np.asarray(found), None, t, inputs=(), disturbances=())
+        return check_lasting(self, found, t, linearise)
 
     def simulate(
         self,

@@ -95,9 +95,9 @@ def test_answers_of_linear_models_are_assessed() -> None:
 
 #: Risks of answers alone.
 OF_ANSWERS = {
-    "changing-coefficients", "controller-left-out", "dry-friction", "input-without-effect",
-    "no-equilibrium",
-    "output-left-out", "run-failed", "stability-unknown", "time-dependent", "unexamined",
+    "changing-coefficients", "changing-input", "controller-left-out", "dry-friction",
+    "input-without-effect", "no-equilibrium", "output-left-out", "run-failed",
+    "stability-unknown", "time-dependent", "unexamined",
     "unrestrained", "unstable", "unsteady-state",
 }  # fmt: skip
 

@@ -1,9 +1,9 @@
-"""States that turn balls: what a frequency response can be asked there.
+"""States that move: what a frequency response can be asked there.
 
-Increments go in outboard axes, which turn along with the state.  They answer a push of one
+Increments go along with the motion, those of hinges in axes that turn.  They answer a push of one
 frequency with that frequency alone where neither the matrices nor the push, nor what is read,
-change along the motion: an effort of a hinge stays what it is, a force with inertial components
-goes round.
+change along the motion or with time: an effort of a hinge stays what it is, a force with inertial
+components on a body that turns goes round, and so does the place of its end.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING
 
 from mstmm.errors import SceneError
 from mstmm.printable import abbreviate
+from mstmm.risk import Risk
 
 from ..channels import Channel
-from ..judged import accelerating
-from ..output.outputs import outputs_of, rows_of
+from ..judged import changing_risk
+from ..operating_point.changes import MATRICES, find_changes
+from ..operating_point.departure import find_departure
+from ..operating_point.later import LaterStates
 from ..output.seen import Seen
-from ..rotors.later import SAME, apart, later
 
 if TYPE_CHECKING:
     from ..equations import Equations
@@ -34,29 +36,27 @@ def refuse_turning(linear: Equations) -> None:
 
 
 def refuse_unsteady(linear: Equations, pushes: Sequence[Channel], shown: Sequence[Seen]) -> None:
-    """SceneError where a state turns balls and what is asked changes along its motion."""
-    if linear.turning is None:
+    """SceneError where what is asked changes along the motion of the state."""
+    later = LaterStates(linear)
+    if not linear.state.u.any() and not later.driven:
         return
-    changing = list(_changing(linear, pushes, shown))
+    changing = find_changes(linear, later, pushes, shown)
+    if linear.turning is not None and (leaving := find_departure(linear)) is not None:
+        changing += leaving.coordinates
     if changing:
         raise SceneError(
-            "frequency response: the state turns, and along its motion changes "
+            "frequency response: the state moves, and along its motion changes "
             f"{abbreviate(changing)}, so that other frequencies answer too; push by "
-            "efforts of hinges and read their speeds, which go in outboard axes, "
+            "efforts of hinges and read their coordinates and speeds, in axes that turn along, "
             "or ask about a state at rest"
         )
 
 
-def _changing(linear: Equations, pushes: Sequence[Channel], shown: Sequence[Seen]) -> Iterator[str]:
-    there = later(linear)
-    if any(apart(getattr(linear, x), getattr(there, x)) > SAME for x in "MCK"):
-        yield "the matrices"
-    yield from accelerating(linear)
-    for push in pushes:
-        if apart(linear.pushed([push]), there.pushed([push])) > SAME:
-            yield push.name
-    names = [one.name for one in shown]
-    for one, other in zip(shown, outputs_of(there, names), strict=True):
-        now, then = (rows_of(at, [it], ()).orders for at, it in ((linear, one), (there, other)))
-        if any(apart(now[order], then[order]) > SAME for order in now):
-            yield one.name
+def find_time_risks(
+    linear: Equations, pushes: Sequence[Channel], shown: Sequence[Seen]
+) -> Iterator[Risk]:
+    """Inputs and outputs whose effects change with time."""
+    known = {risk.element for risk in linear.risks}
+    for name in find_changes(linear, LaterStates(linear), pushes, shown):
+        if name != MATRICES and f'input "{name}"' not in known:
+            yield changing_risk(linear, name)

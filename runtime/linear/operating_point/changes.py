@@ -1,0 +1,89 @@
+"""What changes along the motion of an operating point: matrices, effects of inputs, outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+from ..channels import Channel
+from ..output.outputs import outputs_of, rows_of
+from ..output.seen import Seen
+from ..pushed import Pushed
+from .departure import LARGEST
+from .later import LaterStates
+
+if TYPE_CHECKING:
+    from ..equations import Equations
+
+#: The name of M, C and K among what changes.
+MATRICES = "the matrices"
+#: Changes that count as none: in parts of their own rows, of the largest entry, and of a unit.
+_SAME, _FAINT, _ROUNDING = 1e-6, 1e-9, 1e-12
+
+
+def find_changes(
+    linear: Equations, later: LaterStates, pushes: Sequence[Channel], shown: Sequence[Seen] = ()
+) -> list[str]:
+    """What changes along the motion: `MATRICES`, and names of pushes and outputs."""
+    names, changing = [one.name for one in shown], dict[str, None]()
+    if not later.sparse:
+        return []
+    effects, rows = _effects(linear, pushes), _rows(linear, shown, pushes)
+    for there in later.equations():
+        if len(linear) <= LARGEST and _matrices_differ(linear, there):
+            changing[MATRICES] = None
+        now = _effects(there, pushes)
+        again = _rows(there, outputs_of(there, names) if names else (), pushes)
+        pairs = zip((*(one.name for one in pushes), *names), (*effects, *rows), (*now, *again),
+                    strict=True)  # fmt: skip
+        changing |= {name: None for name, one, other in pairs if _differ(one, other)}
+    return list(changing)
+
+
+def _effects(linear: Equations, pushes: Sequence[Channel]) -> list[Array]:
+    """Of each push what a unit of it, and of the motion of its drive, does."""
+    if not pushes:
+        return []
+    efforts = np.zeros((len(pushes), linear.model.nu))
+    efforts[:, list(linear.free)] = linear.pushed(pushes).T
+    found = Pushed.of(linear, pushes, efforts)
+    return [found.columns[found.parts[:, k] != 0] for k in range(len(pushes))]
+
+
+def _rows(linear: Equations, shown: Sequence[Seen], pushes: Sequence[Channel]) -> list[Array]:
+    """Of each output what it is of increments, their rates and accelerations, of the drives that
+    are pushes and of these at once."""
+    places = [*linear.free, *(speed for one in pushes for speed, _ in one.moves)]
+    found, none = [], np.zeros((1, linear.model.nu))
+    for one in shown:
+        rows = rows_of(linear, [one], pushes)
+        orders = [rows.orders.get(order, none)[0, places] for order in range(3)]
+        found.append(np.concatenate([*orders, rows.through[0]]))
+    return found
+
+
+def _differ(one: Array, other: Array) -> bool:
+    scale = max(float(np.abs(x).max(initial=0)) for x in (one, other))
+    return float(np.abs(one - other).max(initial=0)) > _SAME * scale + _ROUNDING
+
+
+def _matrices_differ(one: Equations, other: Equations) -> bool:
+    """Whether M, C or K differ, each entry seen beside its row and its column in a scene of unit
+    masses."""
+    scale = np.sqrt(np.maximum(one.M.diagonal(), np.finfo(float).tiny))
+    first, second = (
+        [x / np.outer(scale, scale) for x in (at.M, at.C, at.K)] for at in (one, other)
+    )
+    spin = float(np.abs(one.state.u).max(initial=0))
+    stiffness = float(np.abs(first[2]).max(initial=0)) + spin**2
+    for a, b, unit in zip(first, second, (1.0, np.sqrt(stiffness), stiffness), strict=True):
+        size = np.maximum(np.abs(a), np.abs(b))
+        whole = max(float(size.max(initial=0)), float(unit))
+        rows = np.sqrt(np.outer(size.max(axis=1, initial=0), size.max(axis=0, initial=0)))
+        if (np.abs(a - b) > _SAME * rows + _FAINT * whole).any():
+            return True
+    return False

@@ -1,0 +1,95 @@
+"""Whether an operating point lasts: what pushes its coordinates away, there and later."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
+
+from ...engine.sizes import speed_sizes
+from .later import LaterStates
+
+if TYPE_CHECKING:
+    from ..equations import Equations
+
+#: Distance from rest, and acceleration per s^2 of what nothing holds, in sizes of coordinates;
+#: stiffness that counts as none, in parts.
+_STILL, _SOFT = 1e-6, 1e-13
+#: Coordinates up to which matrices are made.
+LARGEST = 2000
+
+
+@dataclass(frozen=True)
+class Departure:
+    """What leaves an operating point: names of `coordinates`, of which the effort (N or N*m) that
+    is missing along `worst` at time `t` (s) is the largest."""
+
+    coordinates: list[str]
+    worst: str
+    effort: float
+    unit: str
+    t: float
+
+    def __str__(self) -> str:
+        return f"{abs(self.effort):.4g} {self.unit} along {self.worst} at t = {self.t:.6g} s"
+
+
+def find_departure(linear: Equations, later: LaterStates | None = None) -> Departure | None:
+    """What leaves the operating point there or, with `later`, further along its motion; None where
+    it lasts."""
+    states = [linear.state, *(() if later is None else later.every)]
+    free = list(linear.free)
+    a = np.array([one.a[free] for one in states]).T
+    if not a.any():
+        return None
+    sizes = speed_sizes(linear.model)[free]
+    leaves, efforts = _leaving(linear, a, sizes)
+    if not leaves.any():
+        return None
+    if leaves[:, 0].any():  # what is wrong at once comes first
+        leaves[:, 1:] = False
+    work = np.where(leaves, np.abs(efforts) * sizes[:, None], 0.0)
+    worst, at = np.unravel_index(int(work.argmax()), work.shape)
+    names = [linear.coordinates[k] for k in np.flatnonzero(leaves.any(axis=1))]
+    unit = "N*m" if linear.units[worst] == "rad" else "N"
+    effort = float(efforts[worst, at])
+    return Departure(names, linear.coordinates[worst], effort, unit, states[at].t)
+
+
+def _leaving(linear: Equations, a: Array, sizes: Array) -> tuple[NDArray[np.bool_], Array]:
+    """(n, k) which coordinates leave under accelerations a (n, k): those further from rest than a
+    small part of their sizes, and those that accelerate though nothing holds them; and the efforts
+    that are missing."""
+    if len(linear) > LARGEST:
+        columns = [_displacement_by_sweep(linear, column) for column in a.T]
+        return np.abs(np.array(columns).T / sizes[:, None]) > _STILL, _efforts(linear, a)
+    stiffness, efforts = linear.K * np.outer(sizes, sizes), linear.M @ a
+    pushed = efforts * sizes[:, None]
+    away = np.asarray(np.linalg.lstsq(stiffness, pushed, rcond=_SOFT)[0], dtype=np.float64)
+    missing = (pushed - stiffness @ away) / sizes[:, None]
+    left = np.asarray(np.linalg.solve(linear.M, missing) / sizes[:, None], dtype=np.float64)
+    return (np.abs(away) > _STILL) | (np.abs(left) > _STILL), efforts
+
+
+def _efforts(linear: Equations, a: Array) -> Array:
+    """(n, k) M a, without matrices where there are none."""
+    if linear.mechanism is not None:
+        return linear.M @ a
+    return np.array([linear.pencil.mass(column) for column in a.T]).T
+
+
+def _displacement_by_sweep(linear: Equations, a: Array) -> Array:
+    """(n,) distance from rest, K^-1 M a, without matrices; infinite where K is singular."""
+    if linear.mechanism is not None or linear.turning is not None:
+        return np.where(a == 0, 0.0, np.inf)
+    pencil = linear.pencil
+    try:
+        pencil.factor(0.0)
+    except NumericalFailure:
+        return np.where(a == 0, 0.0, np.inf)
+    return np.asarray(pencil.solve(pencil.mass(a)), dtype=np.float64)

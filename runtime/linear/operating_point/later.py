@@ -1,0 +1,152 @@
+"""States further along the motion of an operating point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure, SceneError
+from mstmm.printable import abbreviate
+
+from ...breaks.acting import acting
+from ...engine.sizes import speed_sizes
+from ...engine.states.steady_motion import move_steadily
+from ...run.system import SceneSystem
+from ..matrices import State
+
+if TYPE_CHECKING:
+    from ..equations import Equations
+
+#: How far the fastest and the slowest motion go on, rad or lengths of the scene: no two differ by
+#: a part of a turn with a small whole number.
+_PHASES = (0.7, 1.9, 3.3)
+#: Speeds, in parts of the fastest, that are rounding.
+_STILL = 1e-9
+#: Times in s after which what depends on time is looked at, and how many of its breaks are.
+_TIMES, _BREAKS = 1.0437 * np.geomspace(1e-3, 1e3, 19), 16
+#: Every how many of these times the matrices are compared.
+_SPARSE = 3
+#: Motion in rad or sizes over which closed loops are settled anew, and how often.
+_STRIDE, _MOST_STRIDES = 0.1, 100
+
+
+class LaterStates:
+    """States further along the motion that keeps the speeds of an operating point, with drives and
+    loads as they are then.
+
+    Attributes:
+        every: all of them; none where nothing moves and nothing depends on time.
+        sparse: those at which matrices are compared.
+        driven: places of the speeds of drives that move at the operating point.
+    """
+
+    def __init__(self, linear: Equations) -> None:
+        self._linear, system = linear, linear.model.packed.system
+        state, first = linear.state, system.places["u"]
+        drives = [int(first[place]) + k for place, k in system.driven]
+        self.driven = [k for k in drives if state.u[k] or state.a[k]]
+        turning = [*self._at(self._phases())]
+        timed = [] if system.steady else [*self._at([*_TIMES, *self._breaks()])]
+        uniform = not self.driven or all(
+            np.allclose(one.u[drives], state.u[drives], rtol=1e-12)
+            and not one.a[drives].any() for one in timed
+        )  # fmt: skip
+        fixed = not self.driven and all(not one.u[drives].any() for one in timed)
+        depends = system.timed or system.closes or not (uniform or fixed)
+        self.every = [*turning, *timed]
+        self.sparse = [*turning, *(timed[::_SPARSE] if depends else ())]
+
+    def equations(self) -> Iterator[Equations]:
+        """The linear equations at those states at which they are compared."""
+        for state in self.sparse:
+            yield equations_at(self._linear, state)
+
+    @property
+    def cause(self) -> str:
+        """What goes on, for messages."""
+        model = self._linear.model
+        hinges = dict.fromkeys(model.layout.hinge_of_speed(k).name for k in self.driven)
+        if hinges:
+            return f"while drives move on (of {abbreviate(list(hinges))})"
+        if self._linear.state.u.any():
+            return "while the motion goes on"
+        return "as loads or drives change with time"
+
+    def _phases(self) -> list[float]:
+        """Times (s) after which what moves has gone on by `_PHASES`."""
+        linear = self._linear
+        rates = np.abs(linear.state.u) / speed_sizes(linear.model)
+        rates = rates[rates > _STILL * rates.max(initial=0)]
+        ends = {float(rates.max()), float(rates.min())} if len(rates) else set()
+        return [phase / rate for rate in sorted(ends, reverse=True) for phase in _PHASES]
+
+    def _breaks(self) -> list[float]:
+        """Times (s) from the state on, between those at which expressions and inputs switch."""
+        scene, t = self._linear.model.scene, self._linear.state.t
+        inputs, found = scene.channels, set[float]()
+        for one in acting(scene):
+            found.update(one.expression.time_breaks())
+            found.update(knot for name in one.inputs for knot in inputs[name].knots)
+        ahead = sorted(x - t for x in found if x > t)
+        ahead = ahead[:: max(1, len(ahead) // _BREAKS)]
+        ends = [0.0, *ahead, *([2 * ahead[-1]] if ahead else [])]
+        return [(a + b) / 2 for a, b in pairwise(ends)]
+
+    def _at(self, times: list[float]) -> Iterator[State]:
+        """States so long (s) after the operating point, of those that can be evaluated."""
+        for dt in times:
+            try:
+                state = _state_after(self._linear, dt)
+            except (NumericalFailure, SceneError):
+                continue
+            if state is not None:
+                yield state
+
+
+def equations_at(linear: Equations, state: State) -> Equations:
+    """The same equations at another state of the same motion."""
+    loops = linear.mechanism
+    loops = None if loops is None else loops.at(state)
+    turning, carrying = linear.turning if loops is None else loops.turning, linear.carrying
+    if carrying is not None:
+        carrying = carrying.later(state.t - linear.state.t)
+    return replace(
+        linear, state=state, about=None, mechanism=loops, turning=turning, carrying=carrying
+    )
+
+
+def _state_after(linear: Equations, dt: float) -> State | None:
+    """The state after dt (s); None where closed loops would have to be followed too far."""
+    state, count = linear.state, 1
+    if linear.mechanism is not None:
+        rate = float((np.abs(state.u) / speed_sizes(linear.model)).max(initial=0))
+        count = max(1, int(np.ceil(dt * rate / _STRIDE)))
+        if count > _MOST_STRIDES:
+            return None
+    q, u = state.q, state.u
+    for k in range(count):
+        q, u = _moved(linear, state.t + dt * (k + 1) / count, q, u, dt / count)
+    engine = linear.model.looped
+    memory = engine.start_memory()[None]
+    _, a = engine.accelerations(state.t + dt, q[None].copy(), u[None].copy(), memory)
+    return State(state.t + dt, q, u, a[0])
+
+
+def _moved(linear: Equations, t: float, q: Array, u: Array, dt: float) -> tuple[Array, Array]:
+    """State at t after a step of dt with drives and loops in order, the speeds of x as they are."""
+    model, loops = linear.model, linear.mechanism
+    engine = model.looped
+    rates = engine.rates(t, q, u, engine.start_memory())
+    q = move_steadily(q, rates, dt, model.layout.quaternions.tolist())
+    whole = SceneSystem(engine).start(t, q, u)
+    q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]
+    if loops is not None and model.freedom is not None:
+        places = list(loops.places)
+        ways = model.freedom.following(q, places)
+        u = u + ways @ (linear.state.u[places] - u[places])
+    return q, u
