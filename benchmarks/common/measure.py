@@ -56,10 +56,12 @@ def versions() -> dict[str, str]:
     import mstmm
 
     home = Path(mstmm.__file__).parent
-    commit = subprocess.run(
-        ["git", "-C", str(home), "rev-parse", "--short", "HEAD"], capture_output=True, text=True
-    )
-    found["mstmm"] = f"{mstmm.__version__} {commit.stdout.strip()}".strip()
+    ask = ["git", "-C", str(home), "rev-parse", "--short", "HEAD"]
+    try:
+        commit = subprocess.run(ask, capture_output=True, text=True).stdout.strip()
+    except OSError:  # a machine without git
+        commit = ""
+    found["mstmm"] = f"{mstmm.__version__} {commit}".strip()
     return found
 
 

@@ -362,3 +362,13 @@ def long_chain(n: int) -> Scene:
 def test_ten_thousand_bodies_are_as_much_work_each_as_a_few() -> None:
     assert len(long_chain(10_000).body) == 10_000
     assert calls(lambda: long_chain(1000)) < 2.2 * calls(lambda: long_chain(500))
+
+
+def test_a_body_as_light_as_a_slip_of_units_is_warned_about() -> None:
+    """1000 m with 1 kg: a rod of 1 m whose lengths were written in mm."""
+    rod = {"mass": 1.0, "center_of_mass": [500, 0, 0], "inertia": [1.0, 84e3, 84e3]}
+    rod = {"name": "rod1", **rod}
+    (risk,) = Scene(**one() | {"body": [rod]}).risks
+    assert risk.name == "proportions" and "500 m with a mass of 1 kg" in risk.means
+    assert not risk.doubt
+    assert not Scene(**one() | {"body": [rod | {"mass": 500.0}]}).risks

@@ -380,3 +380,25 @@ def test_an_end_beyond_what_numbers_hold_is_refused() -> None:
     }
     with pytest.raises(SceneError, match=r"head.*1e\+150 at most.*1.7e\+308"):
         Scene(**scene)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"drive": "sped*t"}, "'sped' is no constant of the scene: did you mean \"speed\"?"),
+        ({"drive": "q*t"}, "use law.effort for feedback"),
+        ({"law": {"effort": "sped*t"}}, "'sped' is unknown; did you mean \"speed\"?"),
+        ({"damping": 0.1}, "unknown key; write it inside law, as in law = { damping = ... }"),
+        ({"parent": "ground"}, 'parent: unknown key; did you mean "inboard"?'),
+        ({"child": "rod"}, 'child: unknown key; did you mean "outboard"?'),
+    ],
+)
+def test_slips_of_other_formats_get_the_way_out(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(SceneError) as raised:
+        Scene(**one(**changes), constants={"speed": 3.0})
+    assert message in str(raised.value)
+
+
+def test_units_of_their_own_are_refused() -> None:
+    with pytest.raises(SceneError, match="units: unknown key; scenes are in m, kg, s"):
+        Scene(**one(), units="mm")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from ...expression.expression import Name
 from ..rules.messages import near
+from ..rules.written import constants
 
 if TYPE_CHECKING:
     from ..tables.all import SceneTables
@@ -85,7 +86,8 @@ def _bare(name: Name, scope: Scope) -> str | None:
             return None if name.index in (None, 0) else f"{name.text!r}: a spring has one length"
         return f"{name.text!r} needs the name of a hinge here, as in shoulder.{word}"
     own = ["q", "u"] if scope.own is not None or scope.spring else []
-    return f"{word!r} is unknown{near(word, ['t', *own, 'pi', *parameters, *scope.inputs])}"
+    there = ["t", *own, "pi", *parameters, *scope.inputs, *constants()]
+    return f"{word!r} is unknown{near(word, there)}"
 
 
 def _modal(name: Name, modes: Modal) -> str | None:

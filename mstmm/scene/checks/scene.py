@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import chain as one_after_another
@@ -204,9 +205,27 @@ def risks(scene: SceneTables) -> tuple[Risk, ...]:
             "inertia", name, means, "write 0 for it", entry, 0.0, "kg*m2", doubt=False, before=True,
         ))  # fmt: skip
     return (
-        *found, *notes(scene), *flexible_bodies.risks(scene), *inputs.risks(scene),
-        *idle_loads.risks(scene),
+        *found, *_proportions(scene), *notes(scene), *flexible_bodies.risks(scene),
+        *inputs.risks(scene), *idle_loads.risks(scene),
     )  # fmt: skip
+
+
+#: Extent in m from which a rigid body lighter than this in kg per m is a slip of units.
+_LONG, _THIN = 20.0, 2e-3
+
+
+def _proportions(scene: SceneTables) -> Iterator[Risk]:
+    """Rigid bodies so long and light that their lengths are in mm more often than not."""
+    for _, name, body in _tables(scene):
+        places = [body.center_of_mass, *(end.position for end in body.ends.values())]
+        extent = max(math.dist((0.0, 0.0, 0.0), place) for place in places)
+        if body.type == "rigid" and extent >= _LONG and 0 < body.mass <= _THIN * extent:
+            yield Risk(
+                "proportions", name,
+                f"{name}: it reaches over {extent:g} m with a mass of {body.mass:g} kg",
+                "lengths are in m and masses in kg; convert them if they are not",
+                body.mass / extent, _THIN, "kg/m", doubt=False, before=True,
+            )  # fmt: skip
 
 
 # --- names in expressions -------------------------------------------------------------------------

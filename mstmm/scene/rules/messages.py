@@ -116,12 +116,12 @@ _OF_CHAINS = {
 }
 
 
-#: What else the keys of beams are called.
+#: What else the keys of beams and hinges are called.
 _SYMBOLS = {
     "EI": "bending_stiffness", "EA": "axial_stiffness", "GJ": "torsional_stiffness",
     "GIt": "torsional_stiffness", "rhoA": "mass_per_length", "mu": "mass_per_length",
     "rhoI": "rotary_inertia", "mass": "mass_per_length", "L": "length", "E": "young",
-    "nu": "poisson", "rho": "density",
+    "nu": "poisson", "rho": "density", "parent": "inboard", "child": "outboard",
 }  # fmt: skip
 
 
@@ -132,10 +132,24 @@ def _unknown_key(key: str, model: type[BaseModel], place: Location) -> str:
         return f"{RESERVED[key]} come in a later release; leave {key} out for now"
     if key in _LOOPS and len(place) == 1:
         return "unknown key; write [[hinge]]: one that holds a body held already closes a loop"
+    if key == "units" and len(place) == 1:
+        return (
+            "unknown key; scenes are in m, kg, s, N and rad: convert the numbers and leave it out"
+        )
     keys = [f.alias or name for name, f in model.model_fields.items()]
     if _SYMBOLS.get(key) in keys:
         return f'unknown key; did you mean "{_SYMBOLS[key]}"?'
+    inside = next((name for name in keys if key in _keys_inside(model, name)), None)
+    if inside is not None:
+        return f"unknown key; write it inside {inside}, as in {inside} = {{ {key} = ... }}"
     return f"unknown key{near(key, keys)}"
+
+
+def _keys_inside(model: type[BaseModel], name: str) -> Iterable[str]:
+    """Keys of the table that a key holds; none where it holds no single table."""
+    info = model.model_fields.get(name)
+    held = None if info is None else info.annotation
+    return held.model_fields if isinstance(held, type) and issubclass(held, BaseModel) else ()
 
 
 def _expected(model: type[BaseModel], place: Location) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -74,9 +74,10 @@ def as_number(text: str) -> float | None:
     return Written(found.constant, found.text) if found.constants else found.constant
 
 
-def unknown(text: str) -> str:
-    """What to do about the first name in a text that is to be constant, as '; ...'; else empty."""
-    names = [name.text for name in expression_of(text).names]
+def unknown(text: str, there: Collection[str] = ()) -> str:
+    """What to do about the first name in a text that is neither constant nor `there`, as '; ...';
+    else empty."""
+    names = [name.text for name in expression_of(text).names if name.text not in there]
     if not names:
         return ""
     close = difflib.get_close_matches(names[0], constants(), n=1, cutoff=0.6)

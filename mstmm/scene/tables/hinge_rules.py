@@ -239,10 +239,16 @@ def _drive(
         others = [n for n in entry.names if n.text != "t" and n.text not in written.inputs()]
         if others:
             inputs = " and inputs" if written.inputs() else ""
+            feedback = others[0].text.partition("[")[0] in ("q", "u") or len(others[0].parts) > 1
+            way_out = (
+                "; use law.effort for feedback"
+                if feedback
+                else written.unknown(entry.text, ("t", *written.inputs()))
+            )
             problems.append((
                 place,
                 f"a drive depends on t{inputs} alone, found {others[0].text!r}"
-                f"{around(entry.text, others[0])}; use law.effort for feedback",
+                f"{around(entry.text, others[0])}{way_out}",
             ))  # fmt: skip
         elif entry.depends_on_time_only:
             problems += unsmooth(entry, place)
