@@ -147,3 +147,33 @@ def test_no_rest_is_a_numerical_failure(mstmm: Command, folder: Path) -> None:
     (folder / "driven.toml").write_text(text)
     done = mstmm("modes", "driven.toml")
     assert done.code == 4 and "no equilibrium" in done.err
+
+
+def test_a_coin_that_rolls(mstmm: Command, folder: Path) -> None:
+    """Beside its motion there are A and its motions, the last of w^2 = 12/5 spin^2 - 4/5 g/r."""
+    across = 0.0625
+    (folder / "coin.toml").write_text(f"""gravity = [0, 0, -9.81]
+body = [{{ name = "coin", mass = 1.0, inertia = [{across}, {2 * across}, {across}] }}]
+[[hinge]]
+name = "fly"
+type = "free"
+inboard = "ground"
+outboard = "coin"
+initial = {{ q = [0, 0, 0.5, 1, 0, 0, 0], u = [2, 0, 0, 0, 4, 0] }}
+[[constraint]]
+name = "road"
+type = "rolling"
+from = "ground"
+to = "coin"
+normal = [0, 0, 1]
+radius = 0.5
+axis = [0, 1, 0]
+""")
+    shown = mstmm("linearize", "coin.toml", "--at-start").out
+    assert "trusted: no check speaks against it" in shown
+    assert "-7.848 fly.wx_increment, -2.4 fly.wz" in shown
+    modes = json.loads(mstmm("modes", "coin.toml", "--at-start", "--json").out)
+    assert modes["omega"][-1] == pytest.approx(math.sqrt(12 / 5 * 16 - 4 / 5 * 9.81 / 0.5))
+    assert mstmm("modes", "coin.toml", "--at-start", "--undamped").code != 0
+    assert mstmm("linearize", "coin.toml", "--at-start", "--plot", "a.png").code == 0
+    assert mstmm("linearize", "coin.toml", "--at-start", "-o", "a.csv").code == 0

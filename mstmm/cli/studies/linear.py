@@ -15,10 +15,13 @@ from .asked import Asked, AtStart, Friction, Output, Plot, SceneFile, Set, numbe
 if TYPE_CHECKING:
     from mstmm.arrays import Array
     from mstmm.risk import Assessed
+    from mstmm.runtime.linear.linear import Linear
     from mstmm.runtime.linear.motions import Modes
 
 #: Rows of tables on the terminal; coordinates and bodies that a mode's row names.
 _ROWS, _NAMED, _OWNERS = 20, 3, 2
+#: Entries of A in parts of the largest that are not shown.
+_ROUNDING = 1e-12
 
 
 def linearize(
@@ -49,18 +52,26 @@ def linearize(
         f"coordinates {len(linear)}, inputs {len(linear.inputs)}, "
         f"disturbances {len(linear.disturbances)}"
     )
-    rows = [
-        [name, f"{m:.5g}", f"{c:.5g}", f"{k:.5g}"]
-        for name, m, c, k in zip(
-            linear.coordinates, linear.M.diagonal(), linear.C.diagonal(), linear.K.diagonal(),
-            strict=True,
-        )
-    ]  # fmt: skip
-    head = ["coordinate", "M>", "C>", "K (diagonals)>"]
+    head, rows = _rows_of(linear)
     terminal.console().print(terminal.table("", head, rows[:_ROWS]))
     if len(rows) > _ROWS:
         terminal.say(f"and {len(rows) - _ROWS} more")
     asked.say_where("all matrices: --output FILE.csv or .nc, or --json")
+
+
+def _rows_of(linear: Linear) -> tuple[list[str], list[list[str]]]:
+    """Diagonals of M, C and K; of a model of first order the largest entries of A."""
+    if linear.has_stiffness:
+        diagonals = (matrix.diagonal() for matrix in (linear.M, linear.C, linear.K))
+        numbers = ([f"{x:.5g}" for x in row] for row in zip(*diagonals, strict=True))
+        rows = [[name, *row] for name, row in zip(linear.coordinates, numbers, strict=True)]
+        return ["coordinate", "M>", "C>", "K (diagonals)>"], rows
+    rows, rounding = [], _ROUNDING * abs(linear.A).max(initial=0.0)
+    for name, row in zip(linear.states, linear.A, strict=True):
+        largest = (-abs(row)).argsort(kind="stable")[:_NAMED]
+        places = [k for k in largest if abs(row[k]) > rounding]
+        rows.append([name, ", ".join(f"{row[k]:.5g} {linear.states[k]}" for k in places)])
+    return ["state", "rate (largest entries of A)"], rows
 
 
 def modes(

@@ -12,7 +12,7 @@ from mstmm.arrays import Array
 from .figure import figure, refuse_none, write
 
 if TYPE_CHECKING:
-    from ..equations import Equations
+    from ..state_space import StateSpace
 
 #: Coordinates up to which every row carries its name.
 _NAMED = 40
@@ -22,28 +22,32 @@ _SMALL = 1e-5
 _INNER = 1e-2
 
 
-def matrices(linear: Equations, path: str | Path | None) -> Any:
-    """M, C and K side by side, each by its own colours, which go by decades."""
-    refuse_none(linear.M)
-    named = len(linear) <= _NAMED
-    side = float(np.clip(0.2 * len(linear), 2.4, 6.0)) if named else 4.0
-    made = figure(side + 1.6, 3 * side + 2.4)
-    panels = made.subplots(1, 3, sharey=True)
-    for panel, name in zip(panels, "MCK", strict=True):
+def matrices(linear: StateSpace, path: str | Path | None) -> Any:
+    """M, C and K side by side, or A where there are none, each by its own colours, which go by
+    decades."""
+    drawn, names = ("MCK", linear.coordinates) if linear.has_stiffness else ("A", linear.states)
+    refuse_none(getattr(linear, drawn[0]))
+    named = len(names) <= _NAMED
+    side = float(np.clip(0.2 * len(names), 2.4, 6.0)) if named else 4.0
+    made = figure(side + 1.6, len(drawn) * side + 2.4)
+    panels = made.subplots(1, len(drawn), sharey=True, squeeze=False)[0]
+    for panel, name in zip(panels, drawn, strict=True):
         matrix = getattr(linear, name)
         _map(made, panel, matrix)
         panel.set_title(name if matrix.any() else f"{name} = 0", fontsize=11)
         if named:
-            panel.set_xticks(range(len(linear)), linear.coordinates, rotation=90, fontsize=7)
-            panel.set_yticks(range(len(linear)), linear.coordinates, fontsize=7)
+            panel.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
+            panel.set_yticks(range(len(names)), names, fontsize=7)
         panel.set_xlabel(_unit(linear, name), fontsize=8)
         panel.tick_params(length=0)
     write(made, path)
     return made
 
 
-def _unit(linear: Equations, name: str) -> str:
+def _unit(linear: StateSpace, name: str) -> str:
     """Of the entries, where all coordinates have the same."""
+    if name == "A":
+        return "rates of rows per column"
     units = set(linear.units)
     if len(units) > 1:
         return "rows in N or N*m"
