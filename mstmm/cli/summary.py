@@ -149,6 +149,7 @@ def _certificate(result: Result) -> dict[str, Any]:
         **plain,
         "error": {
             "q": error.largest("q"), "u": error.largest("u"), "until": error.horizon,
+            "covered": error.covered,
             "tenfold_every": error.tenfold, "reference": error.reference,
         },
     }  # fmt: skip

@@ -154,7 +154,7 @@ def _one(
 
 def gathered(result: Result | None, reach: float) -> tuple[dict[str, Evidence], str]:
     """The evidence, and why there is none."""
-    if result is None or not result.success:
+    if result is None or not result.is_comparable:
         return {}, "" if result is None else result.message
     try:
         return evidence_of(result, reach), ""

@@ -91,7 +91,7 @@ def _wanted(one: Tried, runs: Runs, of: tuple[str, ...], error: float) -> Settin
     except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
         return None
     known = result.error_estimate
-    if known is None or not result.success:
+    if known is None or not result.is_comparable:
         return None
     return Setting(known.method, one.name, known.rtol)
 

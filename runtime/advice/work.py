@@ -142,7 +142,7 @@ class Work:
 
 def size_of(measure: Measure, result: Result | None) -> float:
     """How far what is compared goes in a run; 1 where that is not known."""
-    if result is None or not result.success:
+    if result is None or not result.is_comparable:
         return 1.0
     numbers = measure.read(result)
     measure.scale_by(numbers)

@@ -80,7 +80,7 @@ class Runs:
             result, _ = self.simulate(model, setting, limit, own_steps=True)
         except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
             return np.zeros(0)
-        return result.t if result.success else np.zeros(0)
+        return result.t if result.is_comparable else np.zeros(0)
 
     def simulate(
         self, model: Model, setting: Setting, limit: float, own_steps: bool = False
@@ -100,7 +100,7 @@ class Runs:
         with interruptible() as interrupted:  # short runs end before they look at it
             begin = time.process_time()
             result = model.simulate(self.t_end, output_times=times, progress=alarm, **options)
-            if isinstance(result, OneWayResult) and result.success:
+            if isinstance(result, OneWayResult) and result.is_comparable:
                 _ = result.cost  # makes the elastic response, which is part of what it is for
             spent = time.process_time() - begin
         if interrupted or result.status is None:
@@ -118,7 +118,7 @@ class Runs:
 
         try:
             result, spent = self.simulate(model, setting, limit)
-            if not result.success:
+            if not result.is_comparable:
                 return without(result.message)
             numbers = measure.read(result)
         except OutOfTime:
@@ -130,7 +130,7 @@ class Runs:
         if not np.isfinite(numbers).all():
             return without("not all of its numbers are finite")
         warnings, too_coarse = _told(result)
-        ended = result.message if result.status is Status.STOPPED else ""
+        ended = "" if result.status is Status.FINISHED else result.message
         return Trial(
             setting, spent, result.t, result.q, numbers, result.statistics, ended, warnings,
             too_coarse,

@@ -36,12 +36,16 @@ _ARGUMENTS = {
 
 
 class Status(IntEnum):
-    """Why the C loop came back; negative values are failures (`MSTMM_*` of the C header)."""
+    """Why the C loop came back; negative values are failures (`MSTMM_*` of the C header).
+
+    CAME_TO_REST is not of C: an event stopped the run because its bounces follow ever faster.
+    """
 
     RUNNING = 0
     FINISHED = 1
     STOPPED = 2
     BUFFER_FULL = 3
+    CAME_TO_REST = 4
     STEP_TOO_SMALL = -1
     NOT_FINITE = -2
     RHS_FAILED = -3

@@ -37,7 +37,7 @@ def simulate(
         watch.checkpoint = Checkpoint(path_of("checkpoint", checkpoint), model, settings, q, u)
     run = first_run(model, settings, q, u, watch, resume)
     run = seen.given(run, q, u)
-    error = second_run(model, run, q, u, watch) if certify and run.success else None
+    error = second_run(model, run, q, u, watch) if certify and run.is_comparable else None
     if watch.notes:
         run = replace(run, notes=(*run.notes, *watch.notes))
     result = result_of(model, run, error)

@@ -186,7 +186,7 @@ def _verdict(c: Certificate, accuracy: float, balance: float | None) -> Verdict:
     if c.samples < 2:
         missing.append("one sample tells nothing of energy and momentum")
     if c.error is not None:
-        against += _inaccurate(c, accuracy)
+        against += _uncovered(c.error) + _inaccurate(c, accuracy)
     elif c.reached is None:
         missing.append("no second run has told its error (certify=True)")
     against += c.doubts
@@ -196,6 +196,16 @@ def _verdict(c: Certificate, accuracy: float, balance: float | None) -> Verdict:
     return Verdict(
         tuple(dict.fromkeys(against)), tuple(missing), f"{words}, balances within {kept:g}"
     )  # fmt: skip
+
+
+def _uncovered(error: ErrorEstimate) -> list[str]:
+    """That a second run which failed tells nothing of the error behind where it ended."""
+    if error.covered is None:
+        return []
+    return [
+        f"the error is not known beyond t = {error.covered:.4g} s, where the second run ended; a "
+        "shorter run, or other tolerances, may let it end"
+    ]
 
 
 def _inaccurate(c: Certificate, accuracy: float) -> list[str]:
@@ -232,8 +242,12 @@ def _error_rows(c: Certificate) -> list[tuple[str, str]]:
         return rows + covered if rows else missing
     within = error.horizon is not None and not error.nowhere
     until = f" up to t = {error.horizon:.6g} s" if within else ""
+    whole = "over the whole run"
+    if error.covered is not None:
+        whole = f"up to t = {error.covered:.6g} s, none beyond"
+        until = until or f" {whole}"
     for kind in ("q", "u"):
-        at_all = "; " + _values(error.whole(kind)) + " over the whole run" if within else ""
+        at_all = f"; {_values(error.whole(kind))} {whole}" if within else ""
         values = _values(error.largest(kind) if within else error.whole(kind))
         if values:
             about = f" (from a second run, {error.reference})" if kind == "q" else ""

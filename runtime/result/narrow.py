@@ -90,7 +90,7 @@ def _every_step(model: Compiled, run: Trajectory) -> Trajectory | None:
     t_end = run.settings.t_end if run.last is None else run.last[0]
     settings = replace(run.settings, t_end=t_end, output_times=None)
     again = first_run(model, settings, q, u, Watch(None, settings))
-    return replace(again, start=(q, u)) if again.success else None
+    return replace(again, start=(q, u)) if again.is_comparable else None
 
 
 def _risk(what: str, name: str, unit: str, place: float, way: float, longest: float) -> Risk:

@@ -72,16 +72,23 @@ class Record(FlexibleResults, ABC):
 
     @property
     def success(self) -> bool:
-        """True if the run reached its end or was stopped by an event, with finite numbers: states,
-        energies and momenta of every sample.  It does not say that they are right: see `trusted`.
+        """True if the run reached its end or an event was asked to stop it, with finite numbers:
+        states, energies and momenta of every sample.  Bounces that come to rest end a run before
+        its time, which is no success.  It does not say that numbers are right: see `trusted`.
         """
-        return self.trajectory.success and not self._unusable
+        return self.is_comparable and self.status is not Status.CAME_TO_REST
+
+    @property
+    def is_comparable(self) -> bool:
+        """True if the run can be compared with others of the scene: a success, or one that ended
+        early because bounces came to rest."""
+        return self.trajectory.is_comparable and not self._unusable
 
     @property
     def message(self) -> str:
         """Why the run ended, as a sentence; and which of its samples cannot be used."""
         text, unusable = self.trajectory.message, self._unusable
-        if not unusable or not self.trajectory.success:
+        if not unusable or not self.trajectory.is_comparable:
             return text
         text = f"{text}, but {unusable}"
         return text if self._step is None else self._step.blamed(text)

@@ -77,6 +77,8 @@ class ErrorEstimate:
         tenfold: s in which errors grow tenfold, None if they do not grow exponentially.
         reference: how the second run was made.
         moved: unit -> how far coordinates of that unit went, against which errors are judged.
+        covered: s up to which the second run went where it failed before the end of the first:
+            nothing is known of the error beyond; None for the whole run.
     """
 
     t: Array
@@ -86,6 +88,7 @@ class ErrorEstimate:
     tenfold: float | None
     reference: str
     moved: dict[str, float] = field(default_factory=dict)
+    covered: float | None = None
 
     @property
     def nowhere(self) -> bool:
@@ -93,12 +96,14 @@ class ErrorEstimate:
         return self.horizon is not None and self.horizon <= self.t[0]
 
     def whole(self, kind: str = "q") -> dict[str, float]:
-        """Unit -> largest difference of the two runs, as an error, whatever the horizon."""
+        """Unit -> largest difference of the two runs as far as both went, as an error, whatever
+        the horizon."""
         values: dict[str, Array] = getattr(self, kind)
         return {unit: float(v.max(initial=0.0)) for unit, v in values.items()}
 
     def largest(self, kind: str = "q") -> dict[str, float]:
-        """Unit -> largest error of q or u before the horizon (over the whole run without one)."""
+        """Unit -> largest error of q or u before the horizon (as far as both runs went without
+        one)."""
         within = self.t < np.inf if self.horizon is None else self.t <= self.horizon
         values: dict[str, Array] = getattr(self, kind)
         return {unit: float(v[within].max(initial=0.0)) for unit, v in values.items()}
@@ -177,7 +182,8 @@ def compare(
     path = first.q if start is None or len(first.q) > 1 else np.vstack([start, first.q])
     moved = excursions(layout, path)
     horizon = _horizon(t, q, moved, first.settings.t_start)
-    return ErrorEstimate(t, q, u, horizon, _tenfold(t, [*q.values()]), reference, moved)
+    covered = None if second.is_comparable else float(t[-1])
+    return ErrorEstimate(t, q, u, horizon, _tenfold(t, [*q.values()]), reference, moved, covered)
 
 
 def _groups(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str, Array]]:

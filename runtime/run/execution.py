@@ -137,7 +137,7 @@ def first_run(
         found = replace(found, before=watch.before)
     if watch.choice is not None:
         found = replace(found, methods=tuple(watch.choice.stretches))
-    if status is not None and not found.success:
+    if status is not None and not found.is_comparable:
         found = replace(found, message=_cause(engine, found, q, u))
     if beginnings is None:
         put_back(model, settings, at_start)
@@ -197,7 +197,7 @@ def second_run(
     settings, reference = tighter(first, known.breaks.tolist())
     watch.run = 1
     second = first_run(model, settings, q, u, watch)
-    if not second.success:
+    if not second.is_comparable:
         why = "it was interrupted" if second.status is None else second.message
         watch.notes.append(f"the second run, for the error, did not reach the end: {why}")
     if alike(first, second):

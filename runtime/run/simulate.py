@@ -19,7 +19,7 @@ from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO, Tableau, check_steps, get
 from ..integrate.steppers.implicit import Alpha
 from ..pack.loops.refusal import refuse_method, refuse_of_speeds
-from .endings import message_of
+from .endings import message_of, rest_of
 from .method_choice import Choice
 from .notes import endless, unresolved, unseen
 from .system import SceneSystem
@@ -151,6 +151,8 @@ def trajectory(
     """Samples of a run, behind those of an earlier process, split into q, u and work."""
     samples = run.samples if earlier is None else Samples.joined([earlier, run.samples])
     failure = run.failure
+    if status is Status.STOPPED and rest_of(system, run.event):
+        status = Status.CAME_TO_REST
     found = split(
         system, samples, settings, status, message, run.statistics, (run.t, run.y),
         None if failure is None else failure.time,

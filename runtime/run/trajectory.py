@@ -59,6 +59,12 @@ class Trajectory:
 
     @property
     def success(self) -> bool:
-        """True if the run reached its end or an event stopped it, with finite numbers."""
-        done = self.status in (Status.FINISHED, Status.STOPPED)
+        """True if the run reached its end or an event was asked to stop it, with finite numbers."""
+        return self.is_comparable and self.status is not Status.CAME_TO_REST
+
+    @property
+    def is_comparable(self) -> bool:
+        """True if the run has finite numbers up to where it is defined: to its end, to an event
+        that was asked to stop it, or to where bounces came to rest."""
+        done = self.status in (Status.FINISHED, Status.STOPPED, Status.CAME_TO_REST)
         return done and bool(np.isfinite(self.q).all() and np.isfinite(self.u).all())

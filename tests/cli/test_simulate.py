@@ -358,3 +358,31 @@ def test_the_choice_of_methods_is_told(mstmm: Command, folder: Path) -> None:
     assert "from t = 0 s" not in plain.out
     refused = mstmm("simulate", "stiff.toml", *command, "--step", "0.1")
     assert refused.code == 2 and "chooses its steps" in refused.err
+
+
+def test_bounces_that_come_to_rest_are_no_success(mstmm: Command, folder: Path) -> None:
+    """Flights of sqrt(2 h / g) (1 + e) / (1 - e) in all: 1.35 s of the 5 s asked for."""
+    (folder / "ball.toml").write_text(
+        """
+gravity = [0, -9.81, 0]
+[[body]]
+name = "ball"
+mass = 0.2
+[[hinge]]
+name = "fall"
+type = "prismatic"
+inboard = "ground"
+outboard = "ball"
+axis = [0, 1, 0]
+initial = { q = [1.0] }
+[[event]]
+name = "floor"
+when = "ball.y <= 0"
+do = "bounce"
+restitution = 0.5
+"""
+    )
+    done = mstmm("simulate", "ball.toml", "--t-end", "5", "--json", "-o", "run.csv")
+    data = json.loads(done.out)
+    assert done.code == 4 and not data["success"] and not data["trusted"]
+    assert "come to rest" in done.err

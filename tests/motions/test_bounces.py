@@ -11,6 +11,7 @@ from loops.test_four_bar import linkage
 from loops.test_heavy import LENGTHS, chain
 
 import mstmm
+from mstmm.runtime.integrate.loop import Status
 
 Scene = dict[str, Any]
 G = 9.81
@@ -34,10 +35,13 @@ def model(scene: Scene) -> mstmm.Model:
 @pytest.mark.parametrize("when", ["ball.y <= 0", "fall.q < 0"])
 @pytest.mark.parametrize("method", ["dop853", "scipy-DOP853"])
 def test_a_ball_loses_its_height_by_squares(when: str, method: str) -> None:
-    """Heights e^(2k), times of flight 2 sqrt(2 h / g) each; then it rests, and the run says so."""
-    result = model(ball(when=when)).simulate(20.0, method, rtol=1e-10, atol=1e-12)
-    assert result.success, result.message
+    """Heights e^(2k), times of flight 2 sqrt(2 h / g) each; then it rests, before the end of the
+    run, which says so and is no success."""
+    result = model(ball(when=when)).simulate(20.0, method, rtol=1e-10, atol=1e-12, certify=True)
+    assert result.status is Status.CAME_TO_REST and not result.success and not result.trusted
     assert "come to rest" in result.message
+    assert "come to rest" in str(result.certificate.verdict())
+    assert result.certificate.error is not None
     assert abs(result.t[-1] - np.sqrt(2 / G) * (1 + 2 * 0.8 / 0.2)) < 1e-5
     again = np.flatnonzero(result.trajectory.event > 0)[:20]
     heights = result.u[again, 0] ** 2 / (2 * G)
@@ -202,7 +206,7 @@ def test_a_blade_strikes_the_floor(end: str, height: float) -> None:
     """All shapes are struck with it: the mass matrix, and slopes of the height by differences."""
     one = bladed(f"{end}.y < {height}")
     run = one.simulate(1.0, rtol=1e-9, certify=True)
-    assert run.success and run.certificate.energy.relative < 1e-8
+    assert run.is_comparable and run.certificate.energy.relative < 1e-8
     hit = int(np.flatnonzero(run.trajectory.event > 0)[0])
     q, before, behind = run.q[hit], run.u[hit - 1], run.u[hit]
 
@@ -306,6 +310,15 @@ def test_a_ball_comes_to_rest_on_its_floor(method: str, restitution: float) -> N
     assert run.q.min() > -1e-9
     ideal = np.sqrt(2 * height / G) * (1 + restitution) / (1 - restitution)
     assert run.t[-1] == pytest.approx(ideal, rel=1e-4)
+
+
+def test_a_stop_that_was_asked_for_is_a_success() -> None:
+    scene = ball(when="ball.y <= 0")
+    low = {"name": "low", "when": "ball.y < 0.5", "do": "stop"}
+    scene["event"] = [*scene["event"], low]
+    run = model(scene).simulate(20.0)
+    assert run.status is Status.STOPPED and run.success
+    assert run.t[-1] == pytest.approx(np.sqrt(1.0 / G), rel=1e-9)
 
 
 @pytest.mark.parametrize("push", [1.0, -1.0])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,8 +13,11 @@ from support.models import model_of
 from support.result_scenes import motor, pins
 
 import mstmm
+from mstmm.runtime.integrate.settings import Settings
 from mstmm.runtime.result.result import Result
+from mstmm.runtime.run import execution
 from mstmm.runtime.run.error_estimate import alike, tighter
+from mstmm.runtime.run.trajectory import Trajectory
 
 
 def true_error(run: Result) -> float:
@@ -84,3 +90,27 @@ def test_one_output_time_is_enough_for_an_estimate() -> None:
     assert error is not None
     assert error.horizon == 0.0
     assert estimated(lost) > 0.1
+
+
+def test_a_second_run_that_fails_tells_only_of_the_time_that_it_covers(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It is given up after fifty steps: nothing vouches for what the first run did beyond."""
+
+    def given_up(first: Trajectory, breaks: Sequence[float] = ()) -> tuple[Settings, str]:
+        settings, reference = tighter(first, breaks)
+        return replace(settings, max_steps=50), reference
+
+    model, times = mstmm.compile(pins(2, [1.0, 0.5])), np.linspace(0.0, 5.0, 101)
+    assert model.simulate(5.0, rtol=1e-6, output_times=times, certify=True).trusted
+    monkeypatch.setattr(execution, "tighter", given_up)
+    run = model.simulate(5.0, rtol=1e-6, output_times=times, certify=True)
+    error = run.certificate.error
+    assert run.success and not run.trusted
+    assert error is not None and error.covered is not None and 0.1 < error.covered < 4.0
+    assert error.covered == error.t[-1]
+    told = f"up to t = {error.covered:.6g} s, none beyond"
+    assert told in run.certificate.text()
+    assert "the error is not known beyond" in str(run.certificate.verdict())
+    again = mstmm.load_result(run.save(tmp_path / "run.nc"))
+    assert told in again.certificate.text() and not again.trusted

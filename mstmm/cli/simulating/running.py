@@ -51,7 +51,7 @@ def saved(plan: Plan, result: Result, seconds: float, progress: Bar) -> Result:
     resumed is no short one.
     """
     short = seconds < SHORT and not plan.resume and plan.error is None
-    if result.trajectory.success and (short if plan.certify is None else plan.certify):
+    if result.trajectory.is_comparable and (short if plan.certify is None else plan.certify):
         from mstmm.runtime.result.output import storage
 
         storage.save(result, plan.output)

@@ -129,7 +129,7 @@ class Search:
         run = first_run(self._model, settings, self._q, self._u, watch, beginnings=self._beginnings)
         spent = time.process_time() - begin
         self._notes += [note for note in watch.notes if note not in self._notes]
-        if not run.success:
+        if not run.is_comparable:
             self._failed.append(_attempt(run, spent, None, run.message))
             return run
         self._made.append(_Made(run, self._numbers(run), spent, kind_of_run(run)))
@@ -318,7 +318,7 @@ def simulate(
 ) -> Result:  # fmt: skip
     """The result of a search, and with `certify` of a second run beside it."""
     result = Search(model, settings, wanted, q, u, seen, progress).result()
-    return certified(result, progress) if certify and result.trajectory.success else result
+    return certified(result, progress) if certify and result.trajectory.is_comparable else result
 
 
 def _looked_at(settings: Settings) -> tuple[float, ...]:

@@ -150,7 +150,7 @@ def _sampled(model: Compiled, run: Trajectory, grid: Cells) -> Trajectory:
     times = tuple(grid.samples.tolist())
     settings = replace(s, t_start=t, t_end=times[-1], output_times=times, first_step=0.0)
     repeated = first_run(model, settings, q, u, Watch(None, settings))
-    if not repeated.success or repeated.t[-1] < times[-1]:
+    if not repeated.is_comparable or repeated.t[-1] < times[-1]:
         raise NumericalFailure(
             f"one-way response: the run could not be repeated: {repeated.message}"
         )

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 #: Version of the layout of a saved result.
 FORMAT = 1
 
-_ERROR = ("horizon", "tenfold", "reference", "moved")
+_ERROR = ("horizon", "tenfold", "reference", "moved", "covered")
 
 Variable = tuple[tuple[str, ...], Any, dict[str, str]]
 

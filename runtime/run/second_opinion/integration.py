@@ -230,7 +230,8 @@ class _Loop:
         """The end of a run that an event stops, or what comes to rest there."""
         scene = self.system.scene
         said = f"stopped by {scene.event_names[event]} at t = {self.t:.9g} s"
-        return Ended(Status.STOPPED, said + rest_of(scene, event))
+        rest = rest_of(scene, event)
+        return Ended(Status.CAME_TO_REST if rest else Status.STOPPED, said + rest)
 
     def refuse_start(self, y: Array) -> None:
         """SciPy chooses its first step from the rates: from nan a step that never ends."""
