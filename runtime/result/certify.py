@@ -15,6 +15,7 @@ from .conditioning import LARGEST, pivot_loss, singular_distance
 from .control import control
 from .flexible import certify
 from .narrow import passed_over
+from .owners.contacts import find_pulling_contacts
 from .record import Record
 from .risks import of_outputs
 
@@ -44,7 +45,12 @@ def certificate(result: Record, error: ErrorEstimate | None) -> Certificate:
         give=gives.stiffest(result),
         failures=() if result.success else (result.message,),
         models=result._outside(),
-        known=(*run.risks, *passed_over(result.model, run), *of_outputs(run, result.outputs())),
+        known=(
+            *run.risks,
+            *passed_over(result.model, run),
+            *find_pulling_contacts(result),
+            *of_outputs(run, result.outputs()),
+        ),
         reached=run.reached,
         closure=closure(result.model, run),
     )
