@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mstmm.arguments import yes_or_no
-from mstmm.arrays import Array, one, pair, real
+from mstmm.arrays import Array, one, pair, real, whole
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import NumericalFailure
 from mstmm.markup import Displayed, table
@@ -119,15 +119,22 @@ class Model(Linearised, Displayed):
                 quantity_of(output, start.t, start.quantity)
 
     def equilibrium(
-        self, q: ArrayLike | None = None, t: float = 0.0, tolerance: float = 1e-10
+        self,
+        q: ArrayLike | None = None,
+        t: float = 0.0,
+        tolerance: float = 1e-10,
+        *,
+        max_steps: int = 2000,
+        progress: Callable[[int, float], None] | None = None,
     ) -> Equilibrium:
-        """q (nq,) at which every acceleration vanishes at rest, by Newton from `q` (or the start).
+        """q (nq,) at which every acceleration vanishes at rest, downhill from `q` (or the start).
 
         `tolerance` is how far coordinates may be off: rad, or parts of the length of what they
         move.  The array found has `residuals`, the efforts still missing by the names of speeds,
-        and `unstable`, those with which it leaves a saddle.  Where Newton's method fails, what is
-        missing at the start is applied in parts.  Hinges that nothing counts turns of end within
-        half a turn of the start.
+        and `unstable`, those with which it leaves a saddle.  Steps that lead downhill become those
+        of Newton's method, O(bodies) each, with closed loops too; `max_steps` of them are taken at
+        most, and `progress` is called with the number and the length of every one, in rad or parts
+        of lengths.  Hinges that nothing counts turns of end within half a turn of the start.
 
         Drives are where they are at t (s), loads what they are then.  Where drives move there, what
         is found is the rest beside them, which has to last: as long as they go on, no effort may be
@@ -142,8 +149,9 @@ class Model(Linearised, Displayed):
 
         instead = "call equilibrium for each of several"
         start = self.initial_state()[0] if q is None else one("q", q, self.nq, instead)
-        t = real("t", t, "a time in s")
-        found = equilibrium(self, start, t, real("tolerance", tolerance))
+        t, tolerance = real("t", t, "a time in s"), real("tolerance", tolerance)
+        most = whole("max_steps", max_steps, 1, "a number of steps from 1 on")
+        found = equilibrium(self, start, t, tolerance, most, progress)
         linearise = partial(self.linearize, np.asarray(found), None, t, inputs=(), disturbances=())
         return check_lasting(self, found, t, linearise)
 

@@ -75,12 +75,16 @@ static int changes_of(mstmm_tangent *at, const mstmm_parts *parts, int pass, rea
     return code;
 }
 
-/* The same where rows are asked of positions: in a step those go by accelerations alone. */
-static int changes_at_end(mstmm_tangent *at, const mstmm_parts *parts, int pass, real *changes)
+/* The same where rows are asked of positions: in a step those go by accelerations alone, of a small
+ * motion x by what would be accelerations along it, however small or large s is. */
+static int changes_at_end(mstmm_tangent *at, const mstmm_parts *parts, const real *x, int pass,
+                          real *changes)
 {
     const size_t speeds = (size_t)at->model->nu * sizeof(real);
     real *loads = mstmm_across_missing(at);
     memcpy(parts->still_efforts, parts->d_a, speeds);
+    for (int j = 0; at->rows_of_motion && j < at->model->nu; j++)
+        parts->still_efforts[j] = (1 + at->s) * x[j];
     int code = changes_of(at, parts, pass, changes);
     memcpy(loads, changes, (size_t)n_changes(at) * sizeof(real));
     memset(parts->d_q, 0, (size_t)at->model->nq * sizeof(real));
@@ -106,8 +110,8 @@ static int changes_along(mstmm_tangent *at, const real *x, const mstmm_known *kn
     }
     for (int i = 0; known && i < model->nq; i++) parts.d_q[i] += known->q[i];
     for (int j = 0; known && j < model->nu; j++) parts.d_a[j] += known->a[j];
-    return at->on_positions ? changes_at_end(at, &parts, pass, changes)
-                            : changes_of(at, &parts, pass, changes);
+    return at->on_positions || at->rows_of_motion ? changes_at_end(at, &parts, x, pass, changes)
+                                                  : changes_of(at, &parts, pass, changes);
 }
 
 int mstmm_coupled_along(mstmm_tangent *at, const real *x, const real *d_u, const real *d_a,

@@ -45,6 +45,7 @@ typedef struct {
     int known;            /* there has been a residual since the memory changed */
     int laws_alone;       /* the last tangent was that of mstmm_laws_factor */
     int on_positions;     /* rows are asked of positions alone: see mstmm_across_solve */
+    int rows_of_motion;   /* rows are those of small motions x, J x = 0, whatever s is */
     int counts;           /* pivots may be negative: somebody counts them */
     int keeps, kept;      /* tangents leave S of every body, as increments that are known ask for */
     real t, rate, s, sq, kappa; /* of the last residual and tangent */

@@ -151,6 +151,24 @@ def by_hinges(system: System, slides: Mapping[int, Collection[int]]) -> System:
     return _with_bodies(system, changed)
 
 
+def with_rotors(system: System, inertia: Sequence[float]) -> System:
+    """With rotors of `inertia` (nu,) besides those there are on the hinges, but for what closes
+    loops."""
+    frames, first = {one.frame for one in system.closures}, system.places["u"].tolist()
+
+    def turning(body: BodyNumbers, place: int) -> BodyNumbers:
+        own = zip(body.rotor, inertia[first[place] : first[place] + body.nu], strict=True)
+        return replace(body, rotor=tuple(float(one + more) for one, more in own))
+
+    def made(run: BodyRun) -> BodyRun:
+        last = len(run.alike) - 1
+        places = [run.place + (k if k < last else run.count - 1) for k in range(last + 1)]
+        return replace(run, alike=tuple(map(turning, run.alike, places)))
+
+    runs = tuple(run if run.place in frames else made(run) for run in system.bodies)
+    return replace(system, bodies=runs)
+
+
 def _moment(system: System) -> float:
     return (_GYRATION * length_of(system)) ** 2
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
-from ...engine.rest import Rest, Undetermined, Unsettled, at_rest
+from ...engine.statics.rest import Rest, Undetermined, Unsettled, at_rest
 from ...flexible.modal_body import ModalBody
 from ...flexible.sizes import modal_sizes
 from ...pack.layout import HingeSlots

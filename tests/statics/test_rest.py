@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mstmm.errors import NumericalFailure
-from mstmm.runtime.engine.rest import Rest, Undetermined, Unsettled, at_rest
+from mstmm.runtime.engine.statics.rest import Rest, Undetermined, Unsettled, at_rest
 
 Array = NDArray[np.float64]
 

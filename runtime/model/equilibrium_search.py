@@ -1,0 +1,206 @@
+"""The way of a model to static equilibrium: by sweeps, or by a stiffness matrix of differences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure, SceneError
+
+from ..engine.engine import Engine
+from ..engine.loops.calls import LoopCalls
+from ..engine.loops.freedom import Freedom
+from ..engine.sizes import scene_length, speed_sizes
+from ..engine.statics.rest import Rest, approached, leaving
+from ..engine.statics.rest_by_sweep import RestBySweep
+from ..engine.statics.shifted_stiffness import ShiftedStiffness
+from ..engine.statics.stability import Stability, find_stability
+from ..engine.tangent import Tangent
+from ..pack.loops.variants import with_rotors
+from ..pack.pack import packed_system
+from ..run.at_rest.mechanism import Mechanism
+from ..run.system import SceneSystem
+
+if TYPE_CHECKING:
+    from ..engine.compiled import Compiled
+
+#: Free speeds of trees, and of mechanisms, up to which a stiffness matrix by differences is made
+#: where the sweep finds no rest.
+_DENSE, _DENSE_LOOPS = 20, 6
+#: Of mechanisms with more speeds left than these, those that decide all others are not looked for.
+DECIDING = 200
+#: Efforts along motions of loops that are rounding, in parts of the work of all that cancel.
+_CANCELLED = 1e-14
+#: How often a saddle is left, and how far, in sizes of the coordinates.
+_LEFT, _ASIDE = 4, 0.05
+
+#: Called with the number of every step and how long it is, in sizes of the coordinates.
+Progress = Callable[[int, float], None]
+
+
+class EquilibriumSearch:
+    """The way of one model to rest at time t: by the sweep, and of few coordinates, where that
+    finds none, by a stiffness matrix of differences and with the load in parts."""
+
+    def __init__(self, model: Compiled, t: float) -> None:
+        self._model, self._t = model, t
+        few = len(model.free_speeds) if model.closed is None else model.closed.loops.mobility
+        self._is_decided = few <= DECIDING
+        self._is_small = few <= (_DENSE if model.freedom is None else _DENSE_LOOPS)
+        self._stiffness: ShiftedStiffness | None = None
+        self._scene: SceneSystem | None = None
+        try:
+            engine = _with_rotors(model)
+            self._stiffness = ShiftedStiffness(Tangent(engine), t, speed_sizes(model))
+            self._scene = SceneSystem(engine, with_power=False)
+        except SceneError:  # elements of before there were derivatives
+            if not self._is_small:
+                raise
+        self._by_differences: Rest | None = None
+
+    def find(
+        self, q: Array, tolerance: float, max_steps: int, progress: Progress | None
+    ) -> tuple[Array, Stability]:
+        """q at rest, and its stability; saddles that were found on the way are left again."""
+        if self._stiffness is None:
+            return self._find_by_differences(q, tolerance)
+        sweep = RestBySweep(self._stiffness, self._settled, max_steps, progress)
+        try:
+            found = sweep.find(q, tolerance)
+        except NumericalFailure as failure:
+            if not self._is_small:
+                raise
+            try:
+                return self._find_by_differences(q, tolerance)
+            except NumericalFailure:
+                raise failure from None
+        stability = find_stability(self._stiffness, found)
+        for _ in range(_LEFT if sweep.steps else 0):
+            if not stability.unstable:
+                break
+            try:
+                beside = sweep.find(self._beside(found, stability.unstable[0]), tolerance)
+            except NumericalFailure:
+                break
+            found, stability = beside, find_stability(self._stiffness, beside)
+        return found, stability
+
+    def _settled(self, q: Array) -> Array:
+        """The state nearby with drives, quaternions and loops in order."""
+        assert self._scene is not None
+        try:
+            return self._scene.start(self._t, q, np.zeros(self._model.nu))[: len(q)]
+        except SceneError as error:
+            raise NumericalFailure(str(error)) from None
+
+    def _beside(self, q: Array, motion: Array) -> Array:
+        """q a little way along a motion (nu,)."""
+        assert self._stiffness is not None
+        step = _ASIDE / self._stiffness.length(motion) * motion
+        return np.asarray(q + self._stiffness.tangent.rates(q, step))
+
+    def _find_by_differences(self, q: Array, tolerance: float) -> tuple[Array, Stability]:
+        model = self._model
+        if model.freedom is not None:
+            problem = _of_mechanism(model, model.freedom, q, self._t)
+        else:
+            problem = _problem(model, self._t, list(model.free_speeds))
+        found = approached(problem, q, tolerance)
+        self._by_differences = problem = problem.at(found)
+        units = np.eye(model.nu)
+        return found, Stability([units[problem.places[k]] for k in leaving(problem, found)])
+
+    def residuals(self, q: Array) -> dict[str, float]:
+        """Efforts that are missing at a rest, by the names of speeds."""
+        model, freedom, stiffness = self._model, self._model.freedom, self._stiffness
+        if stiffness is None or self._by_differences is not None:
+            assert self._by_differences is not None
+            places, efforts = self._by_differences.places, self._by_differences.needed(q)
+        elif freedom is None or not self._is_decided:
+            own, missing = set(stiffness.own.tolist()), stiffness.residual(q)
+            places = tuple(j for j in model.free_speeds if j not in own)
+            efforts = missing[list(places)]
+        else:
+            places = freedom.chosen(q)
+            efforts = freedom.following(q, places).T @ stiffness.residual(q)
+        return {model.layout.u_name(j): float(x) for j, x in zip(places, efforts, strict=True)}
+
+
+def _with_rotors(model: Compiled) -> Engine:
+    """The engine of the model with rotors on all hinges, as heavy as the scene: what the way to
+    rest may go by."""
+    packed = model.packed
+    masses = [body.mass for body in model.scene.bodies.by_name.values() if hasattr(body, "mass")]
+    rotors = (sum(masses) or 1.0) * (scene_length(model) / speed_sizes(model)) ** 2
+    heavy = Engine(packed_system(with_rotors(packed.system, rotors.tolist()), packed))
+    if model.closed is not None:
+        LoopCalls(heavy, model.closed.start[0])  # judges its rows
+    return heavy
+
+
+def _problem(model: Compiled, t: float, free: list[int]) -> Rest:
+    engine, still = model.looped, np.zeros(model.nu)
+    memory, quaternions = engine.start_memory(), model.layout.quaternions
+    straight = _straight_places(model, free)
+
+    def needed(q: Array) -> Array:
+        return np.asarray(engine.inverse_dynamics(t, q, still, still, memory)[free])
+
+    def moved(q: Array, increment: Array) -> Array:
+        if straight is not None:
+            result = q.copy()
+            result[straight] += increment
+            return result
+        speeds = np.zeros(model.nu)
+        speeds[free] = increment
+        result = q + engine.rates(t, q, speeds, memory)
+        for first in quaternions:
+            unit = result[first : first + 4]
+            result[first : first + 4] = unit / np.linalg.norm(unit)
+        return np.asarray(result)
+
+    return Rest(needed, moved, speed_sizes(model)[free], tuple(free))
+
+
+def _of_mechanism(model: Compiled, freedom: Freedom, q: Array, t: float) -> Rest:
+    """The way of a closed q to rest along the independent speeds there: what the tree needs along
+    the motions that the loops leave, which the loads of loops do not see."""
+    engine, still, closed = model.looped, np.zeros(model.nu), Mechanism(model, freedom, t)
+
+    def along(places: tuple[int, ...]) -> Rest:
+        sizes = closed.sizes[list(places)]
+
+        def needed(q: Array) -> Array:
+            efforts = engine.inverse_dynamics(t, q, still, still, closed.memory)
+            found = np.asarray(freedom.following(q, places).T @ efforts)
+            # What nothing pushes must not go by rounding of what cancels.
+            whole = float(np.abs(efforts) @ freedom.sizes)
+            return np.where(np.abs(found) * sizes > _CANCELLED * whole, found, 0.0)
+
+        def moved(q: Array, increment: Array) -> Array:
+            return closed.moved(q, places, increment)
+
+        problem = Rest(needed, moved, sizes, places, lambda q: there(places, problem, q))
+        return problem
+
+    def there(places: tuple[int, ...], problem: Rest, q: Array) -> Rest:
+        chosen = freedom.chosen(q)
+        return problem if chosen == places else along(chosen)
+
+    return along(freedom.chosen(q))
+
+
+def _straight_places(model: Compiled, free: list[int]) -> NDArray[np.int64] | None:
+    """Places in q whose rates are the free speeds; None where a hinge has others."""
+    places = np.zeros(model.nu, dtype=np.int64)
+    for slots in model.layout.hinges.values():
+        if slots.nu and not slots.straight:
+            return None
+        places[slots.u_slice] = np.arange(slots.q, slots.q + slots.nq)
+    for slots in model.layout.modal.values():
+        places[slots.u_slice] = np.arange(slots.q, slots.q + slots.nq)
+    return np.asarray(places[free])
