@@ -9,6 +9,7 @@ by as much as the model is made for, as what moves the held end sees it.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,6 +52,22 @@ def stays_definite(body: ModalBody, held: ModalPort, support: Support, turns: Ar
     if not held.moves and not support.speeds:
         return True  # what is left is the constant matrix of the modes
     return is_definite_at(body, held, support, _deflections(body, turns))
+
+
+def depends_on_count(body: ModalBody, held: str, support: Support, turns: Array) -> bool:
+    """Whether a body that does not stay definite would with its first shape alone."""
+    port = {"phi": (slice(None), slice(1)), "theta": (slice(None), slice(1)),
+            "second_order": (slice(None), slice(1), slice(1))}  # fmt: skip
+    one = replace(
+        body, modes=body.modes[:1], C=body.C[:, :1], E=body.E[..., :1], F=body.F[..., :1, :1],
+        G=body.G[:, :1, :1], X=body.X[..., :1, :1], K=body.K[:1, :1], D=body.D[:1, :1],
+        shapes=None,
+        ports={
+            name: replace(end, **{key: getattr(end, key)[cut] for key, cut in port.items()})
+            for name, end in body.ports.items()
+        },
+    )  # fmt: skip
+    return stays_definite(one, one.ports[held], support, turns[..., :1])
 
 
 def is_definite_at(body: ModalBody, held: ModalPort, support: Support, eta: Array) -> bool:

@@ -63,6 +63,7 @@ class ModalBody(Moments):
     warnings: tuple[str, ...] = ()
     resolved: float | None = None
     truncation: Truncation | None = None
+    unmoved_frame: str = ""  #: the frame that it has with fewer shapes, where it is another one
 
     @property
     def n(self) -> int:

@@ -13,7 +13,7 @@ from mstmm.scene.tables.beam_keys import Modes
 from mstmm.scene.tables.loads import Load
 
 from ..computable import computed
-from ..definiteness import stays_definite
+from ..definiteness import depends_on_count, stays_definite
 from ..modal_body import ModalBody
 from ..support import Support, Supports
 from .bases import shapes_of
@@ -98,7 +98,10 @@ def _made(
     definite = bool(beam.quadrature) or beam.model == "one-way"  # whose inertia stays as it is
     definite = definite or _stays_definite(body, held, support)
     if not definite and may_change_frame(beam, chosen):
+        counted = depends_on_count(body, held.name, support, _turns(body))
+        natural = body.frame if counted else ""
         body = _of_choices(beam, data, held, in_the_mean(chosen), idle)
+        body = replace(body, notes=(*body.notes, *_counted(natural)), unmoved_frame=natural)
         definite = _stays_definite(body, held, support)
     if beam.quadrature or (beam.quadrature is None and not definite):
         assert body.shapes is not None
@@ -108,11 +111,24 @@ def _made(
     return body
 
 
+def _counted(natural: str) -> list[str]:
+    """What is said of a frame that fewer shapes would not have."""
+    if not natural:
+        return []
+    return [
+        f"with fewer shapes deflections may count from a {natural} frame; frame = "
+        '"mean" keeps this one whatever their number'
+    ]
+
+
 def _stays_definite(body: ModalBody, held: Holding, support: Support) -> bool:
-    shapes = body.shapes
-    assert shapes is not None
-    places = np.linspace(0.0, shapes.length, 2 * body.n + 3)
-    return stays_definite(body, body.ports[held.name], support, shapes.at(places).theta)
+    return stays_definite(body, body.ports[held.name], support, _turns(body))
+
+
+def _turns(body: ModalBody) -> Array:
+    """(m, 3, n) rotations of sections along a beam, per mode."""
+    assert body.shapes is not None
+    return body.shapes.at(np.linspace(0.0, body.shapes.length, 2 * body.n + 3)).theta
 
 
 def _of_choices(

@@ -7,6 +7,7 @@ Floating-frame description with the shapes of a finite-element model (Rui, Wang,
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from math import prod
 from pathlib import Path
@@ -22,7 +23,7 @@ from mstmm.scene.tables.hinge_frames import start_motion
 
 from ...host.apart import apart
 from ..computable import computed
-from ..definiteness import stays_definite
+from ..definiteness import depends_on_count, stays_definite
 from ..modal_body import ModalBody
 from ..modal_port import ModalPort
 from ..support import Supports
@@ -81,13 +82,20 @@ def modal_body(elastic: Elastic, scene: Scene) -> ModalBody:
     body = _made(source, held, used, free, frame, why)
     if elastic.frame != "auto" or frame == "mean" or _stays_definite(body, held, scene):
         return body
+    turns, support = _turns(body), Supports(scene).of(body.name)
+    natural = frame if depends_on_count(body, held, support, turns) else ""
     why = "mean, because the mass matrix stays definite there"
-    return _made(source, held, used, free, "mean", why)
+    why += f", {natural} with fewer shapes" if natural else ""
+    return replace(_made(source, held, used, free, "mean", why), unmoved_frame=natural)
 
 
 def _stays_definite(body: ModalBody, held: str, scene: Scene) -> bool:
-    turns = np.stack([one.theta for one in body.ports.values()])
-    return stays_definite(body, body.ports[held], Supports(scene).of(body.name), turns)
+    return stays_definite(body, body.ports[held], Supports(scene).of(body.name), _turns(body))
+
+
+def _turns(body: ModalBody) -> Array:
+    """(ports, 3, n) rotations of the sections, per mode."""
+    return np.stack([one.theta for one in body.ports.values()])
 
 
 class _Source:

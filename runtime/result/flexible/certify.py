@@ -64,6 +64,7 @@ class Flexibility:
         said: what is known of the body's model before it moves, and a way out, one sentence each.
         one_way: it responds to a rigid run, linearly, and is no part of it.
         tail_of: what `tail` is a part of.
+        unmoved_frame: the frame that deflections count from with fewer shapes, where it is another.
     """
 
     name: str
@@ -84,6 +85,7 @@ class Flexibility:
     said: tuple[str, ...] = ()
     one_way: bool = False
     tail_of: str = e.BENDING_ENERGY
+    unmoved_frame: str = ""
 
     @property
     def frame_error(self) -> float:
@@ -139,7 +141,7 @@ def _one(
         _gamma(flexible, name, some), e.last_shape_share(motion) if slope > _STRAIGHT else None,
         tail if slope > _STRAIGHT else None, _leading(motion, coupling),
         e.shear_error(motion, line), e.largest_strain(bent_all), aside, body.warnings,
-        name in flexible.one_way, e.BENDING_ENERGY if shapes else e.DEFLECTION,
+        name in flexible.one_way, e.BENDING_ENERGY if shapes else e.DEFLECTION, body.unmoved_frame,
     )  # fmt: skip
 
 
@@ -279,6 +281,8 @@ def _rows_of(one: Flexibility) -> list[tuple[str, str]]:
         word = f"not {word}" if one.one_way else word
         went.append(f"{word} by loads {abs(worst):.2g} (gamma)")
     kept = [f"{one.modes} in a {one.frame} frame" if one.frame else f"{one.modes}"]
+    if one.unmoved_frame:
+        kept[0] += f" ({one.unmoved_frame} with fewer shapes)"
     if one.last_share is not None and one.last_share[1]:
         kept.append(f"{one.last_share[1]} holds {one.last_share[0]:.1e} of the energy")
     if one.tail is not None:

@@ -67,3 +67,14 @@ def test_a_weak_beam_gives_shapes_out_of_the_plane_to_those_that_carry_it() -> N
     bodies = modal_bodies(mstmm.Scene(beam=[stiff, weak], hinge=hinges, load=load,
                                       gravity=[0, -9.81, 0]))  # fmt: skip
     assert all({name[0] for name in body.modes} == {"y", "z"} for body in bodies.values())
+
+
+def test_answers_about_a_column_with_shapes_of_one_plane_are_doubted() -> None:
+    column = scene(["0-P", 0, 0], beam={"bending_stiffness": [0.5, 2.0], "modes": {"y": 3}})
+    model = mstmm.compile(column, engine="looped").with_parameters({"constants.P": 2.0})
+    loaded = 2.0 / (np.pi**2 / 4 * 0.5)
+    for answer in (model.equilibrium(), model.linearize()):
+        (risk,) = (risk for risk in answer.risks if risk.name == "buckling")
+        assert risk.doubt and risk.figure == pytest.approx(loaded, rel=0.01)
+    found = model.critical("constants.P", 0.1, 8.0)
+    assert not found.trusted and "out of the plane" in found.warnings[0]

@@ -141,3 +141,24 @@ def test_the_inertia_seen_is_that_of_the_engine() -> None:
         whole = bool(np.linalg.eigvalsh(matrix)[0] > 0)
         assert is_definite_at(body, body.ports["root"], support, eta[None]) == whole
     assert not whole
+
+
+@pytest.mark.parametrize(("count", "inertia", "told"), [(1, 0.01, 0), (2, 0.01, 1), (2, 1.0, 0)])
+def test_a_frame_that_follows_from_the_number_of_shapes_is_told(
+    count: int, inertia: float, told: int
+) -> None:
+    """An arm on a hub: what its deflection counts from is another frame for two shapes."""
+    arm = {"name": "arm", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 10.0,
+           "modes": {"y": count}}  # fmt: skip
+    hub = {"name": "hub", "mass": 1.0, "inertia": [inertia] * 3}
+    hinges = [
+        {"name": "axle", "type": "pin", "inboard": "ground", "outboard": "hub"},
+        {"name": "weld", "type": "fixed", "inboard": "hub", "outboard": "arm"},
+    ]
+    for frame, expected in (("auto", told), ("tangent", 0)):
+        beam = [arm | {"frame": frame}]
+        scene = mstmm.Scene(gravity=[0, 0, 0], beam=beam, body=[hub], hinge=hinges)
+        model = mstmm.compile(scene, engine="looped")
+        said = "tangent with fewer shapes"
+        assert (said in str(model.simulate(1e-3).certificate)) == bool(expected)
+        assert any("with fewer shapes" in note for note in model.flexible["arm"].notes) == expected
