@@ -90,6 +90,32 @@ def test_damping_is_asked_for(mstmm: Command) -> None:
     assert imaginary("--modal", "0.02") < 0
 
 
+def test_peaks_are_those_between_the_points(mstmm: Command) -> None:
+    """1/sqrt((k - J w^2)^2 + (c w)^2) at w^2 = k/J - c^2/(2 J^2), from three points; without
+    damping there is no bound."""
+    k, c, j = 9.81 * 0.5, 0.002, 0.334
+    square = k / j - (c / j) ** 2 / 2
+    peak = 1 / math.hypot(k - j * square, c * math.sqrt(square))
+    given = ("frf", "pendulum.toml", "-i", "pivot.effort", "--points", "3", "--to", "1")
+    done = mstmm(*given, "--set", f"pivot.law.damping[0]={c}")
+    assert done.code == 0, done.err
+    assert f"{peak:.4g} rad / N*m" in done.out
+    assert f"{math.sqrt(square) / (2 * math.pi):.5g}" in done.out
+    alone = mstmm(*given, "--set", "pivot.law.damping[0]=0")
+    assert "unbounded rad" in alone.out and f"{OMEGA / (2 * math.pi):.5g}" in alone.out
+    lossy = mstmm(*given, "--set", "pivot.law.damping[0]=0", "--modal", "1e-4")
+    assert f"{1 / (2e-4 * k):.4g} rad / N*m" in lossy.out
+
+
+def test_damped_and_undamped_frequencies_are_told_apart(mstmm: Command) -> None:
+    """sqrt(k/J - (c/2J)^2)/(2 pi) in Hz beside sqrt(k/J) in rad/s."""
+    damped = mstmm("modes", "pendulum.toml", "--set", "pivot.law.damping[0]=1").out
+    hertz = math.sqrt(OMEGA**2 - (1 / 0.668) ** 2) / (2 * math.pi)
+    assert f"{hertz:.6g}" in damped and f"{OMEGA:.6g}" in damped
+    assert "damped Hz" in damped and "undamped rad/s" in damped
+    assert "damped Hz" not in mstmm("modes", "pendulum.toml", "--undamped").out
+
+
 def test_json_of_both(mstmm: Command) -> None:
     modes = json.loads(mstmm("modes", "pendulum.toml", "--json", "--count", "5").out)
     assert modes["omega"] == [pytest.approx(OMEGA)] and modes["complete"] is True

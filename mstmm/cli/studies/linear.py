@@ -3,6 +3,7 @@ and answers to harmonic pushes."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 _ROWS, _NAMED, _OWNERS = 20, 3, 2
 #: Entries of A in parts of the largest that are not shown.
 _ROUNDING = 1e-12
+#: Coordinates up to which peaks are looked for near all motions; a damping ratio that is some.
+_ALL_MOTIONS, _SOME_DAMPING = 400, 1e-6
 
 
 def linearize(
@@ -109,7 +112,8 @@ def modes(
     if asked.answered(found):
         return
     _print_assessment(found)
-    head = ["mode>", "Hz>", "rad/s>", "damping>", "moves most", "kinetic energy"]
+    units = ["Hz>", "rad/s>"] if found.undamped else ["damped Hz>", "undamped rad/s>"]
+    head = ["mode>", *units, "damping>", "moves most", "kinetic energy"]
     carried = found.first(_ROWS).kinetic()
     rows = [
         [str(k + 1), f"{found.frequency[k]:.6g}", f"{found.omega[k]:.6g}",
@@ -119,6 +123,10 @@ def modes(
     terminal.console().print(terminal.table("", head, rows))
     if len(found) > _ROWS:
         terminal.say(f"and {len(found) - _ROWS} more: --count N, or --output FILE.csv")
+    if not found.undamped and len(found):
+        terminal.say(
+            "damped: frequency of the oscillation, |Im s|/(2 pi); undamped: |s| of eigenvalue s"
+        )
     terminal.say(_counted(found) if len(found) else "nothing moves in this scene")
     if found.frame == "rotating":
         terminal.say("frequencies are those of the rotating frame")
@@ -177,6 +185,8 @@ def frf(
     """How a scene near its rest answers harmonic pushes, frequency by frequency."""
     import numpy as np
 
+    from mstmm.runtime.linear.harmonic.peaks import find_peaks
+
     from .. import output as terminal
 
     if not most > least:
@@ -185,26 +195,29 @@ def frf(
     linear = asked.linear(None)
     omega = 2 * np.pi * np.geomspace(least, most, points)
     ratios: list[float] = modal or [0.0]
-    found = linear.frequency_response(
-        omega, inputs or None, outputs or None,
-        structural=number_or_named("--structural", structural or [], "boom=0.02") or 0.0,
-        modal=ratios[0] if len(ratios) == 1 else ratios,
+    losses = number_or_named("--structural", structural or [], "boom=0.02") or 0.0
+    answer = partial(
+        linear.frequency_response, inputs=inputs or None, outputs=outputs or None,
+        structural=losses, modal=ratios[0] if len(ratios) == 1 else ratios,
         exact=True if exact == ["all"] else exact or False,
     )  # fmt: skip
+    found = answer(omega)
     if asked.answered(found):
         return
     _print_assessment(found)
-    head = ["output", "input", "largest magnitude>", "at Hz>"]
+    near = linear.modes().eigenvalues if len(linear) <= _ALL_MOTIONS and not exact else np.zeros(0)
+    if losses or any(ratios):
+        near = near - _SOME_DAMPING * np.abs(near)
+    peaks = find_peaks(answer, found, np.asarray(near, dtype=np.complex128), _ROWS)
+    pairs = [(i, j) for i in range(len(found.outputs)) for j in range(len(found.inputs))]
     rows = []
-    for i, y in enumerate(found.outputs):
-        for j, u in enumerate(found.inputs):
-            k = int(found.magnitude[:, i, j].argmax())
-            unit = f"{found.output_units[i]} / {found.input_units[j]}"
-            size = f"{found.magnitude[k, i, j]:.4g} {unit}"
-            rows.append([y, u, size, f"{found.frequency[k]:.5g}"])
-    terminal.console().print(terminal.table("", head, rows[:_ROWS]))
-    if len(rows) > _ROWS:
-        terminal.say(f"and {len(rows) - _ROWS} more")
+    for (i, j), size, at in zip(pairs, *peaks, strict=False):
+        unit = f"{found.output_units[i]} / {found.input_units[j]}"
+        shown = f"{size:.4g} {unit}" if np.isfinite(size) else f"unbounded {unit}, undamped"
+        rows.append([found.outputs[i], found.inputs[j], shown, f"{at / (2 * np.pi):.5g}"])
+    terminal.console().print(terminal.table("", ["output", "input", "peak>", "at Hz>"], rows))
+    if len(pairs) > _ROWS:
+        terminal.say(f"and {len(pairs) - _ROWS} more")
     asked.say_where("all of it: --output FILE.csv or .nc, --plot FILE.png or --json")
 
 

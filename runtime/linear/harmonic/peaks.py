@@ -1,0 +1,92 @@
+"""Peaks of frequency responses, between the frequencies that were asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from mstmm.arrays import Array
+
+from ..motions import Complex
+from ..response import FrequencyResponse
+
+#: Frequencies about each motion, in parts of it; and in parts of its damping ratio.
+_BESIDE, _WITHIN = (0.0, 1e-4, 1e-3, 1e-2), (0.5, 1.0, 2.0)
+#: Damping ratio below which a motion counts as undamped, and how near it is approached.
+_UNDAMPED, _NEAR = 1e-9, 1e-6
+#: Growth of a response at half the distance from a pole: 2; of one without a pole 1.
+_POLE = 1.5
+#: Points of a bracket, and how often it is refined: to 1e-7 of its width.
+_POINTS, _ROUNDS = 7, 14
+
+
+class Peaks(NamedTuple):
+    """Largest magnitudes (k,) of the first k pairs of an output and an input, row by row, and the
+    omega (rad/s) at which they are; infinite at a resonance without damping."""
+
+    magnitude: Array
+    omega: Array
+
+
+def find_peaks(
+    answer: Callable[[Array], FrequencyResponse],
+    grid: FrequencyResponse,
+    eigenvalues: Complex,
+    count: int,
+) -> Peaks:
+    """Largest magnitudes of `count` pairs over the range of a response on a `grid`, where `answer`
+    gives the response at other omega; near the `eigenvalues` (1/s) of the motions it is looked at
+    closely."""
+    low, high = float(grid.omega.min()), float(grid.omega.max())
+    ratio = np.abs(eigenvalues.real) / np.maximum(np.abs(eigenvalues), np.finfo(float).tiny)
+    centre = np.abs(eigenvalues.imag)
+    held = (low < centre) & (centre < high)
+
+    def magnitudes(omega: Array) -> Array:
+        return answer(omega).magnitude.reshape(len(omega), -1)[:, :count]
+
+    more = _beside(centre[held], ratio[held], low, high)
+    values = grid.magnitude.reshape(len(grid.omega), -1)[:, :count]
+    found = _refined(magnitudes, grid.omega, values, more)
+    for omega in centre[held & (ratio <= _UNDAMPED)]:
+        near = magnitudes(omega * (1 + _NEAR * np.array([1.0, 2.0])))
+        unbounded = near[0] > _POLE * near[1]
+        found.magnitude[unbounded], found.omega[unbounded] = np.inf, omega
+    return found
+
+
+def _beside(centre: Array, ratio: Array, low: float, high: float) -> Array:
+    """Frequencies in a range at and about those of damped motions."""
+    parts = [sign * x for sign in (1, -1) for x in _BESIDE]
+    widths = [sign * x for sign in (1, -1) for x in _WITHIN]
+    damped = ratio > _UNDAMPED
+    near = centre[damped, None] * (1 + np.array(parts))
+    within = centre[damped, None] * (1 + ratio[damped, None] * np.array(widths))
+    every = np.unique(np.concatenate([near.ravel(), within.ravel()]))
+    return every[(every > low) & (every < high)]
+
+
+def _refined(
+    magnitudes: Callable[[Array], Array], omega: Array, values: Array, more: Array
+) -> Peaks:
+    """The largest of `values` (m, k) at omega (m,) and at more frequencies, refined in their
+    brackets."""
+    if len(more):
+        omega, values = np.append(omega, more), np.concatenate([values, magnitudes(more)])
+    order = np.argsort(omega)
+    omega, values = omega[order], values[order]
+    best, last = values.argmax(axis=0), len(omega) - 1
+    peak, at = values.max(axis=0), omega[best]
+    low, high = omega[np.maximum(best - 1, 0)], omega[np.minimum(best + 1, last)]
+    pairs = np.arange(len(best))
+    for _ in range(_ROUNDS if len(best) else 0):
+        points = np.linspace(low, high, _POINTS)
+        seen = magnitudes(points.ravel()).reshape(*points.shape, -1)[:, pairs, pairs]
+        which = seen.argmax(axis=0)
+        better = seen[which, pairs] > peak
+        at = np.where(better, points[which, pairs], at)
+        peak, step = np.maximum(peak, seen[which, pairs]), (high - low) / (_POINTS - 1)
+        low, high = np.maximum(low, at - step), np.minimum(high, at + step)
+    return Peaks(peak, at)
