@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,20 +32,20 @@ class Enclosure:
 
 def of_time(expression: Expression, constants: Mapping[str, float]) -> tuple[list[int], list[int]]:
     """(terms that depend on t and constants alone, those of them in which t occurs)."""
-    return of_one(expression, constants, TIME)
+    return of_names(expression, constants, (TIME,))
 
 
-def of_one(
-    expression: Expression, constants: Mapping[str, float], variable: str
+def of_names(
+    expression: Expression, constants: Mapping[str, float], variables: Collection[str]
 ) -> tuple[list[int], list[int]]:
-    """The same of another name in the place of t."""
+    """The same of other names in the place of t, each of which may change."""
     alone, moving = set[int](), set[int]()
     for number in sorted(expression.needed):
         term = expression.terms[number]
         if term.constant is not None or _is_known(term, constants):
             alone.add(number)
         elif term.name is not None:
-            if _is(term, variable):
+            if term.name.text in variables:
                 alone.add(number)
                 moving.add(number)
         elif all(i in alone for i in term.args):
@@ -59,11 +59,10 @@ def enclose(
     terms: Sequence[Term],
     wanted: Sequence[int],
     constants: Mapping[str, float],
-    t: Interval,
-    variable: str = TIME,
+    leaves: Mapping[str, Enclosure],
 ) -> dict[int, Enclosure]:
-    """Enclosures of `wanted` (arguments before their operations) over cells of time, or of another
-    name in its place."""
+    """Enclosures of `wanted` (arguments before their operations) over cells, in which names that
+    change are `leaves`."""
     known: dict[int, Enclosure] = {}
     with np.errstate(all="ignore"):
         for number in wanted:
@@ -75,22 +74,23 @@ def enclose(
                                                         np.nextafter(x, np.inf))  # fmt: skip
                 known[number] = Enclosure(value, _NONE)
             elif term.name is not None:
+                text = term.name.text
                 known[number] = (
-                    Enclosure(t, _ONE) if _is(term, variable)
-                    else Enclosure(point(constants[term.name.text]), _NONE)
-                )  # fmt: skip
+                    leaves[text] if text in leaves else Enclosure(point(constants[text]), _NONE)
+                )
             else:
                 exponent = terms[term.args[1]].constant if term.op == "pow" else None
                 known[number] = _apply(term.op, [known[i] for i in term.args], exponent)
     return known
 
 
-def _is(term: Term, variable: str) -> bool:
-    return term.name is not None and term.name.text == variable
-
-
 def _is_known(term: Term, constants: Mapping[str, float]) -> bool:
     return term.name is not None and term.name.text in constants
+
+
+def along_itself(t: Interval) -> Enclosure:
+    """A variable over cells of itself."""
+    return Enclosure(t, _ONE)
 
 
 # --- operations -----------------------------------------------------------------------------------

@@ -59,11 +59,13 @@ Terms = Callable[[Interval], dict[int, Enclosure]]
 
 
 def pace(
-    terms: Terms, watched: Sequence[Watched], start: float, end: float, most: int = 2**16
-) -> Pace:
+    terms: Terms, watched: Sequence[Watched], start: float, end: float, most: int = 2**16,
+    edges: Array | None = None,
+) -> Pace:  # fmt: skip
     """Bounds of the steps from start to end (s) that the watched functions ask for, from `most`
-    cells at most."""
-    a, b = np.array([start]), np.array([end])
+    cells at most.  No cell lies across one of the `edges` (n,), from start to end."""
+    bare = np.array([start, end]) if edges is None else edges
+    a, b = bare[:-1], bare[1:]
     lo, hi, even = _looked_at(terms, watched, a, b)
     complete = True
     while True:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from mstmm.arrays import Array
 from mstmm.expression.expression import Expression
 from mstmm.expression.parser import Term
 
-from .enclosures import TIME, Enclosure, enclose, of_one
+from .enclosures import TIME, Enclosure, along_itself, enclose, of_names
 from .intervals import EVERYTHING, Interval, cos
 from .pace import Watched
 from .roots import Margin
@@ -25,26 +25,33 @@ _FUNCTIONS = frozenset({
 })  # fmt: skip
 
 
+#: Names of an expression over cells of one variable.
+Leaves = Callable[[Interval], Mapping[str, Enclosure]]
+
+
 class View:
-    """One expression as functions over cells of time, or of another of its names.  Of a `drive` the
-    second derivative acts."""
+    """One expression as functions over cells of time, or of another of its `names`; of several that
+    `leaves` give over cells of one variable, which is the first.  Of a `drive` the second
+    derivative acts."""
 
     def __init__(
         self,
         expression: Expression,
         constants: Mapping[str, float],
         drive: bool = False,
-        variable: str = TIME,
+        names: Sequence[str] = (TIME,),
+        leaves: Leaves | None = None,
     ) -> None:
         self.expression, self.constants = expression, constants
-        self.drive, self.variable = drive, variable
-        self.order, moving = of_one(expression, constants, variable)
+        self.drive, self.variable = drive, names[0]
+        self._leaves = leaves or (lambda t: {names[0]: along_itself(t)})
+        self.order, moving = of_names(expression, constants, names)
         self.moving = frozenset(moving)
         self.most = min(_CELLS, _WORK // max(1, len(self.order)))
 
     def terms(self, t: Interval) -> dict[int, Enclosure]:
         """Enclosures of all terms that depend on the variable alone."""
-        return enclose(self.expression.terms, self.order, self.constants, t, self.variable)
+        return enclose(self.expression.terms, self.order, self.constants, self._leaves(t))
 
     def values(self, number: int, at: Array) -> Array:
         """(n,) a term at values (n,) of the variable; nan where it has none."""
@@ -110,7 +117,7 @@ class View:
         terms, constants = self.expression.terms, self.constants
 
         def margin(t: Interval) -> Enclosure:
-            known = enclose(terms, needed, constants, t, self.variable)
+            known = enclose(terms, needed, constants, self._leaves(t))
             with np.errstate(all="ignore"):
                 return difference(*(known[i] for i in args))
 

@@ -9,7 +9,7 @@ import pytest
 
 from mstmm.expression.expression import Expression, parse
 from mstmm.runtime.breaks.acting import Acting
-from mstmm.runtime.breaks.enclosures import enclose, of_time
+from mstmm.runtime.breaks.enclosures import along_itself, enclose, of_time
 from mstmm.runtime.breaks.intervals import Interval
 from mstmm.runtime.breaks.times import TimeMap, time_map
 
@@ -35,7 +35,9 @@ def test_values_and_slopes_lie_within_their_bounds(text: str) -> None:
     order, _ = of_time(expression, {})
     edges = np.linspace(0.05, 3.9, 40)
     a, b = edges[:-1], edges[1:]
-    found = enclose(expression.terms, order, {}, Interval(a, b))[expression.root]
+    found = enclose(expression.terms, order, {}, {"t": along_itself(Interval(a, b))})[
+        expression.root
+    ]
     inside = a + (b - a) * np.linspace(0, 1, 9)[:, None]
     values = np.array([[at(expression, t) for t in row] for row in inside])
     assert np.all((values >= found.value.lo) & (values <= found.value.hi))
