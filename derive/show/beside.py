@@ -25,11 +25,14 @@ _SAID = (
 
 
 def beside(name: str) -> tuple[str, Callable[[Columns], list[Item]]]:
-    """Title and items of a hinge in both forms.  Raises ElementError where there is but one."""
-    shown = view(name)
-    if shown.name not in CLASSICAL:
+    """Title and items of a hinge ("hinge_pin") in both forms.
+
+    Raises ElementError where there is but one.
+    """
+    if name not in CLASSICAL:
         both = ", ".join(each.removeprefix("hinge_") for each in CLASSICAL)
-        raise ElementError(f"{shown.name} has no classical matrix beside it; these have: {both}")
+        raise ElementError(f"{name} has no classical matrix beside it; these have: {both}")
+    shown = view(name)
     title = f"{shown.title}, classical and by motion subspace"
 
     def items(measure: Columns) -> list[Item]:

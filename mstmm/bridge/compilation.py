@@ -157,8 +157,9 @@ def _with_digits(made: Callable[[str], Model], engine: str) -> Model:
     return model
 
 
-def generate(elements: Iterable[Element]) -> list[Generated]:
-    """Check, derive, generate and compile elements into the user's kernel store.
+def generate(elements: Iterable[Element], definition: str | None = None) -> list[Generated]:
+    """Check, derive, generate and compile elements into the user's kernel store, which keeps the
+    text of the file that defines them, so that their equations can be shown.
 
     Raises ElementError naming the equation that is wrong, EnvironmentFailure if the store cannot be
     written.  A name that a built-in element has is refused.
@@ -177,6 +178,8 @@ def generate(elements: Iterable[Element]) -> list[Generated]:
         check(element)
         spec = spec_of(element)
         files = {"mstmm.h": header(), f"{spec.kind}_{spec.name}.c": element_source(spec)}
+        if definition is not None:
+            files[store.DEFINITION] = definition
         place, how = store.keep(spec, files)
         made.append(Generated(spec, place, how))
     return made
@@ -186,7 +189,7 @@ def generate_file(path: str | Path) -> list[Generated]:
     """`generate` for every element that a Python file defines.  The file is executed: trust it."""
     from ..derive.catalogue.registry import load_file
 
-    return generate(load_file(path))
+    return generate(load_file(path), Path(path).read_text(encoding="utf-8"))
 
 
 def generate_published() -> list[Generated]:

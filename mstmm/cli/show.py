@@ -11,6 +11,8 @@ from mstmm.errors import ElementError
 from .options import Json, output_file, python_file, quoted
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from mstmm.derive.show.document import ElementView
     from mstmm.ir.spec import ElementSpec
 
@@ -107,7 +109,9 @@ def _beside(element: str, format: str) -> str:
     from mstmm.derive.show.beside import beside
     from mstmm.derive.show.page import printed
 
-    return printed(*beside(element), format)
+    from .names import found
+
+    return printed(*beside("_".join(found(element))), format)
 
 
 def _scene(file: str, at: str, format: str, keep: list[str]) -> str:
@@ -159,16 +163,24 @@ def _views(element: str, at: str) -> list[ElementView]:
     return [_of_spec(element_from_json(kernels), source or "")]  # no need to derive them again
 
 
+def _defined(file: Path, kind: str, name: str) -> ElementView:
+    """An element as the file defines it from which it was generated."""
+    from mstmm.derive.catalogue.registry import kind_of, load_file
+    from mstmm.derive.show import subjects as views
+
+    for element in load_file(file):
+        if (kind_of(element), element.name) == (kind, name):
+            return views.of_element(element)
+    raise ElementError(f"{file}: it does not define {kind} {name!r}; generate it again")
+
+
 def _kept(kind: str, name: str, at: str) -> ElementView:
     """An element of the user's kernel store: its kernels, as its equations are in its file."""
     from mstmm.runtime.kernels import store
 
     full = f"{kind}_{name}"
     if at not in ("ir", "c"):
-        raise ElementError(
-            f"{full}: the kernel store keeps kernels, not equations; "
-            f"show its file: mstmm show MY_FILE.py --at {at}"
-        )
+        return _defined(store.definition((kind, name)), kind, name)
     path = store.folder() / full / f"{full}.c"
     return _of_spec(store.specs()[kind, name], path.read_text(encoding="utf-8"))
 

@@ -41,6 +41,8 @@ from .prebuilt import Element
 Key = tuple[str, str]
 
 _ROOT = (0,)  # may put a store where all can read it
+#: What a definition that is kept is called; reading a scene never runs it.
+DEFINITION = "definition.py"
 _WHAT = "kernel store"
 _WAY_OUT = "set MSTMM_KERNELS to a folder of your own"
 
@@ -102,6 +104,21 @@ def keep(spec: ElementSpec, files: dict[str, str]) -> tuple[Path, str]:
         if spec.kind != "hinge":
             raise
         return place, f"interpreted, several times slower than compiled: {error}{replaced}"
+
+
+def definition(key: Key) -> Path:
+    """The file from which an element of the store was generated.  ElementError where none is kept
+    or others may have written it."""
+    place = _place(key)
+    _trusted(place)
+    try:
+        read_private(place / DEFINITION)
+    except (OSError, Damaged) as error:
+        raise ElementError(
+            f"{key[0]}_{key[1]}: the kernel store has no definition of it ({error}); show its file "
+            "instead: mstmm show MY_FILE.py, or generate it again"
+        ) from None
+    return place / DEFINITION
 
 
 def _replaces(place: Path, spec: ElementSpec) -> str:

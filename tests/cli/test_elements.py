@@ -51,8 +51,6 @@ def test_the_whole_way(mstmm: Command, knee: Path) -> None:
     ]
     assert "knee" in mstmm("show", "knee", "--at", "c").out
     assert "flexion" not in mstmm("show", "my_knee.py", "--at", "equations").err
-    kept = mstmm("show", "knee")
-    assert kept.code == 2 and "show its file" in kept.err
     assert mstmm("simulate", "leg.toml", "--t-end", "0.5").code == 0
 
 
@@ -126,3 +124,11 @@ def test_no_checkout_no_regeneration(
     monkeypatch.setattr("mstmm.cli.generate._folder", lambda: folder / "generated")
     done = mstmm("generate")
     assert done.code == 3 and "clone" in done.err
+
+
+def test_an_element_of_the_store_shows_its_equations(mstmm: Command, knee: Path) -> None:
+    assert mstmm("generate", "my_knee.py").code == 0
+    by_file, by_name = mstmm("show", "my_knee.py"), mstmm("show", "knee")
+    assert by_name.code == 0 and by_name.out == by_file.out and "radius angle" in by_name.out
+    beside = mstmm("show", "knee", "--beside")
+    assert beside.code == 2 and "hinge_knee has no classical matrix beside it" in beside.err
