@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from mstmm.arrays import one, one_row, real
 
+from ..linear.channels import some_names
 from .at_states import AtStates
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from ..linear.motions import Modes
     from ..linear.operating_point.friction import Amplitudes
     from ..linear.response import FrequencyResponse
+    from ..linear.rotors.unbalance import UnbalanceResponse
     from ..linear.waterfall import Waterfall
     from .linearize import Linearising
 
@@ -154,6 +156,30 @@ class Linearised(AtStates):
 
         points = one_row("values", values)
         return waterfall(self._linear_at(parameter), parameter, points, omega, (input, output))
+
+    def unbalance_response(
+        self,
+        parameter: str,
+        values: ArrayLike,
+        at: str,
+        unbalance: float,
+        points: Sequence[str] | None = None,
+    ) -> UnbalanceResponse:
+        """Whirl of `points`, bodies or ends, under an unbalance m e (kg m) that turns with the body
+        of the end `at`, over a number of the scene that sets its spin ("constants.spin" in a
+        drive); of `at` itself unless points are given.
+
+        Steady and linear about the equilibrium, in the fixed frame, at the frequency of the spin.
+        Raises SceneError for unknown names and rotors that are not axisymmetric,
+        NumericalFailure at a critical speed without damping.
+        """
+        from ..linear.rotors.unbalance import unbalance_response
+
+        found = [at] if points is None else some_names("points", points)
+        speeds = one_row("values", values)
+        return unbalance_response(
+            self._linear_at(parameter), parameter, speeds, at, unbalance, found
+        )
 
     def critical(
         self, parameter: str, stable: float, unstable: float, *, friction: Amplitudes = None

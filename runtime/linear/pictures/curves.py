@@ -153,6 +153,21 @@ def nyquist(values: NDArray[Any], labels: Sequence[str], path: str | Path | None
     return made
 
 
+def unbalance(spin: Array, amplitude: Array, labels: Sequence[str], path: str | Path | None) -> Any:
+    """Amplitudes (m, points) over the spin (m,)."""
+    made = figure(4.5)
+    axis, order = made.subplots(), np.argsort(spin, kind="stable")
+    for k, (curve, label) in enumerate(zip(amplitude[order].T, labels, strict=True)):
+        axis.plot(spin[order], curve, lw=1.2, label=label, **_look(k))
+    if (amplitude > 0).any():
+        axis.set_yscale("log")
+    axis.set_xlabel("spin in rad/s")
+    axis.set_ylabel("whirl amplitude in m")
+    _named(made, axis, labels)
+    write(made, path)
+    return made
+
+
 def waterfall(
     frequency: Array, rows: Array, values: NDArray[Any], about: str, path: str | Path | None
 ) -> Any:

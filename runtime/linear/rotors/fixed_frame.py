@@ -197,6 +197,15 @@ def _drift(linear: Equations) -> Array:
     return np.asarray(points[least, COLUMNS["velocity"]])
 
 
+def angular_velocity(linear: Equations, name: str) -> Array:
+    """(3,) angular velocity of a body or end at the state, rad/s, inertial axes."""
+    engine, state = linear.model.looped, linear.state
+    of = np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None]
+    probe = Probe(*linear.model.looped.packed.end(name))
+    points = engine.observe(*of, [probe], parts=("points",)).points
+    return np.asarray(points[0, 0, COLUMNS["angular_velocity"]])
+
+
 def _spin(linear: Equations) -> Array:
     """(3,) unit vector of the largest angular velocity of a body, of the x axis without spin."""
     turns = _points(linear, linear.state, linear.state.u[None])[0, :, COLUMNS["angular_velocity"]]

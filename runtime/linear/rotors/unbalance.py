@@ -1,0 +1,169 @@
+"""Unbalance response of rotors over their spin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.arguments import short
+from mstmm.arrays import Array, real
+from mstmm.errors import SceneError
+from mstmm.risk import Assessed, DeferredRisks, Risk
+
+from ...engine.references import References
+from ...guard.answers import merge_over_values
+from .. import files
+from .fixed_frame import angular_velocity
+
+if TYPE_CHECKING:
+    from ..linear import Linear
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class UnbalanceResponse(Assessed):
+    """Whirl of points under an unbalance m e that turns with a body, in the fixed frame.
+
+    Attributes:
+        parameter, values: the parameter and its values (m,).
+        spin: (m,) rad/s of the body, the frequency of the whirl.
+        at, unbalance: the end that carries it, and m e in kg m.
+        points: names of the ends that are looked at.
+        displacements: (m, points, 3) complex, m in inertial axes: the motion is the real part of
+            displacements * exp(i spin t) while the unbalance turns from the first of `directions`
+            towards the second.
+        directions: (2, 3) unit vectors across the spin.
+    """
+
+    parameter: str
+    values: Array = field(repr=False)
+    spin: Array = field(repr=False)
+    at: str
+    unbalance: float
+    points: tuple[str, ...]
+    displacements: Complex = field(repr=False)
+    directions: Array = field(repr=False)
+    findings: Iterable[Risk] = field(default=(), repr=False)
+
+    @property
+    def amplitude(self) -> Array:
+        """(m, points) major semi-axis of the orbits, m."""
+        d = self.displacements
+        total, square = (np.abs(d) ** 2).sum(axis=2), np.abs((d * d).sum(axis=2))
+        return np.sqrt((total + square) / 2)
+
+    @property
+    def minor_axis(self) -> Array:
+        """(m, points) minor semi-axis of the orbits, m; negative of backward whirl."""
+        d, across = self.displacements, self.directions
+        along, beside = np.einsum("mpi,ki->kmp", d, across)
+        total, square = (np.abs(d) ** 2).sum(axis=2), np.abs((d * d).sum(axis=2))
+        sense = np.sign((along * np.conj(beside)).imag)
+        return np.asarray(sense * np.sqrt(np.maximum(total - square, 0.0) / 2))
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """`matplotlib.figure.Figure`: amplitudes over the spin; written where `path` is given.
+
+        Raises EnvironmentFailure without the extra `plot`.
+        """
+        from ..pictures.curves import unbalance
+
+        return unbalance(self.spin, self.amplitude, self.points, path)
+
+    def to_dataset(self) -> Any:
+        """`xarray.Dataset`, complex numbers in two parts.  EnvironmentFailure without the extra."""
+        along = ("value", "point", "axis")
+        arrays: dict[str, Any] = {
+            "spin": ("value", self.spin, {"units": "rad/s"}),
+            "amplitude": (along[:2], self.amplitude, {"units": "m"}),
+            "minor_axis": (along[:2], self.minor_axis, {"units": "m"}),
+            "real": (along, self.displacements.real), "imag": (along, self.displacements.imag),
+        }  # fmt: skip
+        coords = {"value": self.values, "point": list(self.points), "axis": ["x", "y", "z"]}
+        about = {"parameter": self.parameter, "at": self.at, "unbalance": self.unbalance}
+        return files.xarray().Dataset(arrays, coords, about)
+
+    def _rows(self) -> Iterator[tuple[str, ...]]:
+        """A row for each value of the parameter."""
+        kinds = ("amplitude [m]", "minor axis [m]")
+        yield (
+            self.parameter,
+            "spin [rad/s]",
+            *(f"{p} {kind}" for p in self.points for kind in kinds),
+        )
+        both = np.stack([self.amplitude, self.minor_axis], axis=2).reshape(len(self.values), -1)
+        for value, spin, row in zip(self.values, self.spin, both, strict=True):
+            yield tuple(repr(float(x)) for x in (value, spin, *row))
+
+    def save(self, path: str | Path) -> Path:
+        """All of it: .nc (extra io) or .csv, a row for each value of the parameter.
+
+        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        """
+        return files.save(path, self.to_dataset, self._rows())
+
+
+def unbalance_response(
+    linear_at: Callable[[float], Linear],
+    parameter: str,
+    values: Array,
+    at: str,
+    unbalance: float,
+    points: Sequence[str],
+) -> UnbalanceResponse:
+    """See `Model.unbalance_response`."""
+    size = real("unbalance", unbalance, "m e in kg m")
+    models = [linear_at(value).to_fixed_frame() for value in values.tolist()]
+    places = [_end(models[0], name) for name in (at, *points)]
+    axes = [angular_velocity(linear, at) for linear in models]
+    spins = np.array([np.linalg.norm(axis) for axis in axes])
+    across = _across(axes[int(spins.argmax())])
+    found = [
+        _whirl(linear, spin, size * across, places)
+        for linear, spin in zip(models, spins.tolist(), strict=True)
+    ]
+    each = list(zip(values.tolist(), models, strict=True))
+    findings = DeferredRisks(
+        lambda: merge_over_values(parameter, [(value, one.risks) for value, one in each])
+    )
+    return UnbalanceResponse(
+        parameter, values, spins, places[0], size, tuple(places[1:]), np.array(found), across,
+        findings,
+    )  # fmt: skip
+
+
+def _end(linear: Linear, name: str) -> str:
+    ends = References(linear.model.scene.skeleton)
+    if not isinstance(name, str) or name not in ends:
+        raise SceneError(f'{short(name)}: expected a body or an end of one, such as "disc"')
+    return ends.canonical(name) or name
+
+
+def _across(axis: Array) -> Array:
+    """(2, 3) unit vectors across an axis, which turn into each other along it."""
+    size = float(np.linalg.norm(axis))
+    if not size:
+        raise SceneError("unbalance response: the body does not spin at any value of the parameter")
+    along = axis / size
+    first = np.eye(3)[int(np.abs(np.roll(along, -1)).argmin() + 1) % 3]
+    first = first - along * (along @ first)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(along, first)])
+
+
+def _whirl(linear: Linear, spin: float, unbalance: Array, places: Sequence[str]) -> Complex:
+    """(points, 3) displacements under m e spin^2 that turns from the first direction on."""
+    at, points = places[0], places[1:]
+    if not spin:
+        return np.zeros((len(points), 3), dtype=np.complex128)
+    pushes = [f"{at}.force.{axis}" for axis in "xyz"]
+    shown = [f"{point}.position.{axis}" for point in points for axis in "xyz"]
+    response = linear.frequency_response([spin], pushes, shown)
+    force = spin**2 * (unbalance[0] - 1j * unbalance[1])
+    return np.asarray((response.values[0] @ force).reshape(len(points), 3))
