@@ -165,6 +165,8 @@ def _basis(beam: Beam, data: BeamData, held: Holding, direction: str, frame: Fra
         sprung = {held.x} if direction in held.sprung else set()
         slopes = tuple(sorted({e.x for e in loaded if direction in e.moments} | sprung))
         return Basis(SIMPLY_SUPPORTED, base, slopes=slopes)
+    if frame.kind == "mean" and (loaded or direction in held.sprung):
+        return Basis(STATIC, base, others or _all_others(data, held, base))
     if loaded and others:
         return Basis(STATIC, base, others)
     return Basis(_OF_FRAME[frame.kind], base)

@@ -7,8 +7,8 @@ direction of every inertia.  Anything that is not known to stay in the plane cou
 What nothing pushes out of the plane may still buckle out of it.  That cannot come first where each
 beam is at least as stiff across the plane as in it: hinges that turn about n alone hold every
 deflection across that they hold in the plane, and bending about the softer axis does not twist a
-beam (Timoshenko and Gere, Theory of Elastic Stability, 2nd ed., sections 2.1 and 6.3).  A spring
-in the plane braces beams in it alone.
+beam (Timoshenko and Gere, Theory of Elastic Stability, 2nd ed., sections 2.1 and 6.3).  Springs and
+constraints in the plane brace beams in it alone.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ class Planar:
         n = self._turn[beam][:, axis]
         key = _key(n)
         if key not in self._braced:
-            sprung = any(spring.law.stiffness for spring in self.scene.spring)
-            self._braced[key] = not sprung and all(
+            supports = [spring for spring in self.scene.spring if spring.law.stiffness]
+            self._braced[key] = not (supports or self.scene.constraint) and all(
                 self._is_stiffer_across(one, n) for one in self.scene.beam if one.model != "rigid"
             )
         return not self._braced[key]

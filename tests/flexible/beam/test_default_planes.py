@@ -78,3 +78,9 @@ def test_answers_about_a_column_with_shapes_of_one_plane_are_doubted() -> None:
         assert risk.doubt and risk.figure == pytest.approx(loaded, rel=0.01)
     found = model.critical("constants.P", 0.1, 8.0)
     assert not found.trusted and "out of the plane" in found.warnings[0]
+
+
+def test_a_constraint_braces_a_column_in_its_plane_alone() -> None:
+    guide = {"type": "point-on-plane", "from": "ground", "to": "b.tip", "normal": [0, 1, 0]}
+    body = modal_bodies(scene(["0-P", 0, 0], beam={"bending_stiffness": 1.0}, constraint=[guide]))
+    assert {name[0] for name in body["b"].modes} == {"y", "z"}

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flexible.beam_scenes import HELD, PIN, body_of
+from flexible.beam_scenes import FREE, HELD, PIN, body_of
 from scipy.optimize import brentq
 
 import mstmm
@@ -114,3 +114,18 @@ def test_blocks_of_a_graph() -> None:
 
 def test_a_free_end_keeps_its_shapes() -> None:
     assert body_of(PIN, modes="auto", axial_stiffness=50.0).modes[-1] == "axial1"
+
+
+@pytest.mark.parametrize("end", ["root", "tip"])
+@pytest.mark.parametrize("bends", [False, True])
+def test_loads_at_either_end_of_a_free_beam_deform_it(end: str, bends: bool) -> None:
+    """Strain energy under a force along, or a moment at, one end, in balance with its inertia: the
+    axial force falls linearly, F^2 L / (6 EA); of the moment M (1 - 3 x^2 + 2 x^3) remains,
+    13 M^2 L / (70 EI)."""
+    load = {"moment": [0, 0, 1]} if bends else {"force": [1, 0, 0]}
+    body = body_of(FREE, more={"load": [{"on": f"b.{end}"} | load]}, modes="auto",
+                   axial_stiffness=5.0)  # fmt: skip
+    port = body.ports[end]
+    pushed = port.theta[2] if bends else port.phi[0]
+    energy = pushed @ np.linalg.solve(body.K, pushed) / 2
+    assert energy == pytest.approx(13 / 70 if bends else 1 / (6 * 5.0), rel=5e-3)
