@@ -12,6 +12,7 @@ from mstmm.errors import SceneError
 from mstmm.extras import missing
 
 from .channels import Channel, some_names
+from .harmonic.steady import refuse_turning_outputs
 from .output.outputs import outputs_of, rows_of
 from .state_space import StateSpace
 
@@ -23,6 +24,7 @@ def output_matrices(
     pushes) is what v adds to d/dt z."""
     named = None if outputs is None else some_names("outputs", outputs)
     shown = outputs_of(linear, named)
+    refuse_turning_outputs(linear, shown)
     c, d = linear.observed(rows_of(linear, shown, pushes), b)
     return tuple(one.name for one in shown), c, d
 

@@ -52,6 +52,20 @@ def refuse_unsteady(linear: Equations, pushes: Sequence[Channel], shown: Sequenc
         )
 
 
+def refuse_turning_outputs(linear: Equations, shown: Sequence[Seen]) -> None:
+    """SceneError for outputs that change along a motion that is steady else: where it is not, the
+    risks of the linear model say so."""
+    if not linear.state.u.any():
+        return
+    later = LaterStates(linear)
+    changing = find_changes(linear, later, (), shown)
+    if changing and MATRICES not in changing and find_departure(linear, later) is None:
+        raise SceneError(
+            f"outputs: the state moves, and {abbreviate(changing)} changes along its motion, so "
+            "that no constant matrix gives it; read coordinates and speeds of hinges"
+        )
+
+
 def find_time_risks(
     linear: Equations, pushes: Sequence[Channel], shown: Sequence[Seen]
 ) -> Iterator[Risk]:

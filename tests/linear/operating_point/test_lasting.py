@@ -59,6 +59,9 @@ def test_what_goes_round_is_refused_by_name(drive: str) -> None:
         linear.frequency_response([2.0], ["rail.effort"], ["slider.x"])
     with pytest.raises(SceneError, match=r"changes ground\.acceleration\.x, .*\.y, so"):
         model.linearize([0.0, 0.0], [SPIN, 0.0]).frequency_response([2.0])
+    with pytest.raises(SceneError, match=r"slider\.position\.x changes along its motion"):
+        linear.output_matrices(["rail.displacement", "slider.x"])
+    assert linear.output_matrices(["rail.displacement"])[0].any()
     assert not linear.trusted
     assert any("slider.force.x changes its effect" in text for text in linear.warnings)
     assert not any("rail.effort" in text for text in linear.warnings)
@@ -168,3 +171,54 @@ def test_a_carriage_that_moves_on_is_steady() -> None:
     assert model.equilibrium().trusted and not model.linearize().warnings
     found = model.frequency_response([1.0], ["ground.acceleration.x"], ["pivot.angle", "bob.x"])
     assert found.values[0, 0, 0] == pytest.approx(-1 / (9.81 - 1.1))
+
+
+def test_closed_loops_that_turn() -> None:
+    """A parallelogram on a driven shaft: its swing answers an effort; the ground goes round. With
+    the shaft on a mount its inertia is coupled by the angle."""
+
+    def model(mounted: bool) -> mstmm.Model:
+        arm = {"mass": 0.5, "center_of_mass": [0, -0.15, 0], "inertia": [4e-3, 1e-4, 4e-3],
+               "ends": {"tip": [0, -0.3, 0]}}  # fmt: skip
+        pin = {"type": "pin", "axis": [0, 0, 1], "law": {"stiffness": 8.0}}
+        shaft = "mount" if mounted else "ground"
+        bodies = [{"name": "mount", "mass": 4.0, **SOLID}] if mounted else []
+        hinges = (
+            [
+                {
+                    "name": "x",
+                    "type": "prismatic",
+                    "axis": [1, 0, 0],
+                    "inboard": "ground",
+                    "outboard": "mount",
+                    "law": {"stiffness": 500.0},
+                }
+            ]
+            if mounted
+            else []
+        )
+        return of(
+            body=[*bodies, {"name": "shaft", "mass": 1.0, **SOLID, "ends": {"far": [0.2, 0, 0]}},
+                  arm | {"name": "a"}, arm | {"name": "b"},
+                  {"name": "bar", "mass": 0.3, "center_of_mass": [0.1, 0, 0], **SOLID,
+                   "ends": {"far": [0.2, 0, 0]}}],
+            hinge=[*hinges,
+                   {"name": "spin", "type": "pin", "axis": [0, 1, 0], "inboard": shaft,
+                    "outboard": "shaft", "drive": "4*t"},
+                   pin | {"name": "one", "inboard": "shaft", "outboard": "a"},
+                   pin | {"name": "two", "inboard": "shaft.far", "outboard": "b"},
+                   pin | {"name": "under", "inboard": "a.tip", "outboard": "bar"},
+                   pin | {"name": "close", "inboard": "bar.far", "outboard": "b.tip"}],
+        )  # fmt: skip
+
+    steady = model(False)
+    linear = steady.linearize(inputs=["one.effort"])
+    assert linear.trusted and steady.equilibrium().trusted
+    assert linear.frequency_response([3.0], outputs=["one.angle"]).trusted
+    with pytest.raises(SceneError, match=r"changes ground\.acceleration\.x, .*\.z, so"):
+        steady.frequency_response([3.0])
+    mounted = model(True)
+    with pytest.raises(NumericalFailure, match=r"drives move on \(of spin\)"):
+        mounted.equilibrium()
+    names = {risk.name for risk in mounted.linearize().risks}
+    assert {"unsteady-state", "changing-coefficients"} <= names
