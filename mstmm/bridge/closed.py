@@ -7,6 +7,7 @@ what stands by them.  No second derivation.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -50,7 +51,9 @@ class ClosedEquations:
         h: (n, 1): what the motion needs at u' = 0, gravity, laws and loads in it.
         coordinates, speeds: all of the scene, in its order; `free` are the places of the n.
         accelerations: symbols of those that drives impose, which stand in h.
-        inputs, parameters: symbols by name.
+        inputs: symbols by name ("push") of inputs and signals that occur, their values at t, and of
+            rates of those that drives follow ("push.rates[0]", 1/s; "push.rates[1]", 1/s^2).
+        parameters: symbols by name.
         numbers: what symbols are at the start; `M.subs(numbers)` is the mass matrix there.
     """
 
@@ -111,7 +114,6 @@ class _Closing:
         known = model.known or {}
         system, _ = seeded(model.scene, known, names, lambda _, k: seeds[k])
         self.structure, self.p = structure_and_numbers(system, known)
-        self.inputs = dict(self._inputs(self.structure, system.inputs_at(0.0).tolist()))
         q, u = (x.tolist() for x in model.initial_state())
         owners = list(model.layout.owners)
         self.q = [
@@ -124,17 +126,23 @@ class _Closing:
         self.u = [self.book.symbol("u" + name, x) for name, x in zip(speeds, u, strict=True)]
         self.a = [self.book.symbol("udot" + name, 1.0) for name in speeds]
         self.t = self.book.symbol("t", 0.0)
+        self.inputs = dict(self._inputs(self.structure, system.inputs_at(0.0).tolist()))
 
     def _inputs(self, structure: Structure, given: list[float]) -> Iterator[tuple[str, Formula]]:
-        """Symbols of the inputs, put where their values stand; their slopes are those of now."""
+        """Symbols for values and rates of the inputs at t, as of pieces that begin there."""
         places = dict(structure.inputs)
         for entry, place in places.items():
             self.p[place] = given[entry]
         for name, number in self.model.layout.inputs.items():
-            if COUNT * number in places:
-                found = self.book.symbol(name, given[COUNT * number])
-                self.p[places[COUNT * number]] = found
-                yield name, found
+            first = COUNT * number
+            if first not in places:
+                continue
+            self.p[places[first]] = self.t
+            for k, full in enumerate((name, f"{name}.rates[0]", f"{name}.rates[1]")):
+                factor = math.factorial(k)
+                found = self.book.symbol(full, factor * given[first + 1 + k])
+                self.p[places[first + 1 + k]] = found * (1.0 / factor)
+                yield full, found
 
     def equations(self) -> ClosedEquations:
         required = self._required()
@@ -144,16 +152,20 @@ class _Closing:
         rest = [[_without(required[i], pushed)] for i in free]
         writer = Writer()
         write = writer.symbol
-        numbers = {write(x): x.value for x in (*self.q, *self.u, *self.kept.values())}
+        matrices = writer.matrix(mass), writer.matrix(rest)
+        occurring = set().union(*(matrix.free_symbols for matrix in matrices))
+        inputs = {name: write(x) for name, x in self.inputs.items() if write(x) in occurring}
+        named = (*self.q, *self.u, *self.kept.values(), *(self.inputs[name] for name in inputs))
+        numbers = {write(x): x.value for x in named}
         layout = self.model.layout
         q = zip(self.q, layout.q_names, (x for o in layout.owners for x in o.q_units), strict=True)
         u = zip(self.u, layout.u_names, (x for o in layout.owners for x in o.u_units), strict=True)
         return ClosedEquations(
-            writer.matrix(mass), writer.matrix(rest),
+            *matrices,
             tuple(Motion(write(x), name, unit) for x, name, unit in q),
             tuple(Motion(write(x), name, unit) for x, name, unit in u),
             free, tuple(write(x) for k, x in enumerate(self.a) if k not in free),
-            {name: write(x) for name, x in self.inputs.items()},
+            inputs,
             {name: write(x) for name, x in self.kept.items()}, numbers,
         )  # fmt: skip
 

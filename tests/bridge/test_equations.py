@@ -119,6 +119,37 @@ def test_numbers_of_the_start_come_with_the_symbols() -> None:
     assert found.coordinates[0].name == "pivot.angle" and found.coordinates[0].unit == "rad"
 
 
+@pytest.mark.parametrize("value", [0.5, 0.0, 2.0])
+def test_an_input_of_a_law_and_of_a_load_stays_a_symbol(value: float) -> None:
+    """Whatever its value is: h = m g c cos(q) - 3 p + 0.7 F t sin(q), by hand."""
+    scene = rods({"law": {"effort": "3*push"}}, input=[
+        {"name": "push", "value": value, "rates": [0.3, 0.4]}, {"name": "pull", "value": value}
+    ], load=[{"on": "rod1.tip", "force": ["pull * t", 0, 0]}])  # fmt: skip
+    found = closed(scene)
+    q, t = found.coordinates[0].symbol, sp.Symbol("t", real=True)
+    push, pull = found.inputs["push"], found.inputs["pull"]
+    lever = sp.Rational("0.3") * sp.Rational("2.5") * sp.Rational("9.81")
+    expected = lever * sp.cos(q) - 3 * push + sp.Rational("0.7") * pull * t * sp.sin(q)
+    assert sp.simplify(found.h[0] - expected) == 0
+    assert list(found.inputs) == ["push", "pull"] and found.numbers[push] == value
+
+
+def test_a_drive_that_follows_an_input_has_its_rates_as_symbols() -> None:
+    """As the engine computes them at numbers of the input that are others than the page's."""
+
+    def scene(value: float, *rates: float) -> mstmm.Scene:
+        given = {"name": "turn", "value": value, "rates": list(rates)}
+        return rods({"drive": "2 * turn"}, {}, input=[given])
+
+    found = closed(scene(0.0, 0.0, 0.0))
+    model = mstmm.compile(scene(0.4, 0.7, -0.9), engine="looped")
+    needed = model.inverse_dynamics([0.8, 0.3], [1.4, -0.5], [-1.8, 0.0])[1]
+    values = {"turn": 0.4, "turn.rates[0]": 0.7, "turn.rates[1]": -0.9}
+    at = {found.inputs[name]: value for name, value in values.items()}
+    at |= {found.coordinates[1].symbol: 0.3, found.speeds[1].symbol: -0.5}
+    assert found.h.subs(at)[0] == pytest.approx(needed, rel=1e-12)
+
+
 # --- pages --------------------------------------------------------------------------------------
 
 
