@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ from ..engine.engine import Engine
 from ..engine.loops.calls import LoopCalls
 from ..engine.loops.freedom import Freedom
 from ..engine.sizes import scene_length, speed_sizes
-from ..engine.statics.rest import Rest, approached, leaving
+from ..engine.statics.rest import Rest, Unsettled, approached, leaving
 from ..engine.statics.rest_by_sweep import RestBySweep
 from ..engine.statics.shifted_stiffness import ShiftedStiffness
 from ..engine.statics.stability import Stability, find_stability
@@ -35,28 +36,50 @@ _DENSE, _DENSE_LOOPS = 20, 6
 DECIDING = 200
 #: Efforts along motions of loops that are rounding, in parts of the work of all that cancel.
 _CANCELLED = 1e-14
+#: Steps beside light rotors before heavy ones are tried.
+_PATIENCE = 100
 #: How often a saddle is left, and how far, in sizes of the coordinates.
-_LEFT, _ASIDE = 4, 0.05
+_LEFT, _ASIDE = 20, 0.05
 
 #: Called with the number of every step and how long it is, in sizes of the coordinates.
 Progress = Callable[[int, float], None]
 
 
+class _Sweeps:
+    """Searches beside rotors of one weight, in parts of the scene's, on all hinges."""
+
+    def __init__(self, model: Compiled, t: float, weight: float) -> None:
+        engine = _with_rotors(model, weight)
+        self.stiffness = ShiftedStiffness(Tangent(engine), t, speed_sizes(model))
+        self._scene = SceneSystem(engine, with_power=False)
+
+    def find(
+        self, q: Array, tolerance: float, max_steps: int, progress: Progress | None
+    ) -> tuple[Array, bool]:
+        """q at rest, and whether any steps led there."""
+        sweep = RestBySweep(self.stiffness, self._settled, max_steps, progress)
+        return sweep.find(q, tolerance), sweep.steps > 0
+
+    def _settled(self, q: Array) -> Array:
+        """The state nearby with drives, quaternions and loops in order."""
+        try:
+            return self._scene.start(self.stiffness.t, q, self.stiffness.still)[: len(q)]
+        except SceneError as error:
+            raise NumericalFailure(str(error)) from None
+
+
 class EquilibriumSearch:
-    """The way of one model to rest at time t: by the sweep, and of few coordinates, where that
-    finds none, by a stiffness matrix of differences and with the load in parts."""
+    """The way of one model to rest at time t: by sweeps, and of few coordinates, where those find
+    none, by a stiffness matrix of differences and with the load in parts."""
 
     def __init__(self, model: Compiled, t: float) -> None:
         self._model, self._t = model, t
         few = len(model.free_speeds) if model.closed is None else model.closed.loops.mobility
         self._is_decided = few <= DECIDING
         self._is_small = few <= (_DENSE if model.freedom is None else _DENSE_LOOPS)
-        self._stiffness: ShiftedStiffness | None = None
-        self._scene: SceneSystem | None = None
+        self._sweeps: _Sweeps | None = None
         try:
-            engine = _with_rotors(model)
-            self._stiffness = ShiftedStiffness(Tangent(engine), t, speed_sizes(model))
-            self._scene = SceneSystem(engine, with_power=False)
+            self._sweeps = _Sweeps(model, t, 1.0)
         except SceneError:  # elements of before there were derivatives
             if not self._is_small:
                 raise
@@ -66,11 +89,11 @@ class EquilibriumSearch:
         self, q: Array, tolerance: float, max_steps: int, progress: Progress | None
     ) -> tuple[Array, Stability]:
         """q at rest, and its stability; saddles that were found on the way are left again."""
-        if self._stiffness is None:
+        if self._sweeps is None:
             return self._find_by_differences(q, tolerance)
-        sweep = RestBySweep(self._stiffness, self._settled, max_steps, progress)
+        asked = tolerance, max_steps, _counted(progress)
         try:
-            found = sweep.find(q, tolerance)
+            found, moved = self._swept(self._sweeps, q, *asked)
         except NumericalFailure as failure:
             if not self._is_small:
                 raise
@@ -78,30 +101,49 @@ class EquilibriumSearch:
                 return self._find_by_differences(q, tolerance)
             except NumericalFailure:
                 raise failure from None
-        stability = find_stability(self._stiffness, found)
-        for _ in range(_LEFT if sweep.steps else 0):
+        stability = find_stability(self._sweeps.stiffness, found)
+        for _ in range(_LEFT if moved else 0):
             if not stability.unstable:
                 break
+            beside = self._beside(self._sweeps.stiffness, found, stability.unstable)
             try:
-                beside = sweep.find(self._beside(found, stability.unstable[0]), tolerance)
+                found, _ = self._swept(self._sweeps, beside, *asked)
             except NumericalFailure:
                 break
-            found, stability = beside, find_stability(self._stiffness, beside)
+            stability = find_stability(self._sweeps.stiffness, found)
         return found, stability
 
-    def _settled(self, q: Array) -> Array:
-        """The state nearby with drives, quaternions and loops in order."""
-        assert self._scene is not None
+    def _swept(
+        self, light: _Sweeps, q: Array, tolerance: float, max_steps: int, progress: Progress | None
+    ) -> tuple[Array, bool]:
+        """q at rest, and whether any steps led there: of many coordinates, where that takes long,
+        beside heavy rotors first."""
+        model, first = self._model, max_steps if self._is_small else min(max_steps, _PATIENCE)
         try:
-            return self._scene.start(self._t, q, np.zeros(self._model.nu))[: len(q)]
-        except SceneError as error:
-            raise NumericalFailure(str(error)) from None
+            return light.find(q, tolerance, first, progress)
+        except Unsettled:
+            if first == max_steps:
+                raise
+        left = max_steps - first
+        try:
+            heavy = _Sweeps(model, self._t, float(len(model.free_speeds)))
+            near, _ = heavy.find(q, tolerance, left, progress)
+            return light.find(near, tolerance, left, progress)[0], True
+        except NumericalFailure:
+            pass
+        try:
+            return light.find(q, tolerance, left, progress)
+        except Unsettled as failure:
+            raise Unsettled(f"not at rest after {max_steps} steps", failure.residual) from None
 
-    def _beside(self, q: Array, motion: Array) -> Array:
-        """q a little way along a motion (nu,)."""
-        assert self._stiffness is not None
-        step = _ASIDE / self._stiffness.length(motion) * motion
-        return np.asarray(q + self._stiffness.tangent.rates(q, step))
+    @staticmethod
+    def _beside(stiffness: ShiftedStiffness, q: Array, motions: list[Array]) -> Array:
+        """q a little way along all of some motions (nu,)."""
+        aside = np.zeros_like(motions[0])
+        for one in motions:
+            aside += one / one[np.abs(one / stiffness.sizes).argmax()]
+        step = _ASIDE / stiffness.length(aside) * aside
+        return np.asarray(q + stiffness.tangent.rates(q, step))
 
     def _find_by_differences(self, q: Array, tolerance: float) -> tuple[Array, Stability]:
         model = self._model
@@ -116,11 +158,13 @@ class EquilibriumSearch:
 
     def residuals(self, q: Array) -> dict[str, float]:
         """Efforts that are missing at a rest, by the names of speeds."""
-        model, freedom, stiffness = self._model, self._model.freedom, self._stiffness
-        if stiffness is None or self._by_differences is not None:
+        model, freedom = self._model, self._model.freedom
+        if self._sweeps is None or self._by_differences is not None:
             assert self._by_differences is not None
             places, efforts = self._by_differences.places, self._by_differences.needed(q)
-        elif freedom is None or not self._is_decided:
+            return {model.layout.u_name(j): float(x) for j, x in zip(places, efforts, strict=True)}
+        stiffness = self._sweeps.stiffness
+        if freedom is None or not self._is_decided:
             own, missing = set(stiffness.own.tolist()), stiffness.residual(q)
             places = tuple(j for j in model.free_speeds if j not in own)
             efforts = missing[list(places)]
@@ -130,16 +174,21 @@ class EquilibriumSearch:
         return {model.layout.u_name(j): float(x) for j, x in zip(places, efforts, strict=True)}
 
 
-def _with_rotors(model: Compiled) -> Engine:
-    """The engine of the model with rotors on all hinges, as heavy as the scene: what the way to
-    rest may go by."""
+def _counted(progress: Progress | None) -> Progress | None:
+    """The same with steps counted over several searches."""
+    steps = itertools.count()
+    return None if progress is None else lambda _, length: progress(next(steps), length)
+
+
+def _with_rotors(model: Compiled, weight: float) -> Engine:
+    """The engine of the model with rotors on all hinges, as heavy as so many scenes."""
     packed = model.packed
     masses = [body.mass for body in model.scene.bodies.by_name.values() if hasattr(body, "mass")]
-    rotors = (sum(masses) or 1.0) * (scene_length(model) / speed_sizes(model)) ** 2
-    heavy = Engine(packed_system(with_rotors(packed.system, rotors.tolist()), packed))
+    rotors = weight * (sum(masses) or 1.0) * (scene_length(model) / speed_sizes(model)) ** 2
+    engine = Engine(packed_system(with_rotors(packed.system, rotors.tolist()), packed))
     if model.closed is not None:
-        LoopCalls(heavy, model.closed.start[0])  # judges its rows
-    return heavy
+        LoopCalls(engine, model.closed.start[0])  # judges its rows
+    return engine
 
 
 def _problem(model: Compiled, t: float, free: list[int]) -> Rest:

@@ -112,14 +112,16 @@ def test_a_chain_hangs_as_a_catenary_of_links(name: str, closing: str) -> None:
     assert max(map(abs, found.residuals.values())) < 1e-7
 
 
-def test_a_straight_chain_is_closed_and_hangs() -> None:
-    """Eight links in a row are bent to meet two planes, and hang from there."""
-    scene = chain(np.zeros(8), "planes")
+@pytest.mark.parametrize("count", [8, 200])
+def test_a_straight_chain_is_closed_and_hangs(count: int) -> None:
+    """Links in a row are bent to meet two planes, and hang from there."""
+    scene = chain(np.zeros(count), "planes")
+    span = 0.625 * LENGTH * count
     for one in scene["constraint"]:
-        one["position"] = [2.5, 0.0, 0.0]
+        one["position"] = [span, 0.0, 0.0]
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     found = model.equilibrium()
-    assert apart(angles_of(found, model), catenary(arc(8, 0.625))) < 1e-8
+    assert apart(angles_of(found, model), catenary(arc(count, 0.625))) < 1e-8
 
 
 def test_a_thousand_links_hang_after_few_steps() -> None:

@@ -21,6 +21,7 @@ from .drives import sharing
 from .parallel import COUNTING, skewed, skewed_by_gap
 from .rank import REPEATED, rank_at
 from .refinement import refinements, unlike_masses
+from .rotor_assembly import RotorAssembly
 from .stress import outboard_axes
 
 #: Directions of a hinge that closes a loop, as its rows are called.
@@ -165,7 +166,7 @@ class Closed:
         return q, self._assembly(q, fast, t).speeds(q, u)
 
     def _assembly(self, q: Array, hinges: Collection[str], t: float = 0.0) -> Assembly:
-        return Assembly(self.engine, q, hinges, self._sharing, t)
+        return RotorAssembly(self.engine, q, hinges, self._sharing, t)
 
     def _sharing(self, q: Array) -> str:
         """Drives that move the same freedom near q, in words."""
