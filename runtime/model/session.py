@@ -26,6 +26,7 @@ from ..run import classical, second_opinion
 from ..run.endings import message_of
 from ..run.engine_choice import for_many
 from ..run.measured import MeasuredOutputs, refuse_one_way
+from ..run.notes import unseen
 from ..run.simulate import SLICE, make_run, settled, settles, split
 from ..run.stability import check_step
 from ..run.system import SceneSystem
@@ -54,7 +55,6 @@ class Session:
     Attributes:
         model: the model at the session's start.
         settings: how its steps are made.
-        risks: what speaks against the fixed step.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Session:
     ) -> None:
         refuse_method(settings)
         refuse_one_way(model.packed, "a session")
-        self.model, self.settings, self.risks = model, settings, risks
+        self.model, self.settings, self._risks = model, settings, risks
         self._names = settable(model)
         self._packed = with_held(model.packed, self._names, settings.t_start)
         self._code = for_many(model, settings)
@@ -193,6 +193,12 @@ class Session:
             return y
         t = np.array([self.t])
         return settled(self._system, t, y[None], self._system.memory[None])[0][0]
+
+    @property
+    def risks(self) -> tuple[Risk, ...]:
+        """What speaks against the fixed step; conditions that may have held unseen."""
+        missed = self._run.unseen
+        return self._risks if missed is None else (*self._risks, unseen(self._system, *missed))
 
     @property
     def warnings(self) -> tuple[str, ...]:

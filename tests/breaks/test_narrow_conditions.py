@@ -156,6 +156,14 @@ def test_what_changes_too_often_to_be_followed_is_a_doubt(method: str) -> None:
     assert any(risk.name == "switches" and '"seen"' in risk.element for risk in run.risks)
 
 
+def test_a_session_says_what_changes_too_often() -> None:
+    model = mstmm.compile(sliding("sin(2e5*h.q) + 0.5*sin(4e5*h.q) > 1.4"), engine="looped")
+    session = model.session()
+    assert not session.risks
+    session.advance(2.0)
+    assert [risk.name for risk in session.risks] == ["switches"] and '"seen"' in session.warnings[0]
+
+
 @pytest.mark.parametrize(
     "when",
     ["sin(h.q) > 1.0000001", "b.x < -1e-9", "cos(h.q - 4) > 1 + 1e-12", "h.q > 1e3",
