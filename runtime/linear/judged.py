@@ -18,7 +18,7 @@ from .modes import modes
 from .operating_point.changes import MATRICES, find_changes
 from .operating_point.departure import LARGEST, Departure, find_departure
 from .operating_point.later import LaterStates
-from .operating_point.sticking import friction_risks
+from .operating_point.sticking import friction_risks, saturation_risks
 from .output.outputs import left_out
 
 if TYPE_CHECKING:
@@ -37,6 +37,8 @@ def find_linear_risks(linear: Equations) -> Iterator[Risk]:
     yield from _unsteady(linear)
     if len(linear) <= LARGEST:
         yield from friction_risks(linear)
+    if len(linear) <= _ALL_MOTIONS and linear.carrying is None:
+        yield from saturation_risks(linear)
     yield from without_effect(linear, linear.V)
     yield from find_omissions(linear)
     if len(linear) <= _ALL_MOTIONS:

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 _SMALL = 0.01
 #: Radians or lengths of the scene beyond which nothing pushes a hinge back.
 _FAR = 10.0
+#: Speed in sizes a second, damping in 1/s that is none, and the part of the damping at
+#: small speeds below which that at this speed is another.
+_FAST, _FAINT, _SATURATED = 0.1, 1e-6, 0.1
 #: Entries that a message lists; stiffness that is none, in parts.
 _LISTED, _SOFT = 4, 1e-12
 
@@ -50,6 +53,31 @@ def friction_risks(linear: Equations) -> Iterator[Risk]:
         float(amplitudes[worst]), _SMALL * float(sizes[worst]), _unit(linear, left[worst].speed),
         doubt=bool(amplitudes[worst] > _SMALL * sizes[worst]),
     )  # fmt: skip
+
+
+def saturation_risks(linear: Equations) -> Iterator[Risk]:
+    """Coordinates whose damping at the state is that of small speeds alone: friction that an
+    expression describes, such as -10*tanh(u/0.001)."""
+    sizes, tree, state = speed_sizes(linear.model)[list(linear.free)], linear.tree, linear.state
+    memory, basis = tree.start_memory(), linear.spread(np.eye(len(linear)))
+    for k, (name, size) in enumerate(zip(linear.coordinates, sizes.tolist(), strict=True)):
+        slope, speed = float(linear.C[k, k]), _FAST * size
+        if not slope > _FAINT * float(linear.M[k, k]):
+            continue
+        ahead, behind = (
+            basis[:, k] @ tree.inverse_dynamics(
+                state.t, state.q, state.u + way * speed * basis[:, k], state.a, memory
+            )
+            for way in (1.0, -1.0)
+        )  # fmt: skip
+        part = abs(ahead - behind) / (2 * slope * speed)
+        if part < _SATURATED:
+            yield Risk(
+                "dry-friction", name,
+                f"damping of {name} is that of speeds near the state alone: at {speed:.3g} "
+                f"{linear.units[k]}/s it is {part:.2g} times as large, as of dry friction",
+                "give it as law.friction of the hinge, or as a linear damping", part, _SATURATED,
+            )  # fmt: skip
 
 
 def _sentence(name: str, unit: str, amplitude: float, static: float) -> str:

@@ -186,3 +186,14 @@ def test_beside_beams_without_shapes() -> None:
             [2.0], ["slew.effort"], ["slew.angle"], exact=True, friction=friction
         )
         assert found.values[0, 0, 0] == pytest.approx(1 / (10.0 - 4.0 + 2j * c), rel=1e-5)
+
+
+def test_friction_by_an_expression_is_told() -> None:
+    """Its slope is that of the regularised law, 10 at speeds below 0.001 rad/s; drag and a linear
+    damper are what they are."""
+    scenes = {law: pendulum(law={"effort": law}) for law in
+              ("-0.01*tanh(u/0.001)", "-0.3*u*abs(u)", "-0.2*u", "-2*sinh(u)")}  # fmt: skip
+    told = [law for law, scene in scenes.items() if not of(scene).linearize().trusted]
+    assert told == ["-0.01*tanh(u/0.001)"]
+    (text,) = of(scenes[told[0]]).linearize().warnings
+    assert "damping of pivot.angle is that of speeds near the state alone" in text
