@@ -102,6 +102,7 @@ def _scene(path: str) -> Report:
     """Validate, compile, and evaluate the accelerations once."""
     import mstmm
     from mstmm.runtime.pack.merge.simplification import COUNTED
+    from mstmm.runtime.run.stability import find_fastest_motion
 
     from .models import compiled
 
@@ -116,13 +117,33 @@ def _scene(path: str) -> Report:
     notes = [f"{name}: {note}" for name, body in model.flexible.items() for note in body.notes]
     notes += [str(one) for one in model.simplifications if one.kind in COUNTED]
     warnings = [*scene.warnings, *(w for body in model.flexible.values() for w in body.warnings)]
+    small = model.nu <= _EXAMINED
+    fastest = find_fastest_motion(model.looped, *model.initial_state()) if small else None
     report = {
         "ok": True, "kind": "scene", **sizes, "warnings": warnings, "choices": notes,
         "loops": _loops(model.loops),
+        "fastest": None if fastest is None else {"rate": fastest[0], "element": fastest[1]},
     }  # fmt: skip
     lines = [_scene_text(path, scene, sizes, warnings, notes), *_loop_lines(model.loops)]
+    if fastest is not None:
+        lines.append(_fastest_line(*fastest))
     text = "\n".join(lines)
     return {**report, "toml": scene.to_toml(), "text": text, "model": model}
+
+
+#: Most speeds of scenes whose motions are looked at.
+_EXAMINED = 10_000
+
+#: Rate (1/s) of a motion from which explicit methods need many steps a second.
+_FAST = 1e4
+
+
+def _fastest_line(rate: float, element: str) -> str:
+    """The fastest motion of the start, and what it costs explicit methods."""
+    line = f"  fastest motion at the start: {rate:.3g} 1/s, by {element}"
+    if rate < _FAST:
+        return line
+    return f"{line}; explicit methods need at least {rate / 6:.1g} steps a second: --method auto"
 
 
 def _assembled(model: Model) -> str:

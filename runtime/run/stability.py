@@ -21,7 +21,7 @@ from mstmm.errors import NumericalFailure
 from mstmm.risk import Risk
 
 from ..engine.engine import Engine
-from ..engine.motions import DENSE, Complex, motions
+from ..engine.motions import DENSE, Complex, fastest, motions
 from ..integrate.steppers import get
 from . import classical, second_opinion
 from .system import SceneSystem
@@ -147,26 +147,47 @@ def _checked(
 ) -> StepCheck | None:
     """The check at a state (t, y, memory), over a time (s); None where nothing moves."""
     assert settings.step is not None
-    step, (t, y, memory), layout = settings.step, state, engine.packed.layout
+    step, (t, y, memory) = settings.step, state
     span = max(span, step)
     try:
         values, vectors = motions(engine, t, y, memory)
         growth = _growth(tableau, values, step, span)
         k = int(growth.argmax() if growth.max() > np.log(_GROWTH) else np.abs(values).argmax())
-        shares = _shares(engine, t, y, memory, vectors[engine.nq :, k])
+        kind, name = _element(engine, t, y, memory, vectors[engine.nq :, k])
     except (NumericalFailure, np.linalg.LinAlgError):  # the run itself will say what is wrong
         return None
     rate = float(abs(values[k]))
     if not rate > 0.0 or not np.isfinite(rate):
         return None
-    hinge = max(layout.owners, key=lambda s: float(shares[s.u_slice].sum()))
     with np.errstate(over="ignore"):  # a step may be too long beyond numbers
         factor, over_all = np.exp([growth[k] * step / span, growth[k]]).tolist()
     return StepCheck(
-        step, rate, step * rate, factor, over_all, hinge.name,
-        _longest(tableau, complex(values[k]), span),
-        "flexible body" if hinge.name in layout.modal else "hinge",
+        step, rate, step * rate, factor, over_all, name,
+        _longest(tableau, complex(values[k]), span), kind,
     )  # fmt: skip
+
+
+def find_fastest_motion(engine: Engine, q: Array, u: Array) -> tuple[float, str] | None:
+    """|lambda| (1/s) of the fastest motion at the state q (nq,), u (nu,), and the hinge or flexible
+    body that drives it most, in words; None where nothing moves or the state cannot be evaluated.
+    """
+    if not engine.nu:
+        return None
+    y, memory = np.concatenate([q, u]), engine.start_memory()
+    try:
+        value, vector = fastest(engine, 0.0, y, memory)
+        kind, name = _element(engine, 0.0, y, memory, vector[engine.nq :])
+    except (NumericalFailure, np.linalg.LinAlgError):
+        return None
+    rate = float(abs(value))
+    return (rate, f'{kind} "{name}"') if np.isfinite(rate) and rate > 0.0 else None
+
+
+def _element(engine: Engine, t: float, y: Array, memory: Array, speeds: Complex) -> tuple[str, str]:
+    """Kind and name of the hinge or flexible body that drives a motion (nu, complex) most."""
+    shares, layout = _shares(engine, t, y, memory, speeds), engine.packed.layout
+    most = max(layout.owners, key=lambda s: float(shares[s.u_slice].sum()))
+    return "flexible body" if most.name in layout.modal else "hinge", most.name
 
 
 def _growth(tableau: Tableau, values: Complex, step: ArrayLike, span: float) -> Array:

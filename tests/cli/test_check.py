@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import mstmm as package
-from cli.commands import Command
+from cli.commands import PENDULUM, Command
 
 
 def test_scene_is_summed_up(mstmm: Command) -> None:
@@ -177,3 +177,28 @@ def test_names_beyond_ascii_work(mstmm: Command, folder: Path) -> None:
     assert mstmm("check", "Päpendel 振り子.toml").code == 0
     done = mstmm("simulate", "Päpendel 振り子.toml", "--t-end", "0.1")
     assert done.code == 0 and (folder / "Päpendel 振り子.nc").is_file()
+
+
+def test_the_fastest_motion_is_named_with_its_element(mstmm: Command, folder: Path) -> None:
+    """A damper between a rod on a pin and a tool at its tip: c (1/I_tool + 1/I_rod)."""
+    tool = """
+[[body]]
+name = "tool"
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+[[hinge]]
+name = "grip"
+type = "pin"
+inboard = "rod.tip"
+outboard = "tool"
+law = { damping = 1e6 }
+"""
+    (folder / "stiff.toml").write_text(PENDULUM + tool)
+    done = mstmm("check", "stiff.toml")
+    assert 'fastest motion at the start: 1.07e+07 1/s, by hinge "grip"' in done.out
+    assert "--method auto" in done.out
+    data = json.loads(mstmm("check", "stiff.toml", "--json").out)["checked"][0]["fastest"]
+    assert data["element"] == 'hinge "grip"'
+    assert data["rate"] == pytest.approx(1e6 * (1 / 0.1 + 1 / (0.084 + 0.25 + 1.0)), rel=1e-4)
+    slow = mstmm("check", "pendulum.toml").out
+    assert "fastest motion" in slow and "--method auto" not in slow
