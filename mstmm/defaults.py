@@ -1,6 +1,6 @@
 """What a run does unless it is told otherwise: said here, and nowhere else."""
 
-#: Method of the time integration.
+#: Method of fixed steps, sessions and batches.  Other runs are made by "auto", which begins by it.
 METHOD = "dop853"
 
 #: Relative and absolute tolerance (the latter in the units of q and u).

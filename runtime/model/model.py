@@ -193,7 +193,8 @@ class Model(Linearised, Displayed):
                 scipy-BDF, scipy-LSODA, sundials-BDF, sundials-Adams: integrators of SciPy and
                 SUNDIALS on the same kernels; dttmm-classical, dttmm-classical-product (with
                 `step`): the discrete-time transfer matrix method in absolute coordinates.
-                Without one dop853; auto where an error is given.
+                Without one auto, or dop853 where `step` is given; a run that has kept to dop853
+                is recorded as one by that method.
             step: fixed step in s; otherwise `rtol` (1e-9) and `atol` (1e-12) control the step.
             output_times: times of the samples (s, increasing); otherwise every accepted step (with
                 an error 201 samples).
@@ -236,7 +237,7 @@ class Model(Linearised, Displayed):
         certify, resume = yes_or_no("certify", certify), yes_or_no("resume", resume)
         given = Control(method, step, rtol, atol)
         wanted = asked(error, error_of, given, checkpoint is not None or resume)
-        method, rtol, atol = given.filled(wanted)
+        method, rtol, atol = given.filled()
         settings = checked(
             Settings(
                 t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step,
@@ -256,8 +257,8 @@ class Model(Linearised, Displayed):
             )
         else:
             result = simulate(
-                model, settings, q, u, seen=seen,
-                certify=certify, progress=progress, checkpoint=checkpoint, resume=resume,
+                model, settings, q, u, seen=seen, certify=certify, progress=progress,
+                checkpoint=checkpoint, resume=resume, named=given.method is not None,
             )  # fmt: skip
         return ended(result, on_risk)
 

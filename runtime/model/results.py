@@ -29,10 +29,12 @@ def simulate(
     progress: Callable[[float, float], None] | None,
     checkpoint: str | Path | None,
     resume: bool,
+    named: bool = True,
 ) -> Result:
     """One run, and a second one where its error is asked for; see `Model.simulate`.  `seen` is what
-    a look at it has found."""
-    watch = Watch(progress, settings, runs=2 if certify else 1)
+    a look at it has found; unless its method was `named`, a run by `auto` that has kept to its
+    first one is recorded as one by that."""
+    watch = Watch(progress, settings, runs=2 if certify else 1, named=named)
     if checkpoint is not None:
         watch.checkpoint = Checkpoint(path_of("checkpoint", checkpoint), model, settings, q, u)
     run = first_run(model, settings, q, u, watch, resume)

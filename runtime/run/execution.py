@@ -42,11 +42,15 @@ CHECKPOINT_EVERY = 30.0
 class Watch:
     """What goes on beside a run: progress, checkpoints, and notes of what went wrong with these.
 
-    With two runs, each counts for half of the time that progress tells.
+    With two runs, each counts for half of the time that progress tells.  A run by a method that was
+    not `named`, and that has kept to its first one, is recorded as one by that.
     """
 
-    def __init__(self, progress: Progress | None, settings: Settings, runs: int = 1) -> None:
+    def __init__(
+        self, progress: Progress | None, settings: Settings, runs: int = 1, named: bool = True
+    ) -> None:
         self.progress, self.settings, self.runs = progress, settings, runs
+        self.named = named
         self.run, self.notes = 0, list[str]()
         self.checkpoint: Checkpoint | None = None
         self.engine = compiled_run.LOOPED
@@ -132,11 +136,14 @@ def first_run(
     watch.engine = compiled_run.FUSED if compiled else compiled_run.LOOPED
     if status is Status.RUNNING:
         status, message = _advanced(system, run, watch, earlier)
+    stretches = () if watch.choice is None else tuple(watch.choice.stretches)
+    if not watch.named and len(stretches) == 1:
+        settings, stretches = replace(settings, method=settings.first_method), ()
     found = trajectory(system, run, settings, status, message, earlier)
     if watch.before:
         found = replace(found, before=watch.before)
-    if watch.choice is not None:
-        found = replace(found, methods=tuple(watch.choice.stretches))
+    if stretches:
+        found = replace(found, methods=stretches)
     if status is not None and not found.is_comparable:
         found = replace(found, message=_cause(engine, found, q, u))
     if beginnings is None:

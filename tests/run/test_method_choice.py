@@ -289,3 +289,40 @@ def test_what_makes_no_sense_with_it_is_refused() -> None:
         import dataclasses
 
         register(dataclasses.replace(get("dop853"), name="auto"))
+
+
+def test_a_run_without_a_method_is_changed_where_it_is_stiff() -> None:
+    """A damper of 1e6 N m s/rad in the second joint: 1e7 1/s and more, millions of explicit steps;
+    the stiff joint then holds two rods as one."""
+    scene = pins(2, [0.3, 0.0]).model_dump(by_alias=True, exclude_none=True)
+    scene["hinge"][1]["law"] = {"damping": [1e6]}
+    run = compiled(scene).simulate(2.0)
+    assert run.success and run.settings.method == "auto" and len(names(run)) > 1
+    assert run.statistics is not None and run.statistics.steps < 5000
+    assert np.abs(run.q[:, 1]).max() < 1e-4
+
+
+@pytest.mark.parametrize("options", [{}, {"certify": True}, {"output_times": [0.5, 1.0]}])
+def test_a_run_without_a_method_that_is_not_stiff_is_one_by_dop853(options: dict[str, Any]) -> None:
+    model = compiled(pins(2, [1.0, 0.5]))
+    run, named = model.simulate(1.0, **options), model.simulate(1.0, "dop853", **options)
+    assert equal(run, named) and run.settings == named.settings and run.methods == ()
+    assert run.statistics == named.statistics and run.warnings == named.warnings
+
+
+def test_fixed_steps_without_a_method_are_those_of_dop853() -> None:
+    run = compiled(pins(1, [1.0])).simulate(1.0, step=0.01)
+    assert run.settings.method == "dop853"
+
+
+def test_a_run_without_a_method_is_resumed(tmp_path: Path) -> None:
+    model, path = compiled(pressed()), tmp_path / "run.checkpoint"
+    whole = model.simulate(2.0, **LOOSE)
+
+    def stop(t: float, _: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        model.simulate(2.0, **LOOSE, progress=stop, checkpoint=path)
+    again = model.simulate(2.0, **LOOSE, checkpoint=path, resume=True)
+    assert equal(again, whole) and again.methods == whole.methods

@@ -178,7 +178,7 @@ def test_a_stiff_chain_takes_few_steps_of_bdf() -> None:
     for hinge in data["hinge"]:
         hinge["law"] = {"stiffness": 1e6, "damping": 2e3}
     model = mstmm.compile(mstmm.Scene.from_data(data), engine="looped")
-    exact = model.simulate(0.5, rtol=1e-10, atol=1e-12)
+    exact = model.simulate(0.5, "dop853", rtol=1e-10, atol=1e-12)
     run = model.simulate(0.5, method="sundials-BDF", rtol=1e-6, atol=1e-9)
     assert run.success and exact.statistics is not None and run.statistics is not None
     np.testing.assert_allclose(run.q[-1], exact.q[-1], atol=1e-7)

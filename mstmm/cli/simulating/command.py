@@ -41,7 +41,7 @@ def simulate(
     method: Annotated[
         str | None,
         typer.Option(
-            "--method", metavar="NAME", show_default=f"{METHOD}, auto with --error",
+            "--method", metavar="NAME", show_default=f"auto, {METHOD} with --step",
             help="auto, which chooses; dop853, dopri5, pirk13, rk4; for stiff motion rodas4p2, "
             "rodas5p, rodas4, ros34pw2, rodas4pw, esdirk436, kvaerno5, genalpha, dttmm, hht, "
             "newmark, wilson, houbolt, genalpha-index3, hht-index3; exprb32 for undamped "

@@ -34,9 +34,9 @@ class Control:
     rtol: float | None
     atol: float | None
 
-    def filled(self, wanted: Asked | None) -> tuple[str, float, float]:
+    def filled(self) -> tuple[str, float, float]:
         """Method, relative and absolute tolerance, with the defaults where nothing was said."""
-        usual = METHOD if wanted is None else AUTO
+        usual = AUTO if self.step is None else METHOD
         return (
             usual if self.method is None else self.method,
             RTOL if self.rtol is None else self.rtol,
