@@ -131,6 +131,38 @@ def test_what_urdf_cannot_say_is_refused(tables: dict[str, Any], message: str) -
         mstmm.export_robot(mstmm.Scene(**{"gravity": [0, 0, -9.81], "body": [BAR]} | tables))
 
 
+def excavator(*left_out: str) -> mstmm.Scene:
+    """A bucket on a stick, turned by a rocker and a link; the load hangs on the bucket."""
+
+    def pin(name: str, inboard: str, outboard: str) -> dict[str, Any]:
+        return {"name": name, "type": "pin", "inboard": inboard, "outboard": outboard}
+
+    pins = [
+        pin("boom_pin", "ground", "boom"), pin("stick_pin", "boom.far", "stick"),
+        pin("bucket_link", "link.far", "bucket.far"), pin("bucket_pin", "stick.far", "bucket"),
+        pin("rocker_pin", "stick", "rocker"), pin("link_pin", "rocker.far", "link"),
+        pin("load_pin", "bucket.far", "load"),
+    ]  # fmt: skip
+    names = ("boom", "stick", "bucket", "rocker", "link", "load")
+    solid = {"mass": 1.0, "inertia": [0.1, 0.1, 0.1], "ends": {"far": [1, 0, 0]}}
+    bodies = [solid | {"name": name} for name in names]
+    hinges = [one for one in pins if one["name"] not in left_out]
+    return mstmm.Scene(gravity=[0, 0, -9.81], body=bodies, hinge=hinges)
+
+
+def test_a_loop_is_refused_by_the_hinge_that_is_cut() -> None:
+    """That of the product's own analysis of loops; either hinge of the bucket may be left out."""
+    scene = excavator()
+    (cut,) = mstmm.compile(scene, engine="looped").loops.cut
+    with pytest.raises(mstmm.SceneError) as told:
+        mstmm.export_robot(scene)
+    assert str(told.value).startswith(f'hinge "{cut}" closes a loop')
+    assert 'body "bucket" is held by hinges "bucket_link" and "bucket_pin"' in str(told.value)
+    assert "keep the bodies" in str(told.value)
+    for name in ("bucket_link", "bucket_pin"):
+        assert mstmm.export_robot(excavator(name)).joints >= 6
+
+
 def test_arguments_that_are_none(tmp_path: Path) -> None:
     scene = mstmm.Scene(gravity=[0, 0, -9.81], body=[BAR], hinge=[PIN])
     for wrong in ("arm.toml", None):

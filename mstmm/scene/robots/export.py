@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from ...arguments import short
 from ...errors import SceneError
 from ...numbers.pose import IN_PLACE, Pose
 from ...numbers.rotations import perpendicular, product, transpose
+from ..checks.topology import build
 from ..rules.values import GROUND
 from ..scene import Scene
 from .robot import FIXED, Joint, Link, Look, Mimic, Note, Robot
@@ -255,17 +256,32 @@ def _refuse(scene: Scene) -> None:
             )
     if scene.constraint:
         raise SceneError("[[constraint]]: URDF has no loops; leave the constraints out first")
-    held = Counter(hinge.outboard_body for hinge in scene.hinges)
     for hinge in scene.hinges:
         if hinge.type not in BY_HINGE:
             raise SceneError(
                 f'hinge "{hinge.name}": URDF has no joint like a {hinge.type} hinge; write pins '
                 "and slides in a row, with bodies without mass between them"
             )
-        if held[hinge.outboard_body] > 1:
-            raise SceneError(
-                f'hinge "{hinge.name}" closes a loop, which URDF has not; leave it out first'
-            )
+    if cut := [scene.hinge[number] for number in build(scene).cut]:
+        raise SceneError(_refusal_of_loops(scene, cut))
+
+
+def _refusal_of_loops(scene: Scene, cut: Sequence[Hinge]) -> str:
+    """Message that names the cut hinges and, for each body they hold, all hinges that do."""
+    names = ", ".join(f'"{hinge.name}"' for hinge in cut)
+    closing = f"hinge {names} closes a loop" if len(cut) == 1 else f"hinges {names} close loops"
+    holders: dict[str, list[str]] = {hinge.outboard_body: [] for hinge in cut}
+    for hinge in scene.hinge:
+        if hinge.outboard_body in holders:
+            holders[hinge.outboard_body].append(f'"{hinge.name}"')
+    held = "; ".join(
+        f'body "{body}" is held by hinges {" and ".join(hinges)}'
+        for body, hinges in holders.items()
+    )
+    return (
+        f"{closing}, which URDF does not have: {held}; leave out hinges until one holds each "
+        "body, and keep the bodies"
+    )
 
 
 def _end(body: Body, end: str) -> Pose:
