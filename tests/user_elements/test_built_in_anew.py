@@ -82,7 +82,7 @@ def test_nothing_goes_by_the_name(name: str) -> None:
     assert first[0] == second[0] and first[1].tobytes() == second[1].tobytes()
     assert ours.layout.q_names == theirs.layout.q_names
     assert ours.parameters.keys() - theirs.parameters.keys() == set()
-    runs = [model.simulate(0.05, method="rk4", step=1e-3) for model in models]
+    runs = [model.simulate(0.01, method="rk4", step=5e-5) for model in models]
     assert runs[0].success and np.isfinite(runs[0].q).all()
     assert runs[0].q.tobytes() == runs[1].q.tobytes()
     assert runs[0].names() == runs[1].names()
