@@ -129,6 +129,8 @@ def test_no_checkout_no_regeneration(
 def test_an_element_of_the_store_shows_its_equations(mstmm: Command, knee: Path) -> None:
     assert mstmm("generate", "my_knee.py").code == 0
     by_file, by_name = mstmm("show", "my_knee.py"), mstmm("show", "knee")
-    assert by_name.code == 0 and by_name.out == by_file.out and "position of P from Q" in by_name.out
+    assert (
+        by_name.code == 0 and by_name.out == by_file.out and "position of P from Q" in by_name.out
+    )
     beside = mstmm("show", "knee", "--beside")
     assert beside.code == 2 and "hinge_knee has no classical matrix beside it" in beside.err

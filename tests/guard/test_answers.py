@@ -33,6 +33,24 @@ def cantilever(load: float, constant: bool = False, **more: object) -> mstmm.Mod
     return mstmm.compile(scene, engine="looped")
 
 
+def spinning_disc() -> mstmm.Model:
+    """A disc that a drive spins on a carriage held by springs along y and z."""
+    spring = {"stiffness": 100.0, "damping": 1.0}
+    light = {"mass": 0.1, "inertia": [1e-3] * 3}
+    scene = mstmm.Scene(
+        gravity=(0, 0, 0), constants={"spin": 1.0},
+        body=[{"name": "slide", **light}, {"name": "housing", **light},
+              {"name": "disc", "mass": 1.0, "inertia": [0.1, 0.05, 0.05]}],
+        hinge=[{"name": "y", "type": "prismatic", "axis": [0, 1, 0], "inboard": "ground",
+                "outboard": "slide", "law": spring},
+               {"name": "z", "type": "prismatic", "axis": [0, 0, 1], "inboard": "slide",
+                "outboard": "housing", "law": spring},
+               {"name": "pin", "type": "pin", "axis": [1, 0, 0], "inboard": "housing",
+                "outboard": "disc", "drive": "spin*t"}],
+    )  # fmt: skip
+    return mstmm.compile(scene, engine="looped")
+
+
 # --- every answer --------------------------------------------------------------------------------
 
 #: Calls of a model that give an answer about a scene.
@@ -47,6 +65,9 @@ ANSWERS: dict[str, Callable[[mstmm.Model], object]] = {
     "modes": lambda model: model.modes(),
     "simulate": lambda model: model.simulate(0.1),
     "simulate_batch": lambda model: model.simulate_batch(model.initial_state(), t_end=0.1),
+    "unbalance_response": lambda model: spinning_disc().unbalance_response(
+        "constants.spin", [1.0, 2.0], "disc", 1e-3
+    ),
     "waterfall": lambda model: model.waterfall(
         "constants.P", [0.5, 1.0], [1.0], "ground.acceleration.y", "b.tip.vy"
     ),
