@@ -54,10 +54,21 @@ class Settings:
 
 
 def times_of(output_times: ArrayLike | Sequence[float] | None) -> tuple[float, ...] | None:
-    """Output times as a tuple; one number stands for itself.  SceneError unless they increase."""
+    """Output times (s) as a tuple, of one number too.
+
+    Raises SceneError for times that do not increase and for a lone whole number, which could be
+    a number of samples.
+    """
     if output_times is None:
         return None
     found = numbers("output_times", output_times)
+    if found.ndim == 0 and np.asarray(output_times).dtype.kind in "iu":
+        n = int(found)
+        raise SceneError(
+            f"output_times = {n}: expected times in s, found a whole number, which may be a time "
+            f"or a number of samples; write [{n:.1f}] for one sample at {n} s, or "
+            f"numpy.linspace(t_start, t_end, {max(n, 2)}) for even samples"
+        )
     if found.ndim > 1:
         raise SceneError(f"output_times have shape {found.shape}, expected (n,): times in s")
     times = np.atleast_1d(found)

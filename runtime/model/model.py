@@ -196,8 +196,8 @@ class Model(Linearised, Displayed):
                 Without one auto, or dop853 where `step` is given; a run that has kept to dop853
                 is recorded as one by that method.
             step: fixed step in s; otherwise `rtol` (1e-9) and `atol` (1e-12) control the step.
-            output_times: times of the samples (s, increasing); otherwise every accepted step (with
-                an error 201 samples).
+            output_times: times of the samples (s, increasing), a lone whole number excepted;
+                otherwise every accepted step (with an error 201 samples).
             error: largest error wanted of the whole run, instead of tolerances: in rad, and of
                 coordinates that are no angles in parts of the largest excursion of their unit.
                 Several runs find the tolerance; `Result.error_estimate` says what was reached.

@@ -117,6 +117,14 @@ SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
     "times beyond the end": ({"output_times": [0.5, 2.0]}, "between t_start = 0 and t_end = 1"),
     "times in rows": ({"output_times": [[0.0, 0.5]]}, "output_times have shape (1, 2)"),
     "times as text": ({"output_times": "all"}, "output_times = 'all'"),
+    "one whole number": (
+        {"output_times": 1},
+        "output_times = 1: expected times in s, found a whole",
+    ),
+    "one whole number of NumPy": (
+        {"output_times": np.int64(301)},
+        "write [301.0] for one sample at",
+    ),
     "no rtol": ({"rtol": np.nan}, "rtol = nan"),
     "endless rtol": ({"rtol": np.inf}, "rtol = inf"),
     "negative rtol": ({"rtol": -1e-9}, "rtol = -1e-09"),
@@ -150,6 +158,13 @@ def test_the_smallest_tolerance_is_certified_like_any_other(
 ) -> None:
     run = model.simulate(0.1, method=method, rtol=1e-6, atol=5e-324, certify=True)
     assert run.success and run.certificate.error is not None
+
+
+def test_one_time_is_a_float(model: mstmm.Model) -> None:
+    for one in (1.0, np.float64(1.0), [1]):
+        assert model.simulate(1.0, output_times=one).t.tolist() == [1.0]
+    with pytest.raises(mstmm.SceneError, match=re.escape("numpy.linspace(t_start, t_end, 301)")):
+        model.simulate_batch((Q, U), t_end=1.0, output_times=301)
 
 
 def test_a_batch_of_none(model: mstmm.Model) -> None:
