@@ -1309,7 +1309,8 @@ static int mstmm_at_row_closed(mstmm_state *state, int index)
     const mstmm_loop_row *row = &state->model->rows[index];
     real *line = loops + MSTMM_ROW * (int64_t)index;
     mstmm_loops_settle(
-        .L = line + MSTMM_ROW_PIVOT, .floor_ = &row->floor, .inverse = line + MSTMM_ROW_INVERSE);
+        .L = line + MSTMM_ROW_PIVOT, .floor_ = mstmm_row_floor(state, row),
+        .inverse = line + MSTMM_ROW_INVERSE);
     if ((row->body >= 0)) {
         real *meeting = mstmm_block(state->model, state->workspace, row->body);
         mstmm_loops_close(
@@ -1947,7 +1948,8 @@ static int mstmm_at_row_closed_in_plane(mstmm_state *state, int index)
     const mstmm_loop_row *row = &state->model->rows[index];
     real *line = loops + MSTMM_ROW * (int64_t)index;
     mstmm_loops_settle(
-        .L = line + MSTMM_ROW_PIVOT, .floor_ = &row->floor, .inverse = line + MSTMM_ROW_INVERSE);
+        .L = line + MSTMM_ROW_PIVOT, .floor_ = mstmm_row_floor(state, row),
+        .inverse = line + MSTMM_ROW_INVERSE);
     if ((row->body >= 0)) {
         real *meeting = mstmm_flat_block(state, row->body);
         mstmm_planar_close(

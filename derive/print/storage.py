@@ -140,7 +140,7 @@ _PLACES = {
     "body.rho": "state->tangents->rho + body->q",
     "body.change": "state->tangents->change + body->q",
     "closure.turn": "closure->turn", "closure.end": "closure->end", "closure.p": "closure->p",
-    "row.floor": "&row->floor",
+    "row.floor": "mstmm_row_floor(state, row)",
     "line.softness": "&state->model->rows[closure->rows[c]].softness",
     "side.inner": "loops + closure->inner[c]", "side.outer": "loops + closure->outer[c]",
     "pending.K": "loops + pending->column", "pending.onward": "loops + pending->onward",

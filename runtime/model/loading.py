@@ -111,12 +111,17 @@ def _read(xarray: Any, path: Path) -> Any:
 
 
 def _completed(model: Model, run: Trajectory) -> Trajectory:
-    """The run with a column of memory that files had not until 2026-11-24: whether a step of a
-    scene with loops ended near a singular pose.  Nothing went by that when they were made."""
+    """The run with columns of memory that files had not until 2026-11-24: whether a step of a scene
+    with loops ended near a singular pose; and until 2026-11-29: which rows are at rest.  Nothing
+    went by these when they were made."""
     system, rows = model.packed.system, run.memory
-    if system.strained < 0 or rows.ndim != 2 or rows.shape[1] != system.n_memory - 1:
-        return run
-    return replace(run, memory=np.insert(rows, system.strained, 0.0, axis=1))
+    added = [system.strained] * (system.strained >= 0), [*system.chosen]
+    for places in (added[1], added[0] + added[1]):
+        if places and rows.ndim == 2 and rows.shape[1] == system.n_memory - len(places):
+            wide = np.zeros((len(rows), system.n_memory))
+            wide[:, np.setdiff1d(np.arange(system.n_memory), places)] = rows
+            return replace(run, memory=wide)
+    return run
 
 
 def _fits(model: Model, run: Trajectory) -> bool:

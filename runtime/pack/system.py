@@ -223,6 +223,10 @@ class Held:
     start: Numbers = ()
 
 
+#: Directions of a closure, each with a place in memory where rows are chosen.
+DIRECTIONS = 6
+
+
 @dataclass(frozen=True, slots=True)
 class ClosureNumbers:
     """What closes a loop: a hinge, behind which the body without mass at place `frame` is to be
@@ -233,7 +237,8 @@ class ClosureNumbers:
     Constraints ask less of the two: as `kind` says, one of those in derive/equations/constraints.py
     with its numbers `p`, or "hinge".  `of_speeds` are the directions in which nothing is asked of
     positions.  Of the six directions the first `asked` say something; those without a row repeat
-    what others do.
+    what others do.  Where some of the rows repeat the others but which do changes along the way,
+    `choice` tells the first place in memory of whether each is at rest, and how many count.
     """
 
     frame: int
@@ -245,6 +250,7 @@ class ClosureNumbers:
     p: Numbers = ()
     of_speeds: tuple[int, ...] = ()
     asked: int = 6
+    choice: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,6 +315,12 @@ class System:
     def remembers(self) -> bool:
         """Whether a state alone does not say how it goes on."""
         return self.n_memory > (self.strained >= 0)
+
+    @property
+    def chosen(self) -> range:
+        """Places in memory that tell which rows of closed loops are at rest."""
+        firsts = [one.choice[0] for one in self.closures if one.choice is not None]
+        return range(firsts[0], firsts[-1] + DIRECTIONS) if firsts else range(0)
 
     @property
     def closes(self) -> bool:

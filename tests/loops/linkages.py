@@ -138,6 +138,57 @@ def bricard(cut: int = 5) -> Scene:
     return {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges}
 
 
+#: Lengths, m, and twist, rad, of a Bennett linkage: the sines of its twists go as its lengths.
+BENNETT = 1.0, 0.7, 0.7
+
+
+def bennett_ratio() -> float:
+    """Product of the tangents of half the first two angles of the Bennett linkage."""
+    a, b, alpha = BENNETT
+    beta = math.asin(b / a * math.sin(alpha))
+    return math.sin((alpha + beta) / 2) / math.sin((beta - alpha) / 2)
+
+
+def bennett(angle: float, speed: float = 0.0, digits: int | None = None) -> Scene:
+    """A Bennett linkage drawn where its first angle is `angle`, its numbers with so many digits
+    behind the point.  G. T. Bennett, A new mechanism, Engineering 76 (1903) 777-778."""
+    a, b, alpha = BENNETT
+    beta = math.asin(b / a * math.sin(alpha))
+    second = 2 * math.atan(bennett_ratio() / math.tan(angle / 2))
+    places, axes = [np.zeros(3)], [np.array([0.0, 0, 1])]
+    turn = np.eye(3)
+    for theta, length, twist in zip((angle, second, -angle), (a, b, a), (alpha, beta, alpha)):
+        (c, s), (ct, st) = (math.cos(theta), math.sin(theta)), (math.cos(twist), math.sin(twist))
+        turn = turn @ np.array([[c, -s * ct, s * st], [s, c * ct, -c * st], [0, st, ct]])
+        turned = turn @ np.array([[1, 0, 0], [0, ct, st], [0, -st, ct]])  # before the twist
+        places.append(places[-1] + length * turned[:, 0])
+        axes.append(turn[:, 2])
+
+    def told(numbers: Sequence[float]) -> list[float]:
+        return [float(x) if digits is None else round(float(x), digits) for x in numbers]
+
+    bodies, hinges = [], []
+    for k in range(3):
+        half = (places[k + 1] - places[k]) / 2
+        inertia = (1 + k / 5) * (half @ half * np.eye(3) - np.outer(half, half)) / 3
+        inertia += 0.01 * np.eye(3)
+        bodies.append({
+            "name": f"link{k}", "mass": 1 + k / 5,
+            "inertia": [float(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
+            "ends": {"near": told(-half), "far": told(half)},
+        })  # fmt: skip
+    sides = [("ground", "link0.near"), ("link0.far", "link1.near"), ("link1.far", "link2.near"),
+             ("ground", "link2.far")]  # fmt: skip
+    for k, (inboard, outboard) in enumerate(sides):
+        hinges.append({
+            "name": f"pin{k}", "type": "pin", "inboard": inboard, "outboard": outboard,
+            "axis": told(axes[k]), "cut": k == 3,
+        })  # fmt: skip
+    hinges[0]["initial"] = {"u": [speed]}
+    hinges[3]["position"] = told(places[3])
+    return {"gravity": [0, 0, -9.81], "body": bodies, "hinge": hinges}
+
+
 def legs(turned: tuple[float, float, float] = (0.05, -0.1, 0.2), law: float = 0.0) -> Scene:
     """Stewart's platform: six legs, each a cylinder on a universal hinge and a piston, on balls.
 

@@ -119,6 +119,9 @@ void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system)
 
 /* --- closed loops ----------------------------------------------------------------------------- */
 
+/* So often at most rows are chosen anew where a step ends. */
+#define CHOICES 3
+
 typedef struct {
     mstmm_scene_run *run;
     double t, *y;
@@ -175,7 +178,7 @@ static int compiled_slips(void *context)
     return 0;
 }
 
-int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y)
+static int close_loops(mstmm_scene_run *run, double t, double *y)
 {
     const mstmm_model *model = run->model;
     if (!run->fused) {
@@ -189,6 +192,22 @@ int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y)
     mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
     const mstmm_closing by = {&at, compiled_gaps, run->on_positions ? NULL : compiled_slips};
     return mstmm_closed(&by, model, &run->failure);
+}
+
+int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y)
+{
+    const mstmm_model *model = run->model;
+    int code = 0, changed = model->n_choices > 0;
+    run->rechosen = 0;
+    if (!changed) return close_loops(run, t, y);
+    for (int k = 0; k < CHOICES && changed && !code; k++) {
+        code = close_loops(run, t, y);
+        if (!code)
+            code = mstmm_choose_rows(model, run->workspace, t, y, run->memory, &changed,
+                                     &run->failure);
+        run->rechosen |= changed;
+    }
+    return code;
 }
 
 int mstmm_stage_speeds(mstmm_scene_run *run, double t, const double *y, const double **u)

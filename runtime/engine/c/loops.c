@@ -43,7 +43,9 @@ int mstmm_hook_rows_begun(mstmm_state *state)
     for (int r = 0; r < model->n_rows; r++) {
         const mstmm_loop_row *row = &model->rows[r];
         row_numbers(state, r)[MSTMM_ROW_PIVOT] =
-            let_go(state, row) ? (real)INFINITY : row->softness + state->give * row->mobility;
+            let_go(state, row) || mstmm_rests(state, row)
+                ? (real)INFINITY
+                : row->softness + state->give * row->mobility;
     }
     return model->n_couplings ? mstmm_hook_couplings_valued(state) : 0;
 }

@@ -276,7 +276,9 @@ static int scene_accept(void *context, double t, double *y)
     mstmm_scene_run *run = context;
     const int code = mstmm_scene_settle(run, t, y), place = run->model->strained;
     if (place >= 0) run->memory[place] = run->strain > run->model->loops_strain;
-    return code ? code : mstmm_controllers_act(run, t, y);
+    const int forgets = run->rechosen ? -1 : 0;
+    const int acted = code ? code : mstmm_controllers_act(run, t, y);
+    return acted ? acted : forgets;
 }
 
 /* Poses and velocities of all bodies of a state with speeds u, to be read from `state`. */

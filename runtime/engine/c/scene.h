@@ -118,6 +118,7 @@ typedef struct {
     mstmm_tangent *base, *stage;
     mstmm_implicit implicit;
     real strain;      /* of the loops when their slips were stopped last: see mstmm_strain */
+    int rechosen;     /* rows have been chosen anew when they were closed last */
     real *speeds;     /* nu: those of a stage near a singular pose; NULL: there are no loops */
     int on_positions; /* the step at hand closes gaps, and leaves slips: index 3 */
     int steady;       /* nothing in the scene goes by time */

@@ -149,6 +149,15 @@ typedef struct {
     const int *pairs; /* of those with the ones that stay, up to this one */
 } mstmm_other;
 
+/* Rows of one closure of which only so many count at a time: the others repeat these.  In the order in
+ * which they are closed; pairs: their entries of L behind `loops`, of row i with row j < i at
+ * i (i - 1) / 2 + j. */
+typedef struct {
+    int n, count;
+    int rows[6];
+    int pairs[15];
+} mstmm_choice;
+
 /* A row of a closed loop, in the order in which they are closed. */
 typedef struct {
     int body; /* where its ends meet; -1: the ground */
@@ -159,6 +168,8 @@ typedef struct {
     real softness; /* 1 / inertia of a rotor on an own speed; 0: the row is met */
     int of_speeds; /* nothing is asked of positions */
     int release;   /* place in memory that is non-zero once the row is let go; -1: never */
+    int rest;      /* place in memory that is non-zero while others are met instead; -1: never */
+    const mstmm_choice *choice; /* it is the first of these rows; NULL: of none */
 } mstmm_loop_row;
 
 /* Whose directions rows of a closure are. */
@@ -272,6 +283,7 @@ typedef struct {
     int64_t loops_summed; /* so many of them are sums */
     int64_t answer;       /* and of nu numbers: an answer that is refined */
     int refines;          /* digits are lost behind heavy bodies: how often to refine accelerations */
+    int n_choices; /* closures whose rows are chosen anew along the way */
     int n_couplings;
     const mstmm_coupling *couplings;
     const mstmm_tape *coupling_tape; /* t, q, u -> their numbers */
@@ -337,6 +349,10 @@ int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q
 int mstmm_moved(const mstmm_model *model, real *workspace, real t, real *q, const real *change,
                 const real *memory, int n_quaternions, const int *quaternions,
                 mstmm_failure *failure);
+/* Chooses, of rows that repeat others, those that are met, and writes that to `memory`: the choice that
+ * is there stays while it is not much worse than the best.  *changed: whether there is a new one. */
+int mstmm_choose_rows(const mstmm_model *model, real *workspace, real t, const real *q,
+                      real *memory, int *changed, mstmm_failure *failure);
 /* Gaps closed and, unless `gaps_alone`, slips stopped in place; driven coordinates are filled in. */
 int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q, real *u,
                       const real *memory, int n_quaternions, const int *quaternions,
@@ -396,6 +412,8 @@ typedef struct mstmm_state {
     int refined;      /* `given` is an answer, its multipliers are kept: what is left is answered */
     real closing;     /* above 0: gaps are asked to close by so many times accelerations */
     int residual;     /* drives give accelerations though others are given */
+    real *chosen;     /* memory to which a new choice of rows is written; NULL: it stays */
+    int changed;      /* there is a new one */
     struct mstmm_state *slope; /* where derivatives along a direction lie; NULL: none are wanted */
     mstmm_tangents *tangents;
 } mstmm_state;
@@ -507,6 +525,12 @@ static inline real mstmm_value_at(const mstmm_state *state, int place)
 {
     return place < 0 ? 0 : mstmm_values(state)[place];
 }
+
+/* The largest pivot of a row that is rounding; before it is told of the first of rows that are chosen,
+ * they are, where they have not been yet. */
+const real *mstmm_row_floor(mstmm_state *state, const mstmm_loop_row *row);
+/* Is a row not met because others of its choice are? */
+int mstmm_rests(const mstmm_state *state, const mstmm_loop_row *row);
 
 /* Given effort of a force element, by the distance of its ends and its rate. */
 int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real *length,

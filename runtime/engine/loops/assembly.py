@@ -15,7 +15,7 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import OpenLoop, SceneError
 
-from ...pack.loops.variants import held, length_of, stiff
+from ...pack.loops.variants import LOCKED, held, length_of, stiff
 from ...pack.pack import packed_system
 from ..engine import Engine
 from .calls import LoopCalls
@@ -25,11 +25,15 @@ from .parallel import COUNTING, skewed, skewed_by_gap
 _LONGEST, _STEPS = 0.5, 300
 #: Compliance of the rows: the first, and where there is no use in more or in less.
 _FIRST, _MOST, _LEAST = 1e-2, 1e8, 1e-12
+#: Ways along which misfits close are so many times longer than these.
+_LONG = 50.0
 #: Gap (m, rad) that is closed where hinges are up to 1 m apart, and change (rad, m) at which
 #: nothing moves any more.
 _CLOSED, _STILL = 1e-10, 1e-9
 #: Other starts where one leads to an open loop, and how far they are from it (rad, m).
 _TRIES, _SHAKEN = 4, 0.1
+#: So often at most rows are chosen anew.
+_CHOICES = 4
 #: So many hinges are named.
 _NAMED = 8
 #: Speeds by which rows may slip, in parts of the largest; pivots that still tell a row from others,
@@ -78,13 +82,13 @@ class Assembly:
         Raises OpenLoop with the least gap, its pose and what was held where there is none near.
         """
         draw, start = np.random.default_rng(0), q
-        nearest, missing = self._nearest(start)
+        nearest, missing = self._nearest(start, rough=much > 0.0)
         for _ in range(_TRIES):
             if self._closes(missing, much):
                 return nearest
             # Where all is in line nothing tells which way to bend.
             shaken = draw.uniform(-_SHAKEN, _SHAKEN, len(self._still)) * self.free
-            trial, after = self._nearest(self.calls.moved(start, shaken))
+            trial, after = self._nearest(self.calls.moved(start, shaken), much > 0.0)
             if self._largest(after) < self._largest(missing):
                 nearest, missing = trial, after
         if self._closes(missing, much):
@@ -92,9 +96,19 @@ class Assembly:
         gap = self._largest(missing)
         raise OpenLoop(self._open(nearest, missing), gap, self._by_names(nearest))
 
-    def _nearest(self, q: Array) -> tuple[Array, Array]:
-        """q of the least gap that steps from q lead to, and what the rows lack there."""
-        q, give = self._own(q), _FIRST
+    def _nearest(self, q: Array, rough: bool = False) -> tuple[Array, Array]:
+        """q of the least gap that steps from q lead to, and what the rows lack there; a `rough` one
+        leaves misfits open that only long ways along a motion close."""
+        self.calls.choose(q)
+        for _ in range(_CHOICES):
+            q, missing = self._stepped(q, rough)
+            if not self.calls.choose(q):
+                break
+        return q, missing
+
+    def _stepped(self, q: Array, rough: bool) -> tuple[Array, Array]:
+        """The same for the rows that are chosen."""
+        q, give, left = self._own(q), _FIRST, np.inf
         rest = self._rest(q)
         for _ in range(_STEPS):
             change, missing = self._correction(q, give)
@@ -102,6 +116,11 @@ class Assembly:
                 q = self.calls.moved(q, change)
                 break
             length = float(np.abs(change).max(initial=0.0))
+            if rough and self._largest(missing) < self._locks:
+                left = _LONG * self._largest(missing) if left == np.inf else left
+                left -= length
+                if left < 0.0:
+                    break
             trial = self._own(self.calls.moved(q, change * min(1.0, _LONGEST / (length or 1.0))))
             after = self._rest(trial)
             if after < rest:
@@ -112,10 +131,18 @@ class Assembly:
                 break
             else:
                 give *= 10.0
-        return q, self.calls.correction(self.calls.gap, q, self._still, _MOST)[1]
+        return q, self._lacking(q, self._still, self.calls.gap, _MOST)[1]
+
+    def _lacking(self, q: Array, u: Array, level: int, give: float = 0.0) -> tuple[Array, Array]:
+        """A correction and what the rows lack, but for misfits of those that are not met now."""
+        change, missing = self.calls.correction(level, q, u, give)
+        most = self._locks * max(1.0, float(np.abs(u).max(initial=0.0)))
+        misfits = self.calls.resting() & (np.abs(missing) <= most)
+        return change, np.where(misfits, 0.0, missing)
 
     def speeds(self, q: Array, u: Array) -> Array:
         """u (nu,) without slips at the closed q.  SceneError where those held do not allow it."""
+        self.calls.choose(q)
         u, missing = self._without_slips(q, u)
         counting = self.calls.inverses() > 0
         if self._slipping(u, missing) is not None and not counting.all():
@@ -138,11 +165,11 @@ class Assembly:
 
     def _without_slips(self, q: Array, u: Array) -> tuple[Array, Array]:
         """u with its slips corrected, and what is left of them."""
-        change, missing = self.calls.correction(self.calls.slip, q, u)
+        change, missing = self._lacking(q, u, self.calls.slip)
         largest = self._largest(missing)
         while True:  # once, but for digits lost behind heavy bodies
             trial = u + self.free * change
-            change, after = self.calls.correction(self.calls.slip, q, trial)
+            change, after = self._lacking(q, trial, self.calls.slip)
             if not self._largest(after) < largest:
                 return u, missing
             u, missing, largest = trial, after, self._largest(after)
@@ -170,7 +197,7 @@ class Assembly:
 
     def _correction(self, q: Array, give: float) -> tuple[Array, Array]:
         """What closes the gaps, and these; what is held stays, though its rows may yield."""
-        change, missing = self.calls.correction(self.calls.gap, q, self._still, give)
+        change, missing = self._lacking(q, self._still, self.calls.gap, give)
         return self.free * change, missing
 
     def _own(self, q: Array) -> Array:
@@ -184,7 +211,7 @@ class Assembly:
         return q
 
     def _rest(self, q: Array) -> float:
-        missing = self.calls.correction(self.calls.gap, q, self._still, _ALONE)[1]
+        missing = self._lacking(q, self._still, self.calls.gap, _ALONE)[1]
         with np.errstate(over="ignore"):  # what is asked may be beyond all squares
             return float(np.sum(self._weights * missing**2))
 
@@ -210,6 +237,7 @@ class Assembly:
         weights, self._turning = np.ones(calls.count), turning
         length = max(1.0, length_of(calls.engine.packed.system))
         self._sizes = np.where(turning | coupling, 1.0, length)
+        self._locks = LOCKED * length_of(calls.engine.packed.system)
         for kind in (turning, coupling, ~(turning | coupling)):
             if kind.any():
                 weights[kind] = 1.0 / calls.mobility[kind].mean()

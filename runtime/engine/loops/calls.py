@@ -15,6 +15,8 @@ from .numbers import LoopNumbers
 #: A pivot below this share of its usual size is rounding, which is the mobility of its row but for
 #: rows that only heavy bodies answer.
 ROUNDING, _ANSWERED = 1e-8, 1e-3
+#: A pivot below this share of the mobility of its row repeats others: misfits up to 4e-3 rad.
+REPEATED = 1e-6
 #: Shares of the mobility below which no usual size is one, and no pivot whatever its usual size.
 _NOISE, _LEAST = 1e-12, 1e-15
 
@@ -65,6 +67,23 @@ class LoopCalls(LoopNumbers):
         if code:
             raise engine.failed(failure, t, q, u)
         return change, missing[: self.count]
+
+    def choose(self, q: Array) -> bool:
+        """Of rows that repeat others those that are met from now on: what was chosen stays while it
+        is not much worse than the best at q (nq,).  Whether there is a new choice."""
+        engine = self.engine
+        changed, failure = engine.ffi.new("int *"), engine.ffi.new("mstmm_failure *")
+        code = engine.lib.mstmm_choose_rows(
+            self.model, engine.workspace(), self.t, engine.pointer(q), engine.pointer(self.memory),
+            changed, failure,
+        )  # fmt: skip
+        if code:
+            raise engine.failed(failure, self.t, q, np.zeros(engine.nu))
+        return bool(changed[0])
+
+    def resting(self) -> Array:
+        """Whether each row (rows,) is not met because others of its choice are."""
+        return self.records.resting(self.memory)
 
     def let_go(self) -> list[int]:
         """Rows of hinges that have been let go by `memory`."""
@@ -123,7 +142,7 @@ class LoopCalls(LoopNumbers):
             heavy = 0.0 < pivot < _ANSWERED * mobility and not self.records.yields(row)
             floor = max(ROUNDING * pivot, _LEAST * mobility) if heavy else floors[row]
             self.records.judge(row, min(floor, floors[row]))
-        return {row for row, pivot in enumerate(usual.tolist()) if not pivot}
+        return {row for row in range(self.count) if not usual[row]} - {*self.records.chosen}
 
     def strain(self, q: Array) -> float:
         """The largest of what is rounding for a row in parts of its pivot, at a closed state."""

@@ -11,15 +11,16 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import MstmmError, NumericalFailure, OpenLoop, SceneError
 
-from ...pack.loops.variants import LOCKED, keeping, length_of, without
+from ...pack.loops.variants import LOCKED, choosing, keeping, length_of, without
 from ...pack.pack import packed_system
+from ...pack.records.loops import LoopRecords
 from ...pack.start import start_values
 from ..engine import Engine
 from .assembly import Assembly
 from .calls import LoopCalls
 from .drives import sharing
 from .parallel import COUNTING, skewed, skewed_by_gap
-from .rank import REPEATED, rank_at
+from .rank import REPEATED, Rank, rank_at
 from .refinement import refinements, unlike_masses
 from .rotor_assembly import RotorAssembly
 from .stress import outboard_axes
@@ -146,7 +147,12 @@ class Closed:
         self._whole = self.engine
         self.loops, repeating = self._judged(near, free_speeds)
         self._refuse_structure()
-        self.start = self.assembled(near, u, holds, self.fast)
+        self.start = self._assembly(near, holds).positions(near), u
+        try:
+            self.start = self.assembled(near, u, holds, self.fast)
+        except SceneError:
+            self._refuse_locked(calls, repeating, LOCKED * length)
+            raise
         self.engine.packed.model.refines = refinements(
             self.engine, *self.start, self.loops.mobility
         )
@@ -204,14 +210,15 @@ class Closed:
             for one in records.closures
             for direction, row in one.rows.items() if row in rank.going
         }  # fmt: skip
-        left = without(packed.system, repeated, couplings)
+        counts = _chosen(records, rank)
+        left = choosing(without(packed.system, repeated, couplings), counts)
         mobility = free_speeds - self._shared() - rows
         bent = sum(slots.nu for slots in packed.layout.modal.values())
         if packed.releases:
             # What repeats others now may be needed once these let go: by every evaluation.
             for row in rank.going:
                 records.judge(row, REPEATED * float(calls.mobility[row]))
-        elif rank.going:
+        elif rank.always:
             self.engine = Engine(packed_system(left, packed))
             calls = LoopCalls(self.engine, q)
             records = calls.records
@@ -227,7 +234,7 @@ class Closed:
             tuple(names[row] for row in sorted(rank.here - rank.always)),
             mobility, records.width, loads, shapes=min(mobility, bent),
         )  # fmt: skip
-        return told, {row: names[row] for row in sorted(rank.going)}
+        return told, {row: names[row] for row in sorted(rank.always)}
 
     def _too_many(self, q: Array, holds: Sequence[str], free_speeds: int) -> str:
         """What ends a message where more is held than is free near q, by the rank there."""
@@ -329,6 +336,17 @@ class Closed:
                 coupling.coupling.name, _COUPLED[coupling.coupling.of_speeds]
             )  # fmt: skip
         return names
+
+
+def _chosen(records: LoopRecords, rank: Rank) -> dict[int, int]:
+    """How many rows count of closures of which some stand in for others, by the place of the
+    frame."""
+    own = {one.frame: {*one.rows.values()} for one in records.closures}
+    standing = rank.always - rank.going
+    return {
+        frame: len(rows - rank.always) - sum(map(records.yields, rows))
+        for frame, rows in own.items() if rows & standing
+    }  # fmt: skip
 
 
 def _behind(engine: Engine, q: Array) -> str:

@@ -9,6 +9,7 @@ closed states nearby is no repetition but a singular pose.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import product
 
@@ -17,17 +18,17 @@ import numpy as np
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
-from ...pack.loops.variants import by_hinges, geometric
+from ...pack.loops.variants import LOCKED, by_hinges, geometric, length_of
 from ...pack.pack import packed_system, unmerged
 from ..engine import Engine
-from .calls import LoopCalls
+from .calls import REPEATED, LoopCalls
 from .stress import Open, not_unique
 
-#: A pivot below this share of the mobility of its row repeats others: misfits up to 4e-3 rad.
-REPEATED = 1e-6
 #: Closed states nearby: how many, how far (rad, m), and how much farther the own coordinates of cut
 #: hinges may go, which only follow.
 _NEIGHBOURS, _AWAY, _FOLLOWING = 3, 3e-2, 10.0
+#: Over this way (rad, m) what repeats others but for a misfit leaves no gap that locks.
+_FAR = 0.3
 #: A closed state that is nearer than this part of the way asked for is the pose itself.
 _BACK = 0.1
 #: Around a singular pose so many are looked for at most.  One counts from which speeds without
@@ -45,7 +46,7 @@ _STEPS, _CLOSED, _GIVE, _SHARE = 200, 1e-9, 1e-6, 1e-2
 class Rank:
     """Rows that repeat others here, those of them that do so in closed states nearby too, and those
     of these that go: the others take the place of another row of their hinge where that one says
-    nothing, at a pose farther away.  `states` are those that were looked at, this one first,
+    less, at a pose farther away.  `states` are those that were looked at, this one first,
     `open` the loads that rows which always repeat others leave open, and
     `nearby` is how few repeat others in any of the states.  `stuck`: motions that close the loops
     to first order lead back to the pose from wherever they go, as of links stretched out in line.
@@ -70,11 +71,11 @@ def rank_at(engine: Engine, q: Array) -> Rank:
     raised = _RAISED * np.abs(calls.pivots()) + _ROUNDING * calls.mobility
     level[list(here)] = np.minimum(level, raised)[list(here)]
     states, stuck = _around(calls, q, here, level)
+    apart = LOCKED * length_of(engine.packed.system)
+    stuck = stuck and not _goes_on(calls, q, here, apart)
     there = [_repeating(calls, state, level) for state in states]
     always, nearby = here.intersection(*there), min(map(len, (here, *there)))
-    gaps = calls.correction(calls.gap, q, np.zeros(engine.nu))[1]
-    closed = np.abs(gaps).max() <= _CLOSED
-    going = always - _stand_ins(calls, q, always) if closed else always
+    going = always.difference(*(_stand_ins(calls, state, always) for state in (q, *states[:1])))
     loads = not_unique(calls, q, here - always) if always else Open()
     return Rank(here, always, going, (q, *states), loads, nearby, stuck)
 
@@ -130,8 +131,8 @@ def judging(engine: Engine, q: Array) -> LoopCalls:
 
 
 def _stand_ins(calls: LoopCalls, q: Array, left_out: frozenset[int]) -> frozenset[int]:
-    """Rows that say something once another row of their hinge is left out in their place: they stay
-    where all gaps close, and at each pose the first that say something count.
+    """Rows that say something once another row of their hinge is left out in their place: they
+    stay, and which of them count is chosen along the way.
 
     Tried for all hinges at a time: what each leaves out first for what it keeps first, and so on.
     """
@@ -166,6 +167,26 @@ def _neighbour(calls: LoopCalls, q: Array, speeds: Array, settled: float) -> Arr
         return None
 
 
+def _goes_on(calls: LoopCalls, q: Array, left: frozenset[int], apart: float) -> bool:
+    """Whether a motion without the rows that are `left` out leads away, over a long way and to both
+    sides, and leaves no gap of these that locks (m, rad): they repeat others but for a misfit."""
+    level = np.zeros(calls.count)
+    level[list(left)] = np.inf
+    speeds = np.random.default_rng(0).uniform(-1.0, 1.0, calls.engine.nu)
+    try:
+        for way in (_FAR, -_FAR):
+            ahead = _ahead(calls, q, np.sign(way) * speeds, abs(way), level)
+            near = None if ahead is None else _closed(calls, ahead, _SETTLED, left)
+            if near is None or _way(calls, near - q) < _BACK * _FAR:
+                return False
+            gaps = np.abs(calls.correction(calls.gap, near, np.zeros(calls.engine.nu))[1])
+            if gaps[list(left)].max() > apart:
+                return False
+    except NumericalFailure:
+        return False
+    return True
+
+
 def _leads_on(calls: LoopCalls, q: Array, speeds: Array, level: Array) -> bool:
     """Whether speeds without slips, but for rows of small pivots, lead to closed states, as they do
     where motions do not branch."""
@@ -193,16 +214,19 @@ def _ahead(calls: LoopCalls, q: Array, speeds: Array, way: float, level: Array) 
     return calls.moved(q, tangent * (farther * way / length)) if farther > 1.0 else near
 
 
-def _closed(calls: LoopCalls, near: Array, settled: float) -> Array | None:
+def _closed(
+    calls: LoopCalls, near: Array, settled: float, left: Collection[int] = ()
+) -> Array | None:
     """The closed state (nq,) near another one, known to `settled` (rad, m); None: there is none.
 
-    All rows are met, those that repeat others here as well.
+    All rows but those that are `left` out are met, those that repeat others here as well.
     """
     still, give = np.zeros(calls.engine.nu), _GIVE
     for row in range(calls.count):
-        calls.records.judge(row, 0.0)
+        calls.records.judge(row, np.inf if row in left else 0.0)
     for _ in range(_STEPS):
         change, missing = calls.correction(calls.gap, near, still, give)
+        missing[list(left)] = 0.0
         rest = float(np.abs(missing).max(initial=0.0))
         if rest < _CLOSED and float(np.abs(change).max(initial=0.0)) < settled:
             return near

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..bodies import RIGID
-from ..system import Arrays, BodyNumbers, BodyRun, ClosureNumbers, System
+from ..system import DIRECTIONS, Arrays, BodyNumbers, BodyRun, ClosureNumbers, System
 
 #: Gap of a row that repeats others, in parts of the length of the scene, at which a rigid mechanism
 #: locks.
@@ -41,7 +41,13 @@ def _run_held(run: BodyRun) -> BodyRun:
 
 def _closure_held(one: ClosureNumbers, speeds: int) -> ClosureNumbers:
     others = (k for k in one.directions if k >= speeds)
-    return replace(one, directions=(*range(speeds), *others))
+    held = (*range(speeds), *others)
+    return replace(one, directions=held, choice=_counting(one, len(held) - len(one.directions)))
+
+
+def _counting(one: ClosureNumbers, more: int) -> tuple[int, int] | None:
+    """The choice of a closure of which so many rows more count."""
+    return None if one.choice is None else (one.choice[0], one.choice[1] + more)
 
 
 def keeping(system: System, values: Sequence[float]) -> System:
@@ -51,6 +57,21 @@ def keeping(system: System, values: Sequence[float]) -> System:
         for one, value in zip(system.couplings, values, strict=True)
     )
     return replace(system, couplings=couplings)
+
+
+def choosing(system: System, counts: Mapping[int, int]) -> System:
+    """With rows that are chosen anew along the way, so many as `counts` says of the closures whose
+    frames are at some places; whether each is at rest stands in memory before what inputs hold."""
+    closures, first = list[ClosureNumbers](), system.held.first
+    for one in system.closures:
+        if one.frame in counts:
+            one = replace(one, choice=(first, counts[one.frame]))
+            first += DIRECTIONS
+        closures.append(one)
+    more = first - system.held.first
+    places = tuple(place + more * (place >= 0) for place in system.held.places)
+    held = replace(system.held, first=first, places=places)
+    return replace(system, closures=tuple(closures), held=held, n_memory=system.n_memory + more)
 
 
 def without(
@@ -94,7 +115,8 @@ def _closure_freed(
 ) -> ClosureNumbers:
     rotor = system.body(one.frame).rotor
     free = {k for k, inertia in enumerate(rotor) if (one.frame, k) in driven and not inertia}
-    return replace(one, directions=tuple(k for k in one.directions if k not in free))
+    left = tuple(k for k in one.directions if k not in free)
+    return replace(one, directions=left, choice=_counting(one, len(left) - len(one.directions)))
 
 
 def torn(system: System) -> System:

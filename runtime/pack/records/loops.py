@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from mstmm.arrays import Array
 from mstmm.graph.mechanism import GROUND
 
 from ...kernels.records import Records
@@ -47,10 +50,18 @@ class LoopRecords:
         self.of_bodies = of_bodies
         self.count = len(plan.rows)
         self.width = max(map(len, plan.pending.values()), default=0)
+        #: Rows of which others may be met instead.
+        self.chosen = [row for row in range(self.count) if rows[row].rest >= 0]
 
     def yields(self, row: int) -> bool:
         """Whether the row is that of a rotor."""
         return bool(self._rows[row].softness > 0)
+
+    def resting(self, memory: Array) -> Array:
+        """Whether each row (rows,) is not met, by memory, because others are instead."""
+        found = np.zeros(self.count, bool)
+        found[self.chosen] = memory[[self._rows[row].rest for row in self.chosen]] > 0
+        return found
 
     def scale(self, row: int, mobility: float) -> None:
         """Take this for the mobility of a row where rows give way."""
@@ -162,7 +173,7 @@ class _Loops:
         model.first_ground_row = len(self.plan.rows)
         for number, row in enumerate(self.plan.rows):
             records[number].body = row.body
-            records[number].release = -1
+            records[number].release = records[number].rest = -1
             records[number].n_others = len(row.others)
             records[number].others = self._others(row.body, row.others, number)
             if row.body == GROUND:
@@ -174,6 +185,8 @@ class _Loops:
         written: dict[int, WrittenClosure] = {}
         for group, closure in self._in_order():
             looped[closure.frame].closure, written[group] = self._closure(group, closure, records)
+        chosen = [self._choice(group, one, records) for group, one in enumerate(self.system.closures)]
+        model.n_choices = sum(chosen)
         attach_couplings(model, self.system, memory, couplings, records, looped, self._side)
         model.looped, model.rows, model.n_rows = looped, records, len(self.plan.rows)
         model.closures = self.shelves["mstmm_closure"].records
@@ -276,6 +289,22 @@ class _Loops:
         return record, WrittenClosure(
             closure.frame, inboard, closure.outboard, closure.kind, record.numbers, own
         )
+
+    def _choice(self, group: int, closure: ClosureNumbers, rows: Any) -> bool:
+        """Tell the rows of a closure of which only so many count, and whether there are some."""
+        if closure.choice is None:
+            return False
+        first, count = closure.choice
+        own = [row for row in self.plan.of[group] if not rows[row].softness]
+        choice = self.memory.new("mstmm_choice *")
+        choice.n, choice.count = len(own), count
+        for i, row in enumerate(own):
+            choice.rows[i] = row
+            rows[row].rest = first + i
+            for j in range(i):
+                choice.pairs[i * (i - 1) // 2 + j] = self._entry(own[j], row)
+        rows[own[0]].choice = choice
+        return True
 
     def _side(self, body: int, row: int) -> int:
         """Place of a row's column on a body, a dump on the ground."""
