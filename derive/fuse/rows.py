@@ -42,8 +42,8 @@ _OF_ROW = {
     "row": "row", "line": "row", "pending": "row", "own": "row", "coupling": "row",
     "bent": "row", "other": "other", "before": "other",
 }  # fmt: skip
-#: A pivot that nothing makes count; and how many times larger than rounding one is that says enough.
-_NEVER, _ENOUGH = 1e300, 1e4
+#: A pivot that nothing makes count.
+_NEVER = 1e300
 
 
 class RowSlots(Slots):
@@ -129,7 +129,7 @@ class RowSlots(Slots):
         if slot in _PAIRS:
             return self._entry(*(getattr(self.at, whose) for whose in _PAIRS[slot]))
         if slot == "row.floor":
-            return [self._floor(self.row())]
+            return f.entries(self.row().floor) or f.zeros(1)
         if slot in _COLUMNS:
             return f.zeros(6)
         if slot in _ON_MODES:
@@ -137,16 +137,6 @@ class RowSlots(Slots):
         if slot.partition(".")[0] in _OF_ROW:
             return f.zeros(1)
         return super()._given(slot)
-
-    def _floor(self, row: RowStructure) -> Node:
-        """The largest pivot of a row that is rounding; while rows are not chosen, the first count
-        that say enough."""
-        f = self.state
-        floor = (f.entries(row.floor) or f.zeros(1))[0]
-        if not row.chosen:
-            return floor
-        known = f.graph.call("lt", f.zero, sum((f.memory[k] for k in row.chosen), f.zero))
-        return f.graph.select(known, floor, f.graph.constant(_ENOUGH) * floor)
 
     def _entry(self, one: int, other: int) -> Nodes:
         """An entry of L before anything is added: a rotor gives way on its own row, and one at rest

@@ -154,9 +154,8 @@ class ClosureStructure:
 class RowStructure:
     """A row that is closed on a body, coupled with `others` that are open yet; a pivot up to
     `floor` is rounding.  `soft` is the rotor inertia of the speed whose row it is; empty: the row
-    is met.  One `of_speeds` asks nothing of positions.  Of rows that are chosen,
-    `rest` is the place in memory that is non-zero while others are met instead (-1: never), and
-    `chosen` are those of all of them, which are zero while nothing has been chosen."""
+    is met.  One `of_speeds` asks nothing of positions.  `rest` is the place in memory that is
+    non-zero while others are met instead; -1: never."""
 
     body: int
     others: tuple[int, ...]
@@ -164,7 +163,6 @@ class RowStructure:
     soft: Entries
     of_speeds: bool = False
     rest: int = -1
-    chosen: tuple[int, ...] = ()
 
 
 #: Numbers of a coupling, in their order; behind them stands -C of each of its hinges.

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from typing import Self
 
+import numpy as np
+
 from mstmm.arrays import Array
 from mstmm.errors import SceneError
 from mstmm.risk import Assessed, DeferredRisks, Risk
@@ -12,6 +14,7 @@ from mstmm.scene.rules.messages import near
 
 from ..engine.compiled import Compiled
 from ..engine.loops.calls import LoopCalls
+from ..engine.loops.closed import Closed
 from ..guard.answers import find_state_risks
 
 
@@ -37,17 +40,10 @@ def assemble(
     hold: Sequence[str],
     fast: Collection[str] | None,
     t: float,
+    branch: int | None = None,
 ) -> Assembly:
     """See `Model.assemble`; speeds of the hinges `fast` stay, of all that have some if None."""
-    hinges, modal = compiled.layout.hinges, compiled.layout.modal
-    if isinstance(hold, str) or not isinstance(hold, Collection):
-        raise SceneError(f"hold = {hold!r:.60}: expected a list of names of hinges")
-    for name in hold:
-        if not isinstance(name, str):
-            raise SceneError(f"hold = {hold!r:.60}: expected names of hinges")
-        if name not in hinges or name in modal:
-            raise SceneError(f'hold: there is no hinge "{name}"{near(name, list(hinges))}')
-    hold = [hinges[name].name for name in hold]
+    hold, hinges = _names(compiled, hold), compiled.layout.hinges
     if compiled.closed is None:
         return Assembly(compiled, t, q.copy(), u.copy())
     q, u = LoopCalls(compiled.looped, q, t=t).driven(q, u)
@@ -57,5 +53,43 @@ def assemble(
     ]  # fmt: skip
     if sum(hinges[name].nu for name in moving) > compiled.closed.loops.mobility:
         moving = []  # a whole state: no more than its freedoms can be kept
-    found = compiled.closed.assembled(q, u, hold, moving if fast is None else fast, t)
+    fast = moving if fast is None else fast
+    if branch is None:
+        found = compiled.closed.nearest(q, u, hold, fast, t)
+    else:
+        there = compiled.closed.led(_on_branch(compiled.closed, branch), q, hold, t)
+        found = compiled.closed.assembled(there, u, hold, fast, t)
     return Assembly(compiled, t, *found)
+
+
+def assemble_path(compiled: Compiled, q: Array, hold: Sequence[str], branch: int) -> Array:
+    """See `Model.assemble_path`."""
+    hold = _names(compiled, hold)
+    if compiled.closed is None:
+        return q.copy()
+    here, found = _on_branch(compiled.closed, branch), np.empty_like(q)
+    for k, row in enumerate(q):
+        to = LoopCalls(compiled.looped, row).driven(row, np.zeros(compiled.nu))[0]
+        found[k] = here = compiled.closed.led(here, to, hold)
+    return found
+
+
+def _on_branch(closed: Closed, number: int) -> Array:
+    """q (nq,) of a branch by its number."""
+    count = len(closed.branches)
+    if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < count:
+        raise SceneError(f"branch = {number!r:.60}: expected 0 to {count - 1}, see loops.branches")
+    return closed.branches[number].q
+
+
+def _names(compiled: Compiled, hold: Sequence[str]) -> list[str]:
+    """Names of hinges that are held; SceneError for what names none."""
+    hinges, modal = compiled.layout.hinges, compiled.layout.modal
+    if isinstance(hold, str) or not isinstance(hold, Collection):
+        raise SceneError(f"hold = {hold!r:.60}: expected a list of names of hinges")
+    for name in hold:
+        if not isinstance(name, str):
+            raise SceneError(f"hold = {hold!r:.60}: expected names of hinges")
+        if name not in hinges or name in modal:
+            raise SceneError(f'hold: there is no hinge "{name}"{near(name, list(hinges))}')
+    return [hinges[name].name for name in hold]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mstmm.arguments import yes_or_no
-from mstmm.arrays import Array, one, pair, real, whole
+from mstmm.arrays import Array, batch, one, pair, real, whole
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import NumericalFailure
 from mstmm.markup import Displayed, table
@@ -23,6 +23,7 @@ from ..integrate.settings import Settings, checked, times_of
 from .linearised import Linearised
 
 if TYPE_CHECKING:
+    from ..engine.loops.branches import Branch
     from ..engine.loops.closed import Loops
     from ..result.batch import Batch
     from ..result.result import Result
@@ -70,7 +71,11 @@ class Model(Linearised, Displayed):
 
         if self.closed is None:
             return Loops()
-        return replace(self.closed.loops, decided_by=self._independent)
+        return replace(self.closed.loops, decided_by=self._independent, found_by=self._branches)
+
+    def _branches(self) -> tuple[Branch, ...]:
+        assert self.closed is not None
+        return self.closed.branches
 
     def _independent(self) -> tuple[str, ...]:
         assert self.freedom is not None
@@ -82,6 +87,7 @@ class Model(Linearised, Displayed):
         u: ArrayLike | None = None,
         hold: Sequence[str] = (),
         t: float = 0.0,
+        branch: int | None = None,
     ) -> Assembly:
         """The nearest (q, u) at which all loops are closed at t (s), near the start where nothing
         is given.
@@ -89,18 +95,35 @@ class Model(Linearised, Displayed):
         q (nq,) and u (nu,) are wishes, but for the coordinates of the hinges named in `hold`, and
         for the speeds of hinges that have some, which stay what they are where these are no more
         than the mechanism has freedoms; driven coordinates and couplings that go by time are those
-        at t.  What changes changes least, by inertia.  Without loops the state itself.
+        at t.  Of the ways in which the loops can close that which is nearest to q is taken, of
+        those that are found; on it what changes changes least, by inertia.  Without loops the state
+        itself.
 
-        Raises SceneError for a hinge that there is not, for loops that do not close near the
-        state, and for speeds that contradict each other.
+        `branch` is the number of one of `loops.branches` to be on instead: from its pose the held
+        coordinates are led to those in q by small steps, and nothing else in q counts.
+
+        Raises SceneError for a hinge or branch that there is not, for loops that do not close near
+        the state, for a branch that ends before, and for speeds that contradict each other.
         """
         from .assemble import assemble
 
-        start, only = self.initial_state(), "assemble takes one state"
+        start, only = self.initial_state(), "assemble takes one state; see assemble_path"
         wish_q = start[0] if q is None else one("q", q, self.nq, only)
         wish_u = start[1] if u is None else one("u", u, self.nu, only)
         fast = self.closed.fast if u is None and self.closed is not None else None
-        return assemble(self, wish_q, wish_u, hold, fast, real("t", t, "a time in s"))
+        return assemble(self, wish_q, wish_u, hold, fast, real("t", t, "a time in s"), branch)
+
+    def assemble_path(self, q: ArrayLike, hold: Sequence[str], branch: int = 0) -> Array:
+        """Closed states (n, nq) with the coordinates of the hinges named in `hold` as in the rows
+        of q (n, nq), each found from the one before by small steps, so that they lie on one branch:
+        number `branch` of `loops.branches`.
+
+        Raises SceneError as `assemble` does; OpenLoop where the branch ends.
+        """
+        from .assemble import assemble_path
+
+        rows = batch(("q", q, self.nq))[1][0]
+        return assemble_path(self, rows, hold, branch)
 
     def refuse_undetermined_start(self) -> None:
         """SceneError naming the hinges if the masses leave a motion of the start undetermined."""

@@ -57,13 +57,14 @@ def unmerged(packed: Packed) -> Packed:
     )
     now = packed.system
     both = zip(system.couplings, now.couplings, strict=True)
+    couplings = tuple(replace(one, kept=had.kept, repeats=had.repeats) for one, had in both)
     closures = tuple(
         replace(one, directions=known.directions, choice=known.choice)
         for one, known in zip(system.closures, now.closures, strict=True)
     )
     same = replace(
         system, inputs=now.inputs, held=now.held, by_time=now.by_time, n_memory=now.n_memory,
-        couplings=tuple(replace(one, kept=known.kept, repeats=known.repeats) for one, known in both),
+        couplings=couplings,
         closures=closures,
     )  # fmt: skip
     found = packed_system(same, frames)

@@ -79,7 +79,7 @@ class SceneSystem:
             run.n_controllers, run.controllers = controllers.count, controllers.records
             self.kept.append(controllers)
         if system.closes and system.strained >= 0:
-            speeds = np.zeros(engine.nu)
+            speeds = np.zeros(2 * engine.nu + engine.nq)
             run.speeds = engine.pointer(speeds)
             self.kept.append(speeds)
         self.workspace = np.zeros(packed.workspace)

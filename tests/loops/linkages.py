@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -142,6 +142,10 @@ def bricard(cut: int = 5) -> Scene:
 BENNETT = 1.0, 0.7, 0.7
 
 
+#: Entries of an inertia in the order of the scene.
+PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
 def bennett_ratio() -> float:
     """Product of the tangents of half the first two angles of the Bennett linkage."""
     a, b, alpha = BENNETT
@@ -157,14 +161,15 @@ def bennett(angle: float, speed: float = 0.0, digits: int | None = None) -> Scen
     second = 2 * math.atan(bennett_ratio() / math.tan(angle / 2))
     places, axes = [np.zeros(3)], [np.array([0.0, 0, 1])]
     turn = np.eye(3)
-    for theta, length, twist in zip((angle, second, -angle), (a, b, a), (alpha, beta, alpha)):
+    links = zip((angle, second, -angle), (a, b, a), (alpha, beta, alpha), strict=True)
+    for theta, length, twist in links:
         (c, s), (ct, st) = (math.cos(theta), math.sin(theta)), (math.cos(twist), math.sin(twist))
         turn = turn @ np.array([[c, -s * ct, s * st], [s, c * ct, -c * st], [0, st, ct]])
         turned = turn @ np.array([[1, 0, 0], [0, ct, st], [0, -st, ct]])  # before the twist
         places.append(places[-1] + length * turned[:, 0])
         axes.append(turn[:, 2])
 
-    def told(numbers: Sequence[float]) -> list[float]:
+    def told(numbers: Iterable[float]) -> list[float]:
         return [float(x) if digits is None else round(float(x), digits) for x in numbers]
 
     bodies, hinges = [], []
@@ -174,7 +179,7 @@ def bennett(angle: float, speed: float = 0.0, digits: int | None = None) -> Scen
         inertia += 0.01 * np.eye(3)
         bodies.append({
             "name": f"link{k}", "mass": 1 + k / 5,
-            "inertia": [float(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))],
+            "inertia": [float(inertia[pair]) for pair in PAIRS],
             "ends": {"near": told(-half), "far": told(half)},
         })  # fmt: skip
     sides = [("ground", "link0.near"), ("link0.far", "link1.near"), ("link1.far", "link2.near"),

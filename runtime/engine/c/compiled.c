@@ -66,7 +66,7 @@ static int accelerations(void *context, double t, const double *y, double *dy)
     const mstmm_fused *fused = run->fused;
     mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
     const double *u = y + fused->nq;
-    const int open = mstmm_stage_speeds(run, t, y, &u);
+    const int open = mstmm_stage_state(run, t, &y, &u);
     if (open) return open;
     const int code = fused->accelerations(run->fused_p, &t, y, u, run->memory,
                                           run->fused_numbers, dy, dy + fused->nq);
@@ -84,7 +84,7 @@ static int accelerations_and_power(void *context, double t, const double *y, dou
     }
     mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
     const double *u = y + fused->nq;
-    const int open = mstmm_stage_speeds(run, t, y, &u);
+    const int open = mstmm_stage_state(run, t, &y, &u);
     if (open) return open;
     const int code = fused->accelerations_power(run->fused_p, &t, y, u, run->memory,
                                                 run->fused_numbers, dy, dy + fused->nq, &power,
@@ -190,7 +190,8 @@ static int close_loops(mstmm_scene_run *run, double t, double *y)
     }
     compiled_state at = {run, t, y};
     mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
-    const mstmm_closing by = {&at, compiled_gaps, run->on_positions ? NULL : compiled_slips};
+    const int near = model->strained >= 0 && run->memory[model->strained] > 0;
+    const mstmm_closing by = {&at, compiled_gaps, run->on_positions ? NULL : compiled_slips, near};
     return mstmm_closed(&by, model, &run->failure);
 }
 
@@ -208,6 +209,28 @@ int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y)
         run->rechosen |= changed;
     }
     return code;
+}
+
+/* The coordinates of a stage with gaps closed, where they can be. */
+static const double *stage_coordinates(mstmm_scene_run *run, double t, const double *y)
+{
+    const mstmm_model *model = run->model;
+    real *closed = run->speeds + model->nu;
+    const real strain = run->strain;
+    const mstmm_failure failure = run->failure;
+    memcpy(closed, y, (size_t)(model->nq + model->nu) * sizeof(real));
+    const int code = close_loops(run, t, closed);
+    run->strain = strain;
+    run->failure = failure;
+    return code ? y : closed;
+}
+
+int mstmm_stage_state(mstmm_scene_run *run, double t, const double **y, const double **u)
+{
+    if (!run->speeds || !(run->memory[run->model->strained] > 0)) return 0;
+    if (!run->model->loops_singular) *y = stage_coordinates(run, t, *y);
+    *u = *y + run->model->nq;
+    return mstmm_stage_speeds(run, t, *y, u);
 }
 
 int mstmm_stage_speeds(mstmm_scene_run *run, double t, const double *y, const double **u)

@@ -257,8 +257,8 @@ static int looped_slips(void *context)
 
 int mstmm_closed(const mstmm_closing *by, const mstmm_model *model, mstmm_failure *failure)
 {
-    const real close = model->refines ? CLOSE_REFINED : CLOSE;
-    const int slips = !by->slips ? 0 : model->refines ? SLIPS_REFINED : 1;
+    const real close = model->refines || by->near ? CLOSE_REFINED : CLOSE;
+    const int slips = !by->slips ? 0 : model->refines || by->near ? SLIPS_REFINED : 1;
     mstmm_gaps gaps = {.met = 1};
     for (int k = 0; k < STEPS && !(gaps.met < close); k++) {
         gaps = (mstmm_gaps){0};
@@ -285,6 +285,7 @@ int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q
     const mstmm_state state = {.model = model, .workspace = workspace};
     looped_state at = {model, workspace, q, u, mstmm_spare_udot(&state), t, memory, n_quaternions,
                        quaternions, failure};
-    const mstmm_closing by = {&at, looped_gaps, gaps_alone ? NULL : looped_slips};
+    const int near = model->strained >= 0 && memory[model->strained] > 0;
+    const mstmm_closing by = {&at, looped_gaps, gaps_alone ? NULL : looped_slips, near};
     return mstmm_closed(&by, model, failure);
 }

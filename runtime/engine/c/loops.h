@@ -36,6 +36,7 @@ typedef struct {
     void *context;
     int (*gaps)(void *context, mstmm_gaps *found);
     int (*slips)(void *context);
+    int near; /* a singular pose is near, where steps leave more than rounding of small gaps */
 } mstmm_closing;
 
 /* Gaps closed and slips stopped as well as the model asks for. */

@@ -12,6 +12,9 @@
  * that one is as small as what repeats others. */
 #define WORSE 0.5
 #define REPEATED 1e-6
+/* Where none has been made, the first rows that say something are taken, as compiled code takes them,
+ * unless they are worse than this. */
+#define BAD 1e-2
 /* A later row is taken where its pivot is so many times larger: symmetry makes some equal but for
  * rounding. */
 #define LARGER 1.1
@@ -57,6 +60,20 @@ static real pivoted(int n, int count, real (*entries)[MOST], int *met)
     return smallest;
 }
 
+/* The first so many of the rows that say something, in the order in which they are closed. */
+static void in_order(int n, int count, real (*entries)[MOST], int *met)
+{
+    real left[MOST][MOST];
+    memcpy(left, entries, sizeof left);
+    for (int k = 0; k < n; k++) {
+        const real pivot = left[k][k];
+        met[k] = count > 0 && pivot > REPEATED;
+        count -= met[k];
+        for (int i = k + 1; i < n && met[k]; i++)
+            for (int j = k + 1; j < n; j++) left[i][j] -= left[i][k] * left[k][j] / pivot;
+    }
+}
+
 static int is_resting(const mstmm_state *state, int row)
 {
     return state->memory[state->model->rows[row].rest] > 0;
@@ -73,8 +90,10 @@ static void choose(mstmm_state *state, const mstmm_choice *one)
         known |= !now[i];
     }
     const real most = pivoted(one->n, one->count, entries, best);
-    int stays = 0;
-    if (known) stays = most < REPEATED || pivoted(one->n, one->count, entries, now) > WORSE * most;
+    if (!known) in_order(one->n, one->count, entries, now);
+    const real least = known || state->chosen ? WORSE : BAD;
+    int stays = pivoted(one->n, one->count, entries, now) > least * most;
+    if (known) stays |= most < REPEATED;
     const int *met = stays ? now : best;
     for (int i = 0; i < one->n; i++) {
         const mstmm_loop_row *row = &model->rows[one->rows[i]];
@@ -82,7 +101,7 @@ static void choose(mstmm_state *state, const mstmm_choice *one)
         if (!met[i]) line[MSTMM_ROW_PIVOT] = INFINITY;
         if (state->chosen) state->chosen[row->rest] = !met[i];
     }
-    state->changed |= !stays;
+    state->changed |= !stays || !known;
 }
 
 const real *mstmm_row_floor(mstmm_state *state, const mstmm_loop_row *row)

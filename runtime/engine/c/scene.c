@@ -11,6 +11,12 @@
 #include "scene.h"
 #include "sweep_steps.h"
 
+/* From so many times the strain that is near a singular pose on, what rounding makes of the rows is
+ * worth this relative error of a step, and so much for each part of the strain. */
+#define SINGULAR 10
+#define ATTAINABLE 1e-10
+#define OF_STRAIN 2e-6
+
 static mstmm_state state_of(const mstmm_model *model, real *workspace, real t, const real *memory,
                             mstmm_failure *failure)
 {
@@ -211,7 +217,7 @@ static int scene_rhs(void *context, double t, const double *y, double *dy)
     const mstmm_model *model = run->model;
     mstmm_balance balance;
     const double *u = y + model->nq;
-    int code = mstmm_stage_speeds(run, t, y, &u);
+    int code = mstmm_stage_state(run, t, &y, &u);
     if (!code)
         code = mstmm_accelerations(model, run->workspace, t, y, u, run->memory, NULL, dy,
                                    dy + model->nq, run->with_power ? &balance : NULL,
@@ -275,7 +281,10 @@ static int scene_accept(void *context, double t, double *y)
 {
     mstmm_scene_run *run = context;
     const int code = mstmm_scene_settle(run, t, y), place = run->model->strained;
-    if (place >= 0) run->memory[place] = run->strain > run->model->loops_strain;
+    const real usual = run->model->loops_strain;
+    if (place >= 0) run->memory[place] = run->strain > usual;
+    const real noise = fmax(ATTAINABLE, OF_STRAIN * run->strain);
+    run->attainable = usual > 0 && run->strain > SINGULAR * usual ? noise : 0;
     const int forgets = run->rechosen ? -1 : 0;
     const int acted = code ? code : mstmm_controllers_act(run, t, y);
     return acted ? acted : forgets;
@@ -376,6 +385,7 @@ void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system)
     system->n_error = system->n_state; /* the work too: its power has kinks that motion has not */
     system->rhs = scene_rhs;
     system->accept = needs_settling(run) ? scene_accept : NULL;
+    system->attainable = run->model->looped ? &run->attainable : NULL;
     system->n_events = run->n_events;
     system->n_switches = run->n_switches;
     system->events = scene_events;

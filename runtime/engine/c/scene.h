@@ -118,6 +118,7 @@ typedef struct {
     mstmm_tangent *base, *stage;
     mstmm_implicit implicit;
     real strain;      /* of the loops when their slips were stopped last: see mstmm_strain */
+    double attainable; /* see mstmm_system: near a singular pose */
     int rechosen;     /* rows have been chosen anew when they were closed last */
     real *speeds;     /* nu: those of a stage near a singular pose; NULL: there are no loops */
     int on_positions; /* the step at hand closes gaps, and leaves slips: index 3 */
@@ -154,6 +155,7 @@ int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y);
 
 /* *u, which are speeds of a state inside a step: near a singular pose they are taken without slips,
  * for whose sake accelerations there would be wrong by the slips over the distance from it. */
+int mstmm_stage_state(mstmm_scene_run *run, double t, const double **y, const double **u);
 int mstmm_stage_speeds(mstmm_scene_run *run, double t, const double *y, const double **u);
 
 /* Places and velocities of the probes of a state with speeds u, to `probe_values`. */

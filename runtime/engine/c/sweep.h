@@ -291,6 +291,7 @@ typedef struct {
     int64_t coupling_numbers; /* the first behind `loops` */
     real loops_apart;     /* gap (m, rad) at which rows that repeat others do so no longer */
     real loops_strain;    /* strain from which on a pose is near a singular one; 0: never */
+    int loops_singular;   /* a run begins where rows repeat others that do not nearby */
     int strained;         /* place in memory that is 1 while the last step ended there; -1: none */
     int needs_pose; /* loads or forces that need poses and velocities */
     int64_t workspace; /* numbers of workspace */

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection
 import numpy as np
 
 from mstmm.arrays import Array
-from mstmm.errors import OpenLoop, SceneError
+from mstmm.errors import NumericalFailure, OpenLoop, SceneError
 
 from ...pack.loops.variants import LOCKED, held, length_of, stiff
 from ...pack.pack import packed_system
@@ -76,25 +76,35 @@ class Assembly:
         #: 1 for speeds that nobody holds.
         self.free = self._free_speeds()
 
-    def positions(self, q: Array, much: float = 0.0) -> Array:
-        """q (nq,) with loops closed, or with gaps that no change closes of up to `much` (m, rad).
+    def positions(self, q: Array, much: float = 0.0, rough: bool = True) -> Array:
+        """q (nq,) with loops closed, or with gaps that no change closes of up to `much` (m, rad);
+        a `rough` one leaves gaps as small open that only long ways close.
 
         Raises OpenLoop with the least gap, its pose and what was held where there is none near.
         """
         draw, start = np.random.default_rng(0), q
-        nearest, missing = self._nearest(start, rough=much > 0.0)
+        rough = rough and much > 0.0
+        nearest, missing = self._nearest(start, rough)
         for _ in range(_TRIES):
             if self._closes(missing, much):
                 return nearest
             # Where all is in line nothing tells which way to bend.
             shaken = draw.uniform(-_SHAKEN, _SHAKEN, len(self._still)) * self.free
-            trial, after = self._nearest(self.calls.moved(start, shaken), much > 0.0)
+            trial, after = self._nearest(self.calls.moved(start, shaken), rough)
             if self._largest(after) < self._largest(missing):
                 nearest, missing = trial, after
         if self._closes(missing, much):
             return nearest
         gap = self._largest(missing)
-        raise OpenLoop(self._open(nearest, missing), gap, self._by_names(nearest))
+        raise OpenLoop(self._open(nearest, missing), gap, self.by_names(nearest))
+
+    def nearest_closed(self, q: Array, much: float = 0.0) -> Array | None:
+        """q (nq,) where steps from q lead, if loops are closed there but for gaps up to `much`."""
+        try:
+            found, missing = self._nearest(q, much > 0.0)
+        except NumericalFailure:
+            return None
+        return found if self._closes(missing, much) else None
 
     def _nearest(self, q: Array, rough: bool = False) -> tuple[Array, Array]:
         """q of the least gap that steps from q lead to, and what the rows lack there; a `rough` one
@@ -255,7 +265,7 @@ class Assembly:
             f"{self._amount(row, missing, '.7g')}{while_held}; {self._remedy(row, q, missing)}"
         )
 
-    def _by_names(self, q: Array) -> dict[str, tuple[float, ...]]:
+    def by_names(self, q: Array) -> dict[str, tuple[float, ...]]:
         """q of hinges and of flexible bodies that have some."""
         layout = self.calls.engine.packed.layout
         slots = {**layout.hinges, **layout.modal}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mstmm.arrays import Array
 
@@ -81,7 +82,7 @@ class LoopCalls(LoopNumbers):
             raise engine.failed(failure, self.t, q, np.zeros(engine.nu))
         return bool(changed[0])
 
-    def resting(self) -> Array:
+    def resting(self) -> NDArray[np.bool_]:
         """Whether each row (rows,) is not met because others of its choice are."""
         return self.records.resting(self.memory)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -17,10 +18,11 @@ from ...pack.records.loops import LoopRecords
 from ...pack.start import start_values
 from ..engine import Engine
 from .assembly import Assembly
-from .calls import LoopCalls
+from .branches import Branch, Search, Wishes
+from .calls import REPEATED, LoopCalls
 from .drives import sharing
 from .parallel import COUNTING, skewed, skewed_by_gap
-from .rank import REPEATED, Rank, rank_at
+from .rank import Rank, rank_at
 from .refinement import refinements, unlike_masses
 from .rotor_assembly import RotorAssembly
 from .stress import outboard_axes
@@ -41,6 +43,8 @@ _NEARLY = 1e-2
 _SILENT = 1e-3
 #: A pose is near a singular one where the strain is this many times that of the start.
 _STRAINED = 10.0
+#: Longest step (rad, m) by which a branch is followed.
+_LED = 0.1
 #: So many hinges are named.
 _NAMED = 8
 
@@ -81,6 +85,7 @@ class Loops:
     not_unique: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     misfit: tuple[float, str, str] = (0.0, "", "")
     shapes: int = 0
+    found_by: Callable[[], tuple[Branch, ...]] = field(default=tuple, repr=False, compare=False)
     decided_by: Callable[[], tuple[str, ...]] = field(default=tuple, repr=False, compare=False)
 
     @property
@@ -112,6 +117,12 @@ class Loops:
         )
 
     @property
+    def branches(self) -> tuple[Branch, ...]:
+        """The ways in which the loops can close with what `hold` keeps, as far as they are found:
+        the nearest to the start, where the model begins, then the others."""
+        return self.found_by()
+
+    @property
     def independent(self) -> tuple[str, ...]:
         """Names of speeds that decide all others, as many as the mobility: those over which mass
         matrices and linear models of the mechanism stand."""
@@ -127,6 +138,7 @@ class Closed:
     def __init__(self, engine: Engine, free_speeds: int) -> None:
         packed, self.engine = engine.packed, engine
         self._whole = engine  #: with all rows there are
+        self._found: tuple[Branch, ...] = ()
         hinges = [hinge for hinge in packed.described.hinge if not hinge.is_weld]
         holds = [hinge.name for hinge in hinges if hinge.hold]
         #: Hinges whose start speeds are kept.
@@ -143,6 +155,25 @@ class Closed:
         except OpenLoop as error:
             more = self._too_many(q, holds, free_speeds)
             raise OpenLoop(f"{error}{more}", error.gap, error.pose) from None
+        near = self._nearest(q, near, holds, _NEARLY * length)
+        try:
+            self._begin(near, u, holds, free_speeds, calls)
+        except OpenLoop:  # what is left open there is no misfit: it closes farther away
+            near = self._assembly(near, holds).positions(near, _NEARLY * length, rough=False)
+            self.engine = engine
+            self._begin(near, u, holds, free_speeds, calls)
+        if self._whole is not self.engine:
+            self.engine.packed.behind = partial(_behind, self._whole, self.start[0])
+
+    def _begin(
+        self, near: Array, u: Array, holds: Collection[str], free_speeds: int, calls: LoopCalls
+    ) -> None:
+        """Judge the rows near a state (nq,) that is closed but for misfits, and begin there;
+        `calls` are those of all rows.
+
+        Raises OpenLoop where those that count do not close, SceneError for what cannot move.
+        """
+        locks = LOCKED * length_of(self.engine.packed.system)
         self._keep(near)
         self._whole = self.engine
         self.loops, repeating = self._judged(near, free_speeds)
@@ -151,14 +182,60 @@ class Closed:
         try:
             self.start = self.assembled(near, u, holds, self.fast)
         except SceneError:
-            self._refuse_locked(calls, repeating, LOCKED * length)
+            self._refuse_locked(calls, repeating, locks)
             raise
+        self.engine.packed.model.loops_singular = int(self.loops.singular)
         self.engine.packed.model.refines = refinements(
             self.engine, *self.start, self.loops.mobility
         )
-        self._refuse_locked(calls, repeating, LOCKED * length)
-        if self._whole is not self.engine:
-            self.engine.packed.behind = partial(_behind, self._whole, self.start[0])
+        self._refuse_locked(calls, repeating, locks)
+
+    def _nearest(self, q: Array, near: Array, holds: Collection[str], much: float) -> Array:
+        """`near`, where steps from the start q (nq,) lead, or a state on a nearer branch."""
+        self._wishes = Wishes(self.engine.packed, q, holds)
+        search = Search(self._assembly(q, holds), self._wishes, near, much)
+        if search.is_near():
+            return near
+        found = search.nearest()
+        self._found = search.found
+        return found
+
+    @property
+    def branches(self) -> tuple[Branch, ...]:
+        """Branches on which the loops close, as far as they were found, the nearest to the start
+        first; looked for when they are asked for first, where the start was closed."""
+        if not self._found:
+            holds = self._wishes.kept
+            search = Search(self._assembly(self.start[0], holds), self._wishes, self.start[0])
+            self._found = search.found
+        return self._found
+
+    def nearest(
+        self, q: Array, u: Array, holds: Collection[str], fast: Collection[str], t: float
+    ) -> tuple[Array, Array]:
+        """As `assembled`, on the branch that is nearest to q of those that are found."""
+        assembly = self._assembly(q, holds, t)
+        near = assembly.positions(q)
+        search = Search(assembly, Wishes(self.engine.packed, q, holds, stated=False), near)
+        near = near if search.is_near() else search.nearest()
+        return near, self._assembly(near, fast, t).speeds(near, u)
+
+    def led(self, q: Array, to: Array, holds: Collection[str], t: float = 0.0) -> Array:
+        """A closed q (nq,) with the coordinates of `holds` led to those of `to` by small steps, so
+        that it stays on its branch; what drives and couplings ask is that at t (s).
+
+        Raises OpenLoop where the branch ends before.
+        """
+        layout, kept = self.engine.packed.layout, np.zeros(len(q), bool)
+        driven = {hinge.name for hinge in self.engine.packed.described.hinge if hinge.drive}
+        for name in {*holds, *driven}:
+            kept[layout.hinges[name].q_slice] = True
+        way = np.where(kept, to - q, 0.0)
+        steps = max(1, math.ceil(float(np.abs(way).max(initial=0.0)) / _LED))
+        for k in range(1, steps + 1):
+            onward = np.where(kept, to - way * (1.0 - k / steps), q)
+            q = self._assembly(onward, {*holds, *driven}, t).positions(onward)
+        return q
 
     def assembled(
         self, q: Array, u: Array, holds: Collection[str], fast: Collection[str], t: float = 0.0

@@ -11,7 +11,8 @@ from ...pack.loops.variants import freed
 from ...pack.pack import packed_system
 from ..engine import Engine
 from .assembly import Assembly
-from .rank import REPEATED, judging
+from .calls import REPEATED
+from .rank import judging
 
 #: Random motions beyond as many as there are drives.
 _MORE = 2

@@ -49,6 +49,7 @@ typedef struct mstmm_system {
   int lanes;
   int (*rhs_lanes)(void *context, const double *t, const double *y, double *dy, int *codes);
   const mstmm_implicit *implicit; /* what implicit methods ask; NULL: explicit methods alone */
+  const double *attainable; /* relative error below which the right-hand side is noise here; NULL: 0 */
 } mstmm_system;
 
 enum {

@@ -49,9 +49,12 @@ MSTMM_WIDE double mstmm_error_norm(const mstmm_work *work, double *absolute) {
     high_scaled += (a * scale) * (a * scale);
     low_scaled += (b * scale) * (b * scale);
   }
-  const double h = work->run->real.h;
+  const double h = work->run->real.h, rtol = work->run->rtol;
+  const double *attainable = work->system->attainable;
+  const double share = attainable && *attainable > rtol ? rtol / *attainable : 1.0;
   *absolute = n ? mstmm_combined_error(h, mstmm_total(&high), mstmm_total(&low), n, both) : 0.0;
-  return n ? mstmm_combined_error(h, mstmm_total(&high_scaled), mstmm_total(&low_scaled), n, both)
+  return n ? share * mstmm_combined_error(h, mstmm_total(&high_scaled), mstmm_total(&low_scaled),
+                                          n, both)
            : 0.0;
 }
 

@@ -53,18 +53,14 @@ def with_loops(
     }
     of_speeds |= {one.row for one in couplings if one.of_speeds}
     rests: dict[int, int] = {}
-    chosen: dict[int, tuple[int, ...]] = {}
     for group, one in enumerate(system.closures):
         own = [number for number in plan.of[group] if number not in soft]
         if one.choice is not None:
-            places = tuple(one.choice[0] + k for k in range(len(own)))
-            rests |= zip(own, places, strict=True)
-            chosen |= dict.fromkeys(own, places)
+            rests |= {row: one.choice[0] + k for k, row in enumerate(own)}
     rows = tuple(
         RowStructure(
             row.body, row.others, sort(floors[number : number + 1]), soft.get(number, ()),
             number in of_speeds, rests.get(number, -1),
-            chosen.get(number, ()),
         )
         for number, row in enumerate(plan.rows)
     )  # fmt: skip

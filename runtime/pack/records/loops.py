@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mstmm.arrays import Array
 from mstmm.graph.mechanism import GROUND
@@ -57,7 +58,7 @@ class LoopRecords:
         """Whether the row is that of a rotor."""
         return bool(self._rows[row].softness > 0)
 
-    def resting(self, memory: Array) -> Array:
+    def resting(self, memory: Array) -> NDArray[np.bool_]:
         """Whether each row (rows,) is not met, by memory, because others are instead."""
         found = np.zeros(self.count, bool)
         found[self.chosen] = memory[[self._rows[row].rest for row in self.chosen]] > 0
@@ -185,7 +186,9 @@ class _Loops:
         written: dict[int, WrittenClosure] = {}
         for group, closure in self._in_order():
             looped[closure.frame].closure, written[group] = self._closure(group, closure, records)
-        chosen = [self._choice(group, one, records) for group, one in enumerate(self.system.closures)]
+        chosen = [
+            self._choice(group, one, records) for group, one in enumerate(self.system.closures)
+        ]
         model.n_choices = sum(chosen)
         attach_couplings(model, self.system, memory, couplings, records, looped, self._side)
         model.looped, model.rows, model.n_rows = looped, records, len(self.plan.rows)

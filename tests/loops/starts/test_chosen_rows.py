@@ -1,4 +1,4 @@
-"""Overconstrained linkages, whose rows are chosen anew along the way: exact ones and rounded ones."""
+"""Overconstrained linkages, whose rows are chosen anew along the way: exact and rounded ones."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from reference.jets import Array
 import mstmm
 from mstmm.runtime.result.result import Result
 
-from .linkages import OBLIQUE, bennett, bennett_ratio, bricard
+from ..linkages import OBLIQUE, PAIRS, bennett, bennett_ratio, bricard
 
 TIMES = np.linspace(0.0, 3.0, 61)
 
@@ -97,8 +97,7 @@ def turned(scene: dict[str, Any], digits: int) -> dict[str, Any]:
     scene["gravity"] = [float(x) for x in turn @ np.array(scene["gravity"], float)]
     for body in scene["body"]:
         inertia = turn @ np.diag(body["inertia"]) @ turn.T
-        pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-        body["inertia"] = [float(inertia[pair]) for pair in pairs]
+        body["inertia"] = [float(inertia[pair]) for pair in PAIRS]
         body["center_of_mass"] = [float(x) for x in turn @ np.array(body["center_of_mass"])]
         body["ends"] = {name: told(end) for name, end in body["ends"].items()}
     for hinge in scene["hinge"]:
