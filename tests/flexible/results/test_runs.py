@@ -282,7 +282,8 @@ def test_an_elastic_body_has_what_needs_no_axis(tmp_path: Path) -> None:
         run.modal_energy("bar").sum(axis=1) >= run.strain_energy("bar"), True
     )
     (bar,) = run.certificate.flexible
-    assert bar.gamma is not None and bar.tail is None and run.warnings == ()
+    assert bar.gamma is not None and run.warnings == ()
+    assert bar.tail is not None and bar.tail < 1e-3  # its deflection is judged, without an axis too
     assert run.pictures() == ("shape", "bar.shape", "bar.modal_energy")
     assert len(run.plot("shape").axes) == 2
     again = mstmm.load_result(run.save(tmp_path / "bar.nc"))
