@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mstmm.defaults import METHOD, RTOL
 
-from ..chart.point import Setting
+from ..chart.point import Point, Setting
+from ..chart.trial import error_of
 from ..integrate.steppers import AUTO
 from .choice import RIGID, Choice, given
 from .evidence import Evidence
@@ -16,6 +18,7 @@ from .outputs import with_outputs_there
 from .record import Advice, BodyAdvice, TriedModel
 from .search import Choices, Search
 from .settings import Chosen, compared
+from .whole_run import over_all
 from .words import reason
 from .work import Work
 
@@ -33,11 +36,16 @@ def told(
 ) -> Advice:  # fmt: skip
     """The advice.  `base` is the model that has what was changed before bodies were looked at."""
     asked, bench = work.asked, work.bench
-    bodies = tuple(
-        _body(work, name, choice, evidence.get(name), search)
-        for name, choice in {**_straightened(work), **choices}.items()
-    )
     model_saving, setting_saving = _savings(work, chosen)
+    instead = _scene_as_given(work, chosen, model_saving)
+    if instead is not None:
+        chosen, bodies, work.parts = instead, _bodies_as_given(work, evidence), {}
+        model_saving, setting_saving = _savings(work, chosen)
+    else:
+        bodies = tuple(
+            _body(work, name, choice, evidence.get(name), search)
+            for name, choice in {**_straightened(work), **choices}.items()
+        )
     changes = work.told.get(chosen.tried.name, work.told[base])
     if not bodies:
         work.notes.append("there is nothing to reduce in the bodies: none of them deforms")
@@ -59,6 +67,42 @@ def told(
             if math.isfinite(one.cpu_s)
         ),
     )  # fmt: skip
+
+
+def _scene_as_given(work: Work, chosen: Chosen, saving: float | None) -> Chosen | None:
+    """The scene as given, where the model found takes longer, errs more, and this one suffices."""
+    bench, setting = work.bench, chosen.point.setting
+    scene = bench.tried(AS_GIVEN, work.scene, {})
+    if saving is None or saving >= 1 or scene.model is None:
+        return None
+    if scene.error >= chosen.tried.error or scene.error > work.enough:
+        return None
+    if chosen.whole:
+        instead = over_all(scene, work, work.beside_unseen - scene.error)
+    else:
+        trial = bench.runs.trial(scene.model, setting, bench.measure, bench.budget.left())
+        error = error_of(trial, bench.reference, bench.measure)
+        if isinstance(error, str) or error * bench.span.growth > work.beside_unseen:
+            return None
+        instead = Chosen(scene, Point(replace(setting, model=AS_GIVEN), error, trial.cpu_s, 1))
+    if instead is not None:
+        work.told[AS_GIVEN] = ()
+        work.notes.append(
+            f"a smaller model errs by {chosen.tried.error:.1e} and takes {1 / saving:.2f} times "
+            f"the time of the scene as given, which errs by {scene.error:.1e}: the scene stays as "
+            "it is"
+        )
+    return instead
+
+
+def _bodies_as_given(work: Work, evidence: Mapping[str, Evidence]) -> tuple[BodyAdvice, ...]:
+    """Every flexible body as the scene has it."""
+    written = {name: _given(work, name) for name in work.whole}
+    why = "stays as it is: less of the scene takes longer and errs more"
+    return tuple(
+        BodyAdvice(name, choice, choice, None, None, why, evidence.get(name))
+        for name, choice in written.items()
+    )
 
 
 def _compared(work: Work, chosen: Chosen) -> str:

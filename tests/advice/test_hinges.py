@@ -9,6 +9,7 @@ import pytest
 from advice.scenes import sprung, tip
 
 import mstmm
+from mstmm.runtime.advice import telling
 
 OF = "d.tip.position"
 
@@ -36,6 +37,19 @@ def test_stiff_hinges_become_rigid() -> None:
     assert made.reduced
     assert made.model_saving is not None
     assert error(made, scene) <= 1e-2
+
+
+def test_a_model_that_takes_longer_and_errs_more_is_not_advised(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Then the scene stays as it is, and a note tells what was found."""
+    scene = sprung(3e5)
+    monkeypatch.setattr(telling, "compared", lambda *_: (0.89, 1.0))
+    made = mstmm.advise(scene, 1.0, error=1e-2, of=OF, rounds=0, budget=600)
+    assert not made.reduced and made.changes == () and made.model_saving == 1.0
+    assert mstmm.compile(made.scene, engine="looped").nu == mstmm.compile(scene).nu
+    assert any("1.12 times the time of the scene as given" in note for note in made.notes)
+    assert made.error <= 1e-2 and error(made, scene) <= 1e-2
 
 
 def test_soft_ones_stay() -> None:
