@@ -32,6 +32,7 @@ NOT_APPLICABLE = {
     "quaternion-length": _STEPS,
     "wanted-error": _STEPS,
     "narrow-load": _TIME,
+    "pole": _TIME,
     "switches": _TIME,
     "chatter": _TIME,
     "energy-drift": _TIME,
