@@ -87,7 +87,22 @@ def broken(node: Node, room: float) -> list[Node]:
 
 
 def _pieces(node: Row, room: float) -> Iterator[list[Node]]:
-    """Parts of a row that stay together; each but the first begins with a sign."""
+    """Parts of a row that stay together: what is between signs, and factors of what is too wide."""
+    for piece in _between_signs(node, room):
+        if sum(map(width, piece)) <= room:
+            yield piece
+            continue
+        factor: list[Node] = []
+        for atom in piece:
+            if isinstance(atom, Sign) and atom.text == " " and factor:
+                yield factor
+                factor = []
+            factor.append(atom)
+        yield factor
+
+
+def _between_signs(node: Row, room: float) -> Iterator[list[Node]]:
+    """Parts of a row; each but the first begins with a sign."""
     piece: list[Node] = []
     for atom in _atoms(node, room):
         if isinstance(atom, Sign) and (atom.text == "/" or (atom.spaced and atom.text not in "=,")):
