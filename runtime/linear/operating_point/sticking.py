@@ -1,4 +1,4 @@
-"""Sticking of hinges whose dry friction a linear model leaves out."""
+"""Dry friction that a linear model leaves out: sticking of hinges, and friction by expressions."""
 
 from __future__ import annotations
 
@@ -25,6 +25,9 @@ _FAR = 10.0
 #: Speed in sizes a second, damping in 1/s that is none, and the part of the damping at
 #: small speeds below which that at this speed is another.
 _FAST, _FAINT, _SATURATED = 0.1, 1e-6, 0.1
+#: Speeds, in sizes a second, at which an effort that jumps is the same; the part of a jump by which
+#: it may differ, and acceleration in sizes/s^2 that is none.
+_NEAR, _STEADY, _CREEP = (1e-6, 1e-8), 0.5, 1e-6
 #: Entries that a message lists; stiffness that is none, in parts.
 _LISTED, _SOFT = 4, 1e-12
 
@@ -56,28 +59,48 @@ def friction_risks(linear: Equations) -> Iterator[Risk]:
 
 
 def saturation_risks(linear: Equations) -> Iterator[Risk]:
-    """Coordinates whose damping at the state is that of small speeds alone: friction that an
-    expression describes, such as -10*tanh(u/0.001)."""
+    """Coordinates with friction that an expression describes: their effort jumps with the speed at
+    the state, -10*sign(u), or their damping is that of small speeds alone, -10*tanh(u/0.001)."""
     sizes, tree, state = speed_sizes(linear.model)[list(linear.free)], linear.tree, linear.state
     memory, basis = tree.start_memory(), linear.spread(np.eye(len(linear)))
-    for k, (name, size) in enumerate(zip(linear.coordinates, sizes.tolist(), strict=True)):
-        slope, speed = float(linear.C[k, k]), _FAST * size
-        if not slope > _FAINT * float(linear.M[k, k]):
-            continue
+
+    def change(k: int, speed: float) -> float:
+        """Effort along coordinate k at this speed beyond that at the opposite one."""
         ahead, behind = (
             basis[:, k] @ tree.inverse_dynamics(
                 state.t, state.q, state.u + way * speed * basis[:, k], state.a, memory
             )
             for way in (1.0, -1.0)
         )  # fmt: skip
-        part = abs(ahead - behind) / (2 * slope * speed)
-        if part < _SATURATED:
-            yield Risk(
-                "dry-friction", name,
-                f"damping of {name} is that of speeds near the state alone: at {speed:.3g} "
-                f"{linear.units[k]}/s it is {part:.2g} times as large, as of dry friction",
-                "give it as law.friction of the hinge, or as a linear damping", part, _SATURATED,
-            )  # fmt: skip
+        return float(ahead - behind)
+
+    for k, (name, size) in enumerate(zip(linear.coordinates, sizes.tolist(), strict=True)):
+        slope, mass, speed = float(linear.C[k, k]), float(linear.M[k, k]), _FAST * size
+        first, jump = (change(k, part * size) for part in _NEAR)
+        least = _CREEP * mass * size
+        if abs(jump) > least and abs(first - jump) < _STEADY * abs(jump):
+            yield _jump_risk(linear, k, abs(jump), least)
+        elif slope > _FAINT * mass:
+            part = abs(change(k, speed)) / (2 * slope * speed)
+            if part < _SATURATED:
+                yield Risk(
+                    "dry-friction", name,
+                    f"damping of {name} is that of speeds near the state alone: at {speed:.3g} "
+                    f"{linear.units[k]}/s it is {part:.2g} times as large, as of dry friction",
+                    "give it as law.friction of the hinge, or as a linear damping", part,
+                    _SATURATED,
+                )  # fmt: skip
+
+
+def _jump_risk(linear: Equations, k: int, jump: float, least: float) -> Risk:
+    """An effort that jumps with the speed of coordinate k."""
+    name, unit = linear.coordinates[k], "N*m" if linear.units[k] == "rad" else "N"
+    return Risk(
+        "dry-friction", name,
+        f"an effort along {name} jumps by {jump:.4g} {unit} with its speed at this state, as of "
+        "dry friction: the model leaves the jump out",
+        "give it as law.friction of the hinge, or as a linear damping", jump, least, unit,
+    )  # fmt: skip
 
 
 def _sentence(name: str, unit: str, amplitude: float, static: float) -> str:

@@ -197,3 +197,23 @@ def test_friction_by_an_expression_is_told() -> None:
     assert told == ["-0.01*tanh(u/0.001)"]
     (text,) = of(scenes[told[0]]).linearize().warnings
     assert "damping of pivot.angle is that of speeds near the state alone" in text
+
+
+def test_friction_that_jumps_is_told() -> None:
+    """No slope shows it; its jump is twice the friction, and sliding (u = 0.5) has none."""
+    jumps = {"-0.01*sign(u)": 0.02, "-0.2*u - 0.01*sign(u)": 0.02, "-0.01*where(u > 0, 1, 0)": 0.01}
+    smooth = ["-0.2*u", "-0.3*u*abs(u)", "-0.3*sign(u)*u", "-0.2*u*where(u > 0, 1, 2)",
+              "-0.01*sign(q)", "-1000*u"]  # fmt: skip
+    for law in (*jumps, *smooth):
+        model = of(pendulum(law={"effort": law}))
+        linear = model.linearize([0.0], [0.0])
+        told = [risk for risk in linear.risks if risk.name == "dry-friction"]
+        assert [risk.figure for risk in told] == pytest.approx([jumps[law]] if law in jumps else [])
+        assert linear.trusted == (law not in jumps)
+        assert linear.frequency_response([2.0], ["pivot.effort"]).trusted == (law not in jumps)
+        assert linear.modes().trusted == (law not in jumps)
+    model = of(pendulum(law={"effort": "where(u > 0, -0.01, 0.01)"}))
+    (text,) = model.modes().warnings
+    assert "an effort along pivot.angle jumps by 0.02 N*m" in text
+    sliding = of(pendulum(law={"effort": "-0.01*sign(u)"})).linearize([0.0], [0.5])
+    assert not any(risk.name == "dry-friction" for risk in sliding.risks)
