@@ -75,6 +75,7 @@ class EquilibriumSearch:
     def __init__(self, model: Compiled, t: float) -> None:
         self._model, self._t = model, t
         few = len(model.free_speeds) if model.closed is None else model.closed.loops.mobility
+        self._is_driven = few == 0  # drives and loops alone say where everything is
         self._is_decided = few <= DECIDING
         self._is_small = few <= (_DENSE if model.freedom is None else _DENSE_LOOPS)
         self._sweeps: _Sweeps | None = None
@@ -89,6 +90,8 @@ class EquilibriumSearch:
         self, q: Array, tolerance: float, max_steps: int, progress: Progress | None
     ) -> tuple[Array, Stability]:
         """q at rest, and its stability; saddles that were found on the way are left again."""
+        if self._is_driven:
+            return q, Stability()
         if self._sweeps is None:
             return self._find_by_differences(q, tolerance)
         asked = tolerance, max_steps, _counted(progress)
@@ -159,6 +162,8 @@ class EquilibriumSearch:
     def residuals(self, q: Array) -> dict[str, float]:
         """Efforts that are missing at a rest, by the names of speeds."""
         model, freedom = self._model, self._model.freedom
+        if self._is_driven:
+            return {}
         if self._sweeps is None or self._by_differences is not None:
             assert self._by_differences is not None
             places, efforts = self._by_differences.places, self._by_differences.needed(q)

@@ -1,0 +1,50 @@
+"""Equilibrium beside drives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import mstmm
+
+GRAVITY = 9.81
+
+
+def driven_four_bar() -> dict[str, Any]:
+    """Two bars of 0.25 m that meet above a crank of 0.1 m, which a drive turns."""
+    bar: dict[str, Any] = {"mass": 1.0, "center_of_mass": [0.125, 0, 0],
+                           "inertia": [0, 5e-3, 5e-3], "ends": {"tip": [0.25, 0, 0]}}  # fmt: skip
+    return {
+        "gravity": [0, -GRAVITY, 0],
+        "body": [
+            {"name": "crank", "mass": 1.0, "inertia": [0, 0.1, 0.1], "ends": {"tip": [0.1, 0, 0]}},
+            {"name": "coupler", **bar},
+            {"name": "rocker", **bar},
+        ],
+        "hinge": [
+            {"name": "a", "type": "pin", "inboard": "ground", "outboard": "crank", "drive": "6*t"},
+            {"name": "b", "type": "pin", "inboard": "crank.tip", "outboard": "coupler",
+             "initial": {"q": 1.4}},
+            {"name": "c", "type": "pin", "inboard": "ground", "outboard": "rocker",
+             "position": [0.2, 0, 0], "initial": {"q": 1.8}},
+            {"name": "d", "type": "pin", "inboard": "coupler.tip", "outboard": "rocker.tip"},
+        ],
+    }  # fmt: skip
+
+
+def test_a_mechanism_whose_drives_leave_nothing_free_is_where_they_have_it() -> None:
+    model = mstmm.compile(mstmm.Scene(**driven_four_bar()), engine="looped")
+    found = model.equilibrium(t=0.05)
+    crank, knee, rocker = (float(found[model.layout.hinges[name].q]) for name in "abc")
+    coupler = 0.1 * np.exp(1j * crank) + 0.25 * np.exp(1j * (crank + knee))
+    assert abs(crank - 0.3) < 1e-12
+    assert abs(coupler - 0.2 - 0.25 * np.exp(1j * rocker)) < 1e-9
+    assert found.residuals == {} and found.unstable == () and found.trusted
+
+
+def test_a_tree_whose_drives_leave_nothing_free_is_where_they_have_it() -> None:
+    scene = driven_four_bar()
+    scene["body"], scene["hinge"] = scene["body"][:1], scene["hinge"][:1]
+    found = mstmm.compile(mstmm.Scene(**scene), engine="looped").equilibrium(t=0.05)
+    assert np.abs(found - 0.3).max() < 1e-12 and found.residuals == {}
