@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ from mstmm.printable import abbreviate
 from mstmm.risk import RUN, Risk, advice
 
 from ..guard.answers import find_state_risks
-from .channels import GROUND
+from .channels import GROUND, Channel
 from .modes import modes
 from .operating_point.changes import MATRICES, find_changes
 from .operating_point.departure import LARGEST, Departure, find_departure
@@ -24,6 +24,8 @@ from .output.outputs import left_out
 if TYPE_CHECKING:
     from .equations import Equations
 
+#: Risks of single inputs.
+_OF_INPUTS = ("changing-input", "input-without-effect")
 #: Efforts that are rounding, in parts of those that cancel.
 _CANCELLED = 1e-11
 #: Coordinates up to which all motions are looked for.
@@ -34,12 +36,14 @@ def find_linear_risks(linear: Equations) -> Iterator[Risk]:
     """Risks of the state and of what the linear model leaves out, the gravest first."""
     state = linear.state
     yield from find_state_risks(linear.model, state.t, state.q, state.u)
-    yield from _unsteady(linear)
+    unsteady = list(_unsteady(linear))
+    yield from unsteady
     if len(linear) <= LARGEST:
         yield from friction_risks(linear)
     if len(linear) <= _ALL_MOTIONS and linear.carrying is None:
         yield from saturation_risks(linear)
-    yield from without_effect(linear, linear.V)
+    changing = {risk.element for risk in unsteady}
+    yield from (one for one in without_effect(linear, linear.V) if one.element not in changing)
     yield from find_omissions(linear)
     if len(linear) <= _ALL_MOTIONS:
         yield from modes(linear, None, None).motion_risks()
@@ -71,10 +75,13 @@ def find_omissions(linear: Equations) -> Iterator[Risk]:
         )  # fmt: skip
 
 
-def find_response_risks(linear: Equations) -> Iterator[Risk]:
-    """Risks of a linear model for its steady response, which a growing motion prevents."""
+def find_response_risks(linear: Equations, pushes: Sequence[Channel]) -> Iterator[Risk]:
+    """Risks of a linear model for its steady response to some pushes, which a growing motion
+    prevents; what other inputs do is left out."""
+    asked = {f'input "{one.name}"' for one in pushes}
     for risk in linear.risks:
-        yield replace(risk, doubt=True) if risk.name == "unstable" else risk
+        if risk.name not in _OF_INPUTS or risk.element in asked:
+            yield replace(risk, doubt=True) if risk.name == "unstable" else risk
 
 
 def _unsteady(linear: Equations) -> Iterator[Risk]:

@@ -83,7 +83,8 @@ def exact_modes(linear: Equations, count: int, chosen: Chosen) -> ExactModes:
     beams = exact_beams(linear, chosen, 0.0).undamped()
     counter = _Counter(beams)
     omega = counter.bisected(count)
-    shapeless = DeferredRisks(lambda: (risk for risk in linear.risks if risk.name != "shapes"))
+    others = ("shapes", "changing-input")
+    shapeless = DeferredRisks(lambda: (risk for risk in linear.risks if risk.name not in others))
     return ExactModes(omega, beams.linear.coordinates, counter.shapes(omega), findings=shapeless)
 
 

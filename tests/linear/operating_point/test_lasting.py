@@ -67,6 +67,24 @@ def test_what_goes_round_is_refused_by_name(drive: str) -> None:
     assert not any("rail.effort" in text for text in linear.warnings)
 
 
+def test_only_what_is_asked_counts() -> None:
+    """Forces in axes of the ground beside an effort of a hinge; along y of the table, at the angle
+    0, the slider cannot move, but later it does."""
+    inputs = ["slider.force.x", "slider.force.y", "rail.effort", "table.moment.z"]
+    linear = turntable().linearize(inputs=inputs)
+    assert [(risk.name, risk.element) for risk in linear.risks] == [
+        ("changing-input", 'input "slider.force.x"'),
+        ("changing-input", 'input "slider.force.y"'),
+        ("input-without-effect", 'input "table.moment.z"'),
+    ]
+    found = linear.frequency_response([2.0], ["rail.effort"], ["rail.displacement"])
+    assert found.trusted and not found.risks
+    expected = 1 / (STIFF - MASS * SPIN**2 - MASS * 4 + 2j * DAMPING)
+    assert found.values[0, 0, 0] == pytest.approx(expected, rel=1e-12)
+    idle = linear.frequency_response([2.0], ["table.moment.z"], ["rail.displacement"])
+    assert [risk.name for risk in idle.risks] == ["input-without-effect"]
+
+
 def test_matrices_that_depend_on_the_angle() -> None:
     """The table on a mount that moves along x: their inertia is coupled by m cos(W t)."""
     model = turntable(on="mount")
