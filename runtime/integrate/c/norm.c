@@ -26,6 +26,17 @@ double mstmm_combined_error(double h, double high, double low, int64_t n, int bo
   return h * high / sqrt((high + 0.01 * low) * (double)n);
 }
 
+/* Factor on scaled errors so that no tolerance asks for less than the noise of the right-hand side:
+ * relative ones for `attainable`, absolute ones for a hundredth of it. */
+static double share_above_noise(const mstmm_work *work) {
+  const double noise = work->system->attainable ? *work->system->attainable : 0.0;
+  if (!(noise > 0.0)) return 1.0;
+  double least = 0.01 * noise;
+  for (int64_t i = 0; i < work->system->n_error; i++)
+    if (work->atol[i] > 0.0) least = fmin(least, work->atol[i]);
+  return fmin(fmin(1.0, work->run->rtol / noise), least / (0.01 * noise));
+}
+
 MSTMM_WIDE double mstmm_error_norm(const mstmm_work *work, double *absolute) {
   const mstmm_tableau *tableau = work->tableau;
   const int64_t n = work->system->n_error, row = work->row;
@@ -49,9 +60,7 @@ MSTMM_WIDE double mstmm_error_norm(const mstmm_work *work, double *absolute) {
     high_scaled += (a * scale) * (a * scale);
     low_scaled += (b * scale) * (b * scale);
   }
-  const double h = work->run->real.h, rtol = work->run->rtol;
-  const double *attainable = work->system->attainable;
-  const double share = attainable && *attainable > rtol ? rtol / *attainable : 1.0;
+  const double h = work->run->real.h, share = share_above_noise(work);
   *absolute = n ? mstmm_combined_error(h, mstmm_total(&high), mstmm_total(&low), n, both) : 0.0;
   return n ? share * mstmm_combined_error(h, mstmm_total(&high_scaled), mstmm_total(&low_scaled),
                                           n, both)

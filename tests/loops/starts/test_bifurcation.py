@@ -78,3 +78,11 @@ def test_tighter_tolerances_are_not_worse(rtol: float) -> None:
     )
     assert np.abs(energy - energy[0]).max() < (bound if rtol < 1e-9 else 1e-4)
     assert np.abs(found.q - run(1e-9).q).max() < (1e-4 if rtol > 1e-9 else 1e-5)
+
+
+def test_absolute_tolerances_below_rounding_are_not_worse() -> None:
+    model = mstmm.compile(mstmm.Scene(**peaucellier()), engine="looped")
+    times = np.linspace(0.0, 5.0, 51)
+    found = model.simulate(5.0, rtol=1e-12, atol=1e-15, output_times=times)
+    assert found.success and found.statistics is not None and found.statistics.steps < 1500
+    assert np.abs(found.q - run(1e-9).q).max() < 1e-5
