@@ -38,6 +38,8 @@ FRAMES = ("auto", "fixed", "rotating")
 _NEAR = 1e-12
 #: Part of its first value to which the slowest frequency falls before a limit point.
 _VANISHING = 0.03
+#: Ratio of loads to those that buckle in another plane up to which both buckle together.
+_ALIKE = 1.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,11 +253,11 @@ def _growing(modes: Modes) -> int | None:
 
 def _risks_below(parameter: str, value: float, below: Modes) -> Iterator[Risk]:
     """Risks of the last stable state; that its loads take away a stiffness is the answer itself,
-    and motions that are fast have no part in it."""
+    also where another plane buckles at the same value, and fast motions have no part in it."""
     own = (
         risk for risk in below.risks
         if risk.name not in ("unstable", "unrestrained", "frequency-range")
-        and not (risk.name == "buckling" and risk.figure is not None and risk.figure < 0)
+        and not (risk.name == "buckling" and risk.figure is not None and risk.figure < _ALIKE)
     )  # fmt: skip
     return merge_over_values(parameter, [(value, own)])
 

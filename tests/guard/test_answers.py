@@ -238,3 +238,11 @@ def test_unstable_answers_say_so() -> None:
 def test_closed_states_are_examined_where_they_are_assembled() -> None:
     q, u = cantilever(0.1).assemble()
     assert q.shape == u.shape == (4,)
+
+
+def test_a_column_that_buckles_in_both_planes_at_once_is_trusted() -> None:
+    """Equal axes: what another plane loses at the same load does not speak against the load."""
+    found = cantilever(1.0, constant=True, bending_stiffness=[0.5, 0.5]).critical(
+        "constants.P", 0.5, 4.0
+    )
+    assert found.value == pytest.approx(np.pi**2 / 8, rel=3e-3) and found.trusted

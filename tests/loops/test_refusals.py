@@ -138,3 +138,18 @@ def test_a_row_of_a_batch_whose_loops_stay_open(model: mstmm.Model) -> None:
     alone = model.with_parameters({"rocker_pin.position[0]": feet[2]})
     q = alone.simulate(0.1, initial=model.initial_state(), output_times=[0.1]).q
     assert np.abs(batch.q[2] - q).max() < 1e-12
+
+
+def test_a_mass_centre_out_of_all_proportion_is_named() -> None:
+    """Its body hardly moves, so that the loop stays open for no fault of lengths or axes."""
+    scene = linkage("closing_pin", laws=False)
+    scene["body"] = [
+        body | ({"center_of_mass": [-1e12, 0, 0]} if body["name"] == "rocker" else {})
+        for body in scene["body"]
+    ]
+    scene["hinge"] = [
+        hinge | ({"initial": {"q": 0.3}} if hinge["name"] == "rocker_pin" else {})
+        for hinge in scene["hinge"]
+    ]
+    with pytest.raises(mstmm.SceneError, match=r'mass centre of body "rocker" is 1e\+12 m'):
+        mstmm.compile(mstmm.Scene(**scene))

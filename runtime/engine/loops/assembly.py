@@ -8,6 +8,7 @@ correction, as slips are linear in them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection
 
 import numpy as np
@@ -36,6 +37,8 @@ _TRIES, _SHAKEN = 4, 0.1
 _CHOICES = 4
 #: So many hinges are named.
 _NAMED = 8
+#: Distance of a mass centre in sizes of the scene from which on its body hardly moves.
+_FAR = 1e5
 #: Speeds by which rows may slip, in parts of the largest; pivots that still tell a row from others,
 #: in parts of its mobility.
 _SLIP, _TOLD = 1e-8, 1e-15
@@ -291,10 +294,29 @@ class Assembly:
             return f"{closing} cannot hold"
         return f"the loop that {closing} closes stays open"
 
+    def _far_mass(self) -> str:
+        """A body whose mass centre lies so far away that hardly anything moves it; "" without."""
+        bodies = self.calls.engine.packed.described.body
+        size = max(
+            (math.hypot(*end.position) for b in bodies for end in b.ends.values()), default=0
+        )
+        for body in bodies:
+            away = math.hypot(*body.center_of_mass)
+            if size and away > _FAR * size:
+                return (
+                    f'the mass centre of body "{body.name}" is {away:.3g} m from its origin, '
+                    f"{away / size:.0e} times the size of the scene; correct center_of_mass"
+                )
+        return ""
+
     def _remedy(self, row: int, q: Array, missing: Array) -> str:
         if self.calls.coupling_of(row):
             return "leave it or another coupling out, or correct what they equal"
-        known = self._behind(q) or skewed_by_gap(self.calls.engine.packed, self._largest(missing))
+        known = (
+            self._behind(q)
+            or self._far_mass()
+            or skewed_by_gap(self.calls.engine.packed, self._largest(missing))
+        )
         if known:
             return known
         less = ", hold or drive less" if self.held or self._driven() else ""
