@@ -78,6 +78,7 @@ _MODEL = "another model, or a part of this one"
 #: Other public calls, and why they carry no verdict.
 EXEMPT = {
     "session": "its result() is that of a run",
+    "assemble_path": "rows of closed states; assemble examines each",
     **dict.fromkeys((
         "accelerations", "bias", "derivatives", "energies", "energy", "gravity_efforts",
         "integrate", "inverse_dynamics", "jacobian", "jacobian_rate", "mass_matrix", "momentum",
