@@ -29,6 +29,8 @@ _PHASES = (0.7, 1.9, 3.3)
 _STILL = 1e-9
 #: Times in s after which what depends on time is looked at, and how many of its breaks are.
 _TIMES, _BREAKS = 1.0437 * np.geomspace(1e-3, 1e3, 19), 16
+#: The last time after which a motion is looked at.
+_LATEST = float(_TIMES[-1])
 #: Every how many of these times the matrices are compared.
 _SPARSE = 3
 #: Motion in rad or sizes over which closed loops are settled anew, and how often.
@@ -78,12 +80,13 @@ class LaterStates:
         return "as loads or drives change with time"
 
     def _phases(self) -> list[float]:
-        """Times (s) after which what moves has gone on by `_PHASES`."""
+        """Times (s) after which what moves has gone on by `_PHASES`, or as far as it comes."""
         linear = self._linear
         rates = np.abs(linear.state.u) / speed_sizes(linear.model)
         rates = rates[rates > _STILL * rates.max(initial=0)]
         ends = {float(rates.max()), float(rates.min())} if len(rates) else set()
-        return [phase / rate for rate in sorted(ends, reverse=True) for phase in _PHASES]
+        times = [phase / rate for rate in sorted(ends, reverse=True) for phase in _PHASES]
+        return list(dict.fromkeys(min(time, _LATEST) for time in times))
 
     def _breaks(self) -> list[float]:
         """Times (s) from the state on, between those at which expressions and inputs switch."""

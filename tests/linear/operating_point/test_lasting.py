@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -175,6 +176,19 @@ def test_loads_that_go_with_time() -> None:
         assert not one.linearize().trusted
     later = blown.equilibrium(t=55.0)
     assert later == pytest.approx([math.asin(1 / 9.81)]) and later.trusted
+
+
+@pytest.mark.parametrize("speed", [1e-16, 1e-10, 1e-4])
+def test_creep_is_followed_for_a_thousand_seconds(speed: float) -> None:
+    """A pendulum that hangs creeps: by 1e-13 rad in 1000 s it has not moved, by 0.1 rad its weight
+    pulls it back with m g l sin."""
+    linear = mstmm.compile(pendulum(), engine="looped").linearize([0.0], [speed])
+    found = [risk for risk in linear.risks if risk.name == "unsteady-state"]
+    assert len(found) == (speed > 1e-5) and linear.trusted == (not found)
+    for risk in found:
+        (t,) = re.findall(r"at t = (\S+) s", str(risk))
+        assert 900 < float(t) < 1100
+        assert risk.figure == pytest.approx(2 * 9.81 * 0.5 * math.sin(speed * float(t)), rel=1e-5)
 
 
 def test_a_carriage_that_moves_on_is_steady() -> None:
