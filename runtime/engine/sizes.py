@@ -14,6 +14,10 @@ from ..flexible.modal_body import ModalBody
 from ..flexible.sizes import modal_sizes, radius_of_gyration
 from ..pack.layout import Layout
 
+#: Distances in a scene that are rounding of none: in parts of the radii of gyration, and in m where
+#: all masses are points.
+_NO_LENGTH, _NO_METRES = 1e-3, 1e-5
+
 
 class Sized(Protocol):
     """What has sizes: a compiled scene."""
@@ -41,7 +45,10 @@ def speed_sizes(model: Sized) -> Array:
 
 
 def scene_length(model: Sized) -> float:
-    """The largest distance within a body or from one hinge to the next, m; 1 if all are zero."""
+    """The largest distance within a body or from one hinge to the next, m.
+
+    Where all are zero, or rounding of zero beside the radii of gyration, it is 1.
+    """
     scene = model.scene
     places = [hinge.position for hinge in scene.hinge]
     places += [chain.position for chain in scene.chain]
@@ -49,4 +56,9 @@ def scene_length(model: Sized) -> float:
         places += [body.center_of_mass, *(end.position for end in body.ends.values())]
     lengths = [float(np.linalg.norm(place)) for place in places]
     lengths += [radius_of_gyration(body) for body in model.flexible.values()]
-    return max(lengths, default=0.0) or 1.0
+    length = max(lengths, default=0.0)
+    rigid = [body for body in scene.bodies.by_name.values() if hasattr(body, "inertia")]
+    radii = [np.sqrt(sum(one.inertia[:3]) / 2 / one.mass) for one in rigid if one.mass > 0]
+    radius = float(max(radii, default=0.0))
+    least = _NO_LENGTH * radius if radius else _NO_METRES
+    return length if length > least else 1.0

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 import mstmm
+from mstmm.errors import NumericalFailure
 
 GRAVITY = 9.81
 
@@ -48,3 +50,29 @@ def test_a_tree_whose_drives_leave_nothing_free_is_where_they_have_it() -> None:
     scene["body"], scene["hinge"] = scene["body"][:1], scene["hinge"][:1]
     found = mstmm.compile(mstmm.Scene(**scene), engine="looped").equilibrium(t=0.05)
     assert np.abs(found - 0.3).max() < 1e-12 and found.residuals == {}
+
+
+def carried(offset: float, inertia: list[float]) -> mstmm.Model:
+    """A disc of 2 kg that a drive turns on a sprung slide of 1 kg, its mass centre so far out."""
+    disc = {"name": "disc", "mass": 2.0, "center_of_mass": [offset, 0, 0], "inertia": inertia}
+    slide = {"name": "x", "type": "prismatic", "inboard": "ground", "outboard": "slide",
+             "axis": [0, 1, 0], "law": {"stiffness": [1000.0]}}  # fmt: skip
+    pin = {"name": "p", "type": "pin", "inboard": "slide", "outboard": "disc", "drive": "20*t"}
+    scene = {"gravity": [0, -GRAVITY, 0], "body": [{"name": "slide", "mass": 1.0}, disc],
+             "hinge": [slide, pin]}  # fmt: skip
+    return mstmm.compile(mstmm.Scene(**scene), engine="looped")
+
+
+@pytest.mark.parametrize("inertia", [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+def test_an_offset_of_rounding_is_no_length_and_no_unbalance(inertia: list[float]) -> None:
+    for offset in (1e-12, 1e-9, 1e-7):
+        found = carried(offset, inertia).equilibrium()
+        assert abs(found[0] + 3 * GRAVITY / 1000) < 1e-12
+        assert found.unstable == () and found.trusted
+
+
+@pytest.mark.parametrize("inertia", [0.0, 1e-3, 1.0])
+def test_an_unbalance_that_shakes_does_not_last(inertia: float) -> None:
+    for offset in (2e-6, 5e-6, 1e-5, 1e-4, 1e-3, 1e-2):
+        with pytest.raises(NumericalFailure, match="does not last: while drives move on"):
+            carried(offset, 3 * [inertia]).equilibrium()
