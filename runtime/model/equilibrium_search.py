@@ -52,12 +52,14 @@ class _Sweeps:
         engine = _with_rotors(model, weight)
         self.stiffness = ShiftedStiffness(Tangent(engine), t, speed_sizes(model))
         self._scene = SceneSystem(engine, with_power=False)
+        gravity = float(np.linalg.norm(model.scene.gravity))
+        self._load = _mass(model) * gravity * scene_length(model)
 
     def find(
         self, q: Array, tolerance: float, max_steps: int, progress: Progress | None
     ) -> tuple[Array, bool]:
         """q at rest, and whether any steps led there."""
-        sweep = RestBySweep(self.stiffness, self._settled, max_steps, progress)
+        sweep = RestBySweep(self.stiffness, self._settled, self._load, max_steps, progress)
         return sweep.find(q, tolerance), sweep.steps > 0
 
     def _settled(self, q: Array) -> Array:
@@ -185,11 +187,16 @@ def _counted(progress: Progress | None) -> Progress | None:
     return None if progress is None else lambda _, length: progress(next(steps), length)
 
 
+def _mass(model: Compiled) -> float:
+    """Of all bodies that have one of their own, kg."""
+    bodies = model.scene.bodies.by_name.values()
+    return float(sum(body.mass for body in bodies if hasattr(body, "mass")))
+
+
 def _with_rotors(model: Compiled, weight: float) -> Engine:
     """The engine of the model with rotors on all hinges, as heavy as so many scenes."""
     packed = model.packed
-    masses = [body.mass for body in model.scene.bodies.by_name.values() if hasattr(body, "mass")]
-    rotors = weight * (sum(masses) or 1.0) * (scene_length(model) / speed_sizes(model)) ** 2
+    rotors = weight * (_mass(model) or 1.0) * (scene_length(model) / speed_sizes(model)) ** 2
     engine = Engine(packed_system(with_rotors(packed.system, rotors.tolist()), packed))
     if model.closed is not None:
         LoopCalls(engine, model.closed.start[0])  # judges its rows

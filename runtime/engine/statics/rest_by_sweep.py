@@ -35,23 +35,28 @@ _STUCK = 1e8
 _ROUNDING, _DROPPED, _GONE = 1e-6, 64.0, 1e-20
 #: Changes of q, in parts, by which rounding is seen, how often, and how many times it may be more.
 _NUDGE, _NUDGES, _MORE = 4e-16, 3, 10.0
+#: Rounding of efforts, in parts of those that cancel.
+_CANCELLED = 2e-16
 
 
 class RestBySweep:
     """The search from one state.
 
     `settled` puts a state's drives, quaternions and loops in order or raises NumericalFailure,
-    `progress` is called with the number of every step and its length in sizes.
+    `load` is the work, J, of all forces that may cancel over motions of order one, `progress` is
+    called with the number of every step and its length in sizes.
     """
 
     def __init__(
         self,
         stiffness: ShiftedStiffness,
         settled: Callable[[Array], Array],
+        load: float,
         most: int = MOST,
         progress: Callable[[int, float], None] | None = None,
     ) -> None:
         self.stiffness, self.settled, self.most, self.progress = stiffness, settled, most, progress
+        self.cancelled = _CANCELLED * load  #: J, where sigma falls no more
         self.steps = 0  #: taken by the last search
         self._least = 0.0  # sigma, with which solutions are no rounding
 
@@ -77,6 +82,8 @@ class RestBySweep:
                 return q  # so little of sigma that nothing is left of it
             if length < _ROUNDING and self._is_rounding(q, missing):
                 return q
+            if sigma <= self._least and self._is_rounding(q, missing, self.cancelled):
+                return q  # what nothing pushes back goes by rounding
             ahead = None if step is None else self._ahead(q, step, missing)
             if ahead is None:
                 sigma *= _HELD
@@ -121,9 +128,10 @@ class RestBySweep:
                 return None
         return ahead, left
 
-    def _is_rounding(self, q: Array, missing: Array) -> bool:
-        """Whether what is missing is no more than what rounding of q makes of it."""
-        draw, noise = np.random.default_rng(0), np.zeros_like(missing)
+    def _is_rounding(self, q: Array, missing: Array, cancelled: float = 0.0) -> bool:
+        """Whether what is missing is no more than what rounding of q makes of it, or of what
+        cancels, J."""
+        draw, noise = np.random.default_rng(0), cancelled / _MORE / self.stiffness.sizes
         for _ in range(_NUDGES):
             nudged = q * (1 + _NUDGE * draw.uniform(-1.0, 1.0, len(q)))
             noise = np.maximum(noise, np.abs(self.stiffness.residual(nudged) - missing))
