@@ -294,7 +294,7 @@ class Equations(Assessed):
                 "symbolic: linear models of closed loops are numbers; open the loop, or take M, C "
                 "and K as they are"
             )
-        names = texts_of("keep", keep, "rod1.mass")
+        names = keep if isinstance(keep, str) else texts_of("keep", keep, "rod1.mass")
         found: Symbolic = self.model.fusion.symbolic(self, names)
         return found
 
