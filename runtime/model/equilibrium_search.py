@@ -40,6 +40,9 @@ _CANCELLED = 1e-14
 _PATIENCE = 100
 #: How often a saddle is left, and how far, in sizes of the coordinates.
 _LEFT, _ASIDE = 20, 0.05
+#: How far beside a singular state work is looked at, in sizes, how many times further loops may
+#: lead, and along how many motions drawn.
+_NEAR, _FAR, _BESIDE = 0.02, 10.0, 6
 
 #: Called with the number of every step and how long it is, in sizes of the coordinates.
 Progress = Callable[[int, float], None]
@@ -59,10 +62,10 @@ class _Sweeps:
         self, q: Array, tolerance: float, max_steps: int, progress: Progress | None
     ) -> tuple[Array, bool]:
         """q at rest, and whether any steps led there."""
-        sweep = RestBySweep(self.stiffness, self._settled, self._load, max_steps, progress)
+        sweep = RestBySweep(self.stiffness, self.settled, self._load, max_steps, progress)
         return sweep.find(q, tolerance), sweep.steps > 0
 
-    def _settled(self, q: Array) -> Array:
+    def settled(self, q: Array) -> Array:
         """The state nearby with drives, quaternions and loops in order."""
         try:
             return self._scene.start(self.stiffness.t, q, self.stiffness.still)[: len(q)]
@@ -116,7 +119,34 @@ class EquilibriumSearch:
             except NumericalFailure:
                 break
             stability = find_stability(self._sweeps.stiffness, found)
+        if stability.unstable and self._holds_singular(self._sweeps, found, stability.unstable):
+            stability = Stability([], stability.neutral)
         return found, stability
+
+    def _holds_singular(self, sweeps: _Sweeps, q: Array, motions: list[Array]) -> bool:
+        """Whether states beside q, along motions (nu,) of negative stiffness, all take work where
+        loops have more motions than elsewhere: loads that loops take, and with them the stiffness,
+        are not determined there."""
+        model, freedom, stiffness = self._model, self._model.freedom, sweeps.stiffness
+        straight = _straight_places(model, list(range(model.nu)))
+        if freedom is None or model.closed is None or straight is None or not self._is_decided:
+            return False
+        if len(freedom.chosen(q)) <= model.closed.loops.mobility:
+            return False
+        parts = np.random.default_rng(0).uniform(-1.0, 1.0, (_BESIDE, len(motions)))
+        held, ways = list[bool](), [*motions, *(parts @ np.array(motions))]
+        for way in [*ways, *(-one for one in ways)]:
+            efforts = stiffness.residual(q)
+            step = stiffness.tangent.coordinates(_NEAR / stiffness.length(way) * way)
+            try:
+                beside = sweeps.settled(q + step)
+            except NumericalFailure:
+                continue
+            gone = (beside - q)[straight]
+            if stiffness.length(gone) < _FAR * _NEAR:
+                held.append(float((efforts + stiffness.residual(beside)) @ gone) > 0)
+        stiffness.residual(q)
+        return bool(held) and all(held)
 
     def _swept(
         self, light: _Sweeps, q: Array, tolerance: float, max_steps: int, progress: Progress | None

@@ -191,3 +191,27 @@ def test_links_on_balls_hang_and_may_spin() -> None:
     hooked = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     with pytest.raises(NumericalFailure, match="undetermined along"):
         hooked.equilibrium()
+
+
+@pytest.mark.parametrize("way, held", [(-1, True), (1, False)])
+def test_a_chain_folded_between_supports_in_one_place_is_stable_where_it_hangs(
+    way: int, held: bool
+) -> None:
+    """All links are in line there, and how the supports share the weight is not determined; gravity
+    tells a chain that hangs from one that stands: of many states beside, all or some are higher."""
+    count = 8
+    start = way * np.pi / 2 * np.where(np.arange(count) < count // 2, 1.0, -1.0)
+    scene = chain(np.zeros(count), "planes")
+    for one in scene["constraint"]:
+        one["position"] = [0.0, 0.0, 0.0]
+    model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
+    found = model.equilibrium(np.diff(start, prepend=0.0))
+    assert apart(angles_of(found, model), start) < 1e-6
+    assert (found.unstable == ()) is held
+    weights, draw = count - np.arange(count) - 0.5, np.random.default_rng(1)
+    higher = list[bool]()
+    for _ in range(20):
+        beside = model.assemble(found + draw.uniform(-0.02, 0.02, count))[0]
+        rise = weights @ (np.sin(angles_of(beside, model)) - np.sin(start))
+        higher.append(bool(rise > 0))
+    assert all(higher) is held
