@@ -160,6 +160,10 @@ class Tangent:
 
     def _call(self, name: str, *arguments: Any) -> None:
         pointer = self.engine.pointer
+        missing = self.engine.packed.workspace - len(self.workspace)
+        if missing > 0:  # tapes of events were laid out since, behind what there is
+            self.workspace = np.append(self.workspace, np.zeros(missing))
+            self.record.workspace = pointer(self.workspace)
         given = [
             pointer(np.ascontiguousarray(a, float)) if isinstance(a, np.ndarray) else a
             for a in arguments

@@ -53,8 +53,8 @@ class _Sweeps:
 
     def __init__(self, model: Compiled, t: float, weight: float) -> None:
         engine = _with_rotors(model, weight)
+        self._scene = SceneSystem(engine, with_power=False)  # lays out tapes that need room
         self.stiffness = ShiftedStiffness(Tangent(engine), t, speed_sizes(model))
-        self._scene = SceneSystem(engine, with_power=False)
         gravity = float(np.linalg.norm(model.scene.gravity))
         self._load = _mass(model) * gravity * scene_length(model)
 

@@ -26,15 +26,17 @@ double mstmm_combined_error(double h, double high, double low, int64_t n, int bo
   return h * high / sqrt((high + 0.01 * low) * (double)n);
 }
 
+#define OF_NOISE 3e-3
+
 /* Factor on scaled errors so that no tolerance asks for less than the noise of the right-hand side:
- * relative ones for `attainable`, absolute ones for a hundredth of it. */
+ * relative ones for `attainable`, absolute ones for OF_NOISE of it. */
 static double share_above_noise(const mstmm_work *work) {
   const double noise = work->system->attainable ? *work->system->attainable : 0.0;
   if (!(noise > 0.0)) return 1.0;
-  double least = 0.01 * noise;
+  double least = OF_NOISE * noise;
   for (int64_t i = 0; i < work->system->n_error; i++)
     if (work->atol[i] > 0.0) least = fmin(least, work->atol[i]);
-  return fmin(fmin(1.0, work->run->rtol / noise), least / (0.01 * noise));
+  return fmin(fmin(1.0, work->run->rtol / noise), least / (OF_NOISE * noise));
 }
 
 MSTMM_WIDE double mstmm_error_norm(const mstmm_work *work, double *absolute) {
