@@ -20,6 +20,7 @@ from .operating_point.departure import LARGEST, Departure, find_departure
 from .operating_point.later import LaterStates
 from .operating_point.sticking import friction_risks, saturation_risks
 from .output.outputs import left_out
+from .rotors.blades import find_blades
 
 if TYPE_CHECKING:
     from .equations import Equations
@@ -105,7 +106,9 @@ def _unsteady(linear: Equations) -> Iterator[Risk]:
             "changing-coefficients", RUN,
             "the matrices change along the motion of this state or with time: frequencies and "
             "growth of one moment are not those of the motion",
-            "simulate the motion, or linearise about a state that keeps its matrices",
+            "take to_fixed_frame(), which has constant matrices where the rotor is isotropic"
+            if find_blades(linear)
+            else "simulate the motion, or linearise about a state that keeps its matrices",
         )  # fmt: skip
     yield from (changing_risk(linear, name) for name in changing if name != MATRICES)
 

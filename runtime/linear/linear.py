@@ -58,9 +58,12 @@ class Linear(StateSpace):
     def to_fixed_frame(self) -> Linear:
         """The same model in the fixed frame: increments of an axisymmetric rotor as they are in
         axes that do not turn, those of its supports as they were; exact.  Coordinates keep their
-        names.  Pushes and outputs are those at the ends of bodies in inertial axes.
+        names; those of three or more equal blades are the pattern of the rotor at the azimuths
+        where the blades are now (multi-blade coordinates).  Pushes and
+        outputs are those at the ends of bodies in inertial axes.
 
-        Raises SceneError where a rotor is not axisymmetric or its coefficients change as it turns.
+        Raises SceneError where a rotor is neither axisymmetric nor one of equal blades, or its
+        coefficients change as it turns.
         """
         if self.frame == "fixed":
             return self

@@ -19,7 +19,8 @@ from mstmm.risk import Assessed, Risk, advice
 from ..engine.sizes import scene_length
 from ..guard.shape_range import motion_range_risks, shape_limits
 from . import files, shares
-from .rotors.fixed_frame import frame_of, whirl
+from .rotors.displacements import whirl
+from .rotors.fixed_frame import frame_of
 
 if TYPE_CHECKING:
     from ..result.view.view import View

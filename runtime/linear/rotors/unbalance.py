@@ -18,7 +18,7 @@ from mstmm.risk import Assessed, DeferredRisks, Risk
 from ...engine.references import References
 from ...guard.answers import merge_over_values
 from .. import files
-from .fixed_frame import angular_velocity
+from .displacements import angular_velocity
 
 if TYPE_CHECKING:
     from ..linear import Linear

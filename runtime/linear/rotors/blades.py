@@ -1,0 +1,144 @@
+"""Blades: three or more equal branches that spin with a hub, and their multi-blade coordinates.
+
+A coordinate of blade k of N is a sum of harmonics of the azimuth at which the blade stands,
+
+    x_k(t) = sum over h of a_h(t) exp(i h (W t + 2 pi k / N)),  |h| <= N / 2,
+
+after Coleman and Feingold (1958).  The same sum at the azimuths of the blades at t = 0,
+
+    y_k(t) = sum over h of a_h(t) exp(2 pi i h k / N),
+
+is the pattern of the rotor as an observer sees it who does not turn.  Then y' = x' + R y with a
+circulant R, which turns harmonic h at the rate -h W; the mean of all blades, and of an even number
+the pattern of alternating signs, stay as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array, Integers
+
+from ...engine.calls import Probe
+from ...engine.shown import COLUMNS
+
+if TYPE_CHECKING:
+    from ...pack.packed import Packed
+    from ..equations import Equations
+
+#: Fewest blades whose coefficients stay constant in the fixed frame.
+_FEWEST = 3
+#: Azimuths and distances from the axis that count as equal, in rad and in parts.
+_EQUAL = 1e-6
+
+
+@dataclass(frozen=True)
+class Blades:
+    """Equal branches of one hub, in the order of their azimuths.
+
+    Attributes:
+        bodies: (blades, b) positions of their bodies in the tree.
+        coordinates: (blades, m) indices among the increments of a linear model.
+        speed: angular velocity of the hub, rad/s.
+    """
+
+    bodies: Integers
+    coordinates: Integers
+    speed: float
+
+    @property
+    def rates(self) -> Array:
+        """(blades, blades) R, 1/s, of one coordinate of all blades."""
+        count = len(self.coordinates)
+        k = np.arange(count)
+        h = np.arange(1, (count - 1) // 2 + 1)[:, None, None]
+        turns = h * np.sin(2 * np.pi * h * (k[:, None] - k) / count)
+        return np.asarray(2 * self.speed / count * turns.sum(axis=0))
+
+
+@dataclass(frozen=True)
+class _Branch:
+    """A branch: its bodies by their positions in the tree, and its increments of a linear model."""
+
+    bodies: tuple[int, ...]
+    coordinates: tuple[int, ...]
+    form: tuple[object, ...]
+
+
+def find_blades(linear: Equations) -> list[Blades]:
+    """Groups of equal branches around spinning bodies, at equal angles about their axes."""
+    packed = linear.model.looped.packed
+    points = _mass_centres(linear)
+    found: list[Blades] = []
+    for hub, link in enumerate(packed.topology.links):
+        by_form: dict[tuple[object, ...], list[_Branch]] = {}
+        for child in link.children if len(link.children) >= _FEWEST else ():
+            branch = _branch(linear, packed, child)
+            if branch.coordinates:
+                by_form.setdefault(branch.form, []).append(branch)
+        groups = (_arranged(points, hub, group) for group in by_form.values())
+        found += [group for group in groups if group is not None]
+    return found
+
+
+def _branch(linear: Equations, packed: Packed, root: int) -> _Branch:
+    """The branch from a body outwards; its form are the hinges and free increments, in order."""
+    bodies, coordinates, form = [], list[int](), list[object]()
+    places = {speed: k for k, speed in enumerate(linear.free)}
+    for place in _outwards(packed, root):
+        bodies.append(place)
+        body, hinge = packed.topology.at(place)
+        of_hinge = packed.layout.hinges.get(packed.scene.hinges[hinge].name)
+        of_body = packed.layout.modal.get(packed.scene.bodies.name(body))
+        for slots in (of_hinge, of_body):
+            free = [] if slots is None else [k for k in range(slots.nu) if slots.u + k in places]
+            form.append((None if slots is None else slots.type, tuple(free)))
+            coordinates += [places[slots.u + k] for k in free] if slots is not None else []
+        form.append(len(packed.topology.links[place].children))
+    return _Branch(tuple(bodies), tuple(coordinates), tuple(form))
+
+
+def _outwards(packed: Packed, root: int) -> Iterator[int]:
+    """A body and all that hang on it, depth first."""
+    waiting = [root]
+    while waiting:
+        place = waiting.pop()
+        yield place
+        waiting += reversed(packed.topology.links[place].children)
+
+
+def _mass_centres(linear: Equations) -> Array:
+    """(bodies, 24) of mass centres in the order of the tree, as of `Observation.points`."""
+    packed, state, engine = linear.model.looped.packed, linear.state, linear.model.looped
+    names = [packed.scene.bodies.name(body) for body in packed.topology.order]
+    probes = [Probe(packed.end(name)[0], packed.end(name)[1], packed.mass_center(name))
+              for name in names]  # fmt: skip
+    of = np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None]
+    return np.asarray(engine.observe(*of, probes, parts=("points",)).points[0])
+
+
+def _arranged(points: Array, hub: int, group: list[_Branch]) -> Blades | None:
+    """The branches in the order of their azimuths about the axis of the hub, where these are equal
+    angles apart."""
+    spin = points[hub, COLUMNS["angular_velocity"]]
+    speed = float(np.linalg.norm(spin))
+    if len(group) < _FEWEST or not speed:
+        return None
+    axis = spin / speed
+    across = np.linalg.svd(axis[None])[2][1:]
+    across[1] = np.cross(axis, across[0])
+    means = np.array([points[list(one.bodies), :3].mean(axis=0) for one in group])
+    plane = (means - means.mean(axis=0)) @ (across.T @ [1, 1j])
+    radius, order = np.abs(plane), np.argsort(np.angle(plane))
+    steps = np.angle(plane[np.roll(order, -1)] / plane[order]) if radius.all() else np.zeros(1)
+    even = np.abs(steps - 2 * np.pi / len(group)).max() <= _EQUAL
+    if not even or np.ptp(radius) > _EQUAL * radius.max():
+        return None
+    bodies, coordinates = (
+        np.array([getattr(group[k], name) for k in order]) for name in ("bodies", "coordinates")
+    )
+    return Blades(bodies, coordinates, speed)
