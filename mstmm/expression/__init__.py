@@ -1,4 +1,4 @@
-"""The small grammar of scene files: text, its parsed form, and drives made of it."""
+"""Expressions of scene files: text, parsed form, and prescribed motion built from them."""
 
 from __future__ import annotations
 

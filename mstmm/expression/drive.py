@@ -1,4 +1,4 @@
-"""Prescribed motion: a drive and its exact first and second time derivatives."""
+"""Prescribed motion: a drive and its exact first and second derivatives by time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..ir.tangent import derivative
 from .expression import Expression, Name
 from .inputs import Inputs, Resolved
 
-#: Longest numerator or denominator of a constant; fractions are stored as decimal text.
+#: Most bits of a numerator or denominator: fractions are stored as decimal text.
 _MAX_BITS = 12_000
 
 
@@ -21,8 +21,9 @@ def motion(
 ) -> tuple[Node, Node, Node]:
     """Position, speed and acceleration of a drive as nodes of the graph of `time`.
 
-    The drive depends on `t` and on what `resolve` gives, functions of `time` too.  Derivatives are
-    exact on every smooth piece.  Raises ExpressionError where their constants cannot be stored.
+    The drive depends on `t` and on the nodes that `resolve` returns for names; these are functions
+    of `time` too.  Derivatives are exact on every smooth piece.  Raises ExpressionError where a
+    constant of a derivative is too long or too large.
     """
     position = drive.build(time.graph, (lambda _: time) if resolve is None else resolve)
     speed = derivative(position, {time: 1})
@@ -33,7 +34,10 @@ def motion(
 
 
 def _refuse_long_constants(root: Node, drive: Expression) -> None:
-    """Derivatives multiply constants exactly; hundreds of them make numbers nobody can store."""
+    """Reject constants that exact differentiation has made too long or too large.
+
+    Derivatives multiply constants exactly, so that hundreds of factors give very long fractions.
+    """
     seen: set[int] = set()
     stack = [root]
     while stack:
@@ -47,24 +51,25 @@ def _refuse_long_constants(root: Node, drive: Expression) -> None:
             continue
         if max(exact.numerator.bit_length(), exact.denominator.bit_length()) > _MAX_BITS:
             raise ExpressionError(
-                f"the derivatives of {drive.text[:60]!r} hold a constant of thousands of digits; "
-                "write the product of its constants as one number"
+                f"the derivatives of {drive.text[:60]!r} contain a constant of thousands of "
+                "digits; write the product of its constants as one number"
             )
         try:
             float(exact)
         except OverflowError:
             raise ExpressionError(
-                f"the derivatives of {drive.text[:60]!r} hold a constant beyond 1.8e308; scale it"
+                f"the derivatives of {drive.text[:60]!r} contain a constant above 1.8e308; scale "
+                "the drive"
             ) from None
 
 
 def motion_at(
     drive: Expression, t: float, inputs: Inputs | None = None
 ) -> tuple[float, float, float]:
-    """(position, speed, acceleration) of a drive at time t in double precision; `inputs` are those
-    that it may name.
+    """Position, speed and acceleration of a drive at time t (s), in double precision.
 
-    An entry is nan or infinite where the mathematics has no finite value.
+    `inputs` are the inputs and signals that the drive may name.  An entry is nan or infinite where
+    the expression has no finite value.
     """
     resolved = Resolved(Graph().element("t"), inputs or {})
     nodes = motion(drive, resolved.time, resolved.node)
@@ -72,17 +77,17 @@ def motion_at(
     return q, u, a
 
 
-#: A drive may jump by no more than this share of its own size, in position and in speed.
+#: Largest jump of a drive in position or speed that counts as rounding, relative above 1.
 _CONTINUOUS = 1e-6
 
 
 def jump(
     drive: Expression, gaps: Iterable[tuple[float, float]], inputs: Inputs | None = None
 ) -> str:
-    """What jumps first across gaps (before, after) in time, in s; "" if nothing does.
+    """Message about the first jump of a drive across gaps (before, after) in time (s), or "".
 
-    A position that jumps is no motion, a speed that jumps needs an impulse, and neither has a
-    finite effort.
+    A jump in position is not a motion, and a jump in speed needs an impulse: neither has a finite
+    effort.
     """
     resolved = Resolved(Graph().element("t"), inputs or {})
     nodes = motion(drive, resolved.time, resolved.node)[:2]
@@ -98,9 +103,9 @@ def jump(
 
 
 def value(node: Node, leaf: Callable[[Node], float]) -> float:
-    """Double-precision value of a node; `leaf` gives the value of each input entry.
+    """Value of a node in double precision; `leaf` returns the value of each input entry.
 
-    nan where the mathematics has no value; only the chosen branch of a `select` counts.
+    nan where the expression has no value; only the selected branch of a `select` counts.
     """
     known: dict[int, float] = {}
     stack = [node]

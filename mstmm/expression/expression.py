@@ -1,8 +1,8 @@
-"""Expressions of scene files: numbers, names, + - * / ^, comparisons, `pi`, `deg`, a few functions.
+"""Expressions of scene files: parsing, evaluation and conversion into an expression graph.
 
-`parse` turns text into a frozen `Expression`; `Expression.build` puts it into a
-`mstmm.ir.graph.Graph`, from where it reaches the tape, C, and its exact derivatives like every
-derived equation.  Nothing is ever evaluated as Python.
+`parse` turns text into a frozen `Expression`; `Expression.build` converts it to nodes of a
+`mstmm.ir.graph.Graph`.  From there it is compiled and differentiated exactly, as every derived
+equation is.  Text is never evaluated as Python.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from .parser import FUNCTIONS, MAX_LENGTH, MEANING, Name, Parser, Term
 
 __all__ = ["FUNCTIONS", "SWITCHES", "Expression", "Name", "number", "parse"]
 
-#: Operations that change branch where their argument, or the difference of the two, is zero.
+#: Operations that change branch where their argument, or the difference of both, is zero.
 SWITCHES = frozenset({"sign", "abs", "lt", "le", "gt", "ge", "min", "max"})
 
-#: Operations that are numbers wherever their operands are, overflow aside.
+#: Operations that are not nan where no operand is nan, except after overflow.
 _NEVER_NAN = frozenset({
     "number", "pi", "name", "neg", "add", "sub", "mul", "abs", "sign", "min", "max", "sin", "cos",
     "tan", "atan", "atan2", "tanh", "lt", "le", "gt", "ge", "where",
@@ -33,49 +33,50 @@ _Line = tuple[Fraction, Fraction]
 
 @dataclass(frozen=True)
 class Expression:
-    """A parsed expression.  Two are equal when their texts and their constants are.
+    """Parsed expression.
 
-    `names` are the names it refers to, each once, in the order of the text; `terms` is the flat
-    syntax tree (arguments before the operation), `root` the number of the outermost term.
+    Expressions with equal text and equal constants are equal.  `names` are the names in it, each
+    once, in the order of the text.  `terms` is the flat syntax tree (arguments before the
+    operation), `root` the index of the outermost term.
     """
 
     text: str
     names: tuple[Name, ...] = field(compare=False)
     terms: tuple[Term, ...] = field(compare=False, repr=False)
     root: int = field(compare=False, repr=False)
-    #: The named constants in it and their numbers, which the terms hold.
+    #: The named constants in it with their values, which the terms contain.
     constants: tuple[tuple[str, float], ...] = field(default=(), kw_only=True)
 
     # --- what it depends on -------------------------------------------------------------------
 
     @property
     def is_constant(self) -> bool:
-        """True when no name occurs in it."""
+        """Whether the expression contains no name."""
         return not self.names
 
     @property
     def constant(self) -> float | None:
-        """The value of a constant expression, else None."""
+        """Value of a constant expression, else None."""
         return self.terms[self.root].constant
 
     @property
     def is_zero(self) -> bool:
-        """True for an expression that is exactly the constant zero."""
+        """Whether the expression is exactly the constant zero."""
         return self.terms[self.root].constant == 0
 
     @property
     def depends_on_time_only(self) -> bool:
-        """True when `t` is the only name in it (constants included)."""
+        """Whether no name but `t` occurs in the expression; true for constants."""
         return all(name.parts == ("t",) and name.index is None for name in self.names)
 
     @property
     def is_condition(self) -> bool:
-        """True when the whole expression is a comparison."""
+        """Whether the whole expression is a comparison."""
         return self.terms[self.root].is_condition
 
     @property
     def comparison(self) -> tuple[Expression, str, Expression] | None:
-        """(left, "<" | "<=" | ">" | ">=", right) of a top-level comparison, else None."""
+        """Parts (left, "<" | "<=" | ">" | ">=", right) of a top-level comparison, else None."""
         top = self.terms[self.root]
         if not top.is_condition:
             return None
@@ -93,7 +94,7 @@ class Expression:
 
     @property
     def needed(self) -> frozenset[int]:
-        """Numbers of the terms that the value depends on."""
+        """Indices of the terms that the value depends on."""
         return frozenset(self._needed(self.root))
 
     def _needed(self, root: int) -> set[int]:
@@ -108,15 +109,15 @@ class Expression:
     # --- meaning --------------------------------------------------------------------------------
 
     def build(self, graph: Terms, resolve: Callable[[Name], Node]) -> Node:
-        """The expression as a node of `graph`; `resolve` gives the node of each name.
+        """Build the expression as a node of `graph`; `resolve` returns the node of each name.
 
-        A comparison becomes 1 where it holds and 0 elsewhere; a `where` whose comparison has nan on
-        a side is nan.
+        A comparison is 1 where it is true and 0 elsewhere.  A `where` whose comparison has nan on
+        either side is nan.
         """
         return self.nodes(graph, resolve)[self.root]
 
     def nodes(self, graph: Terms, resolve: Callable[[Name], Node]) -> dict[int, Node]:
-        """The nodes of all terms that the value depends on, by their numbers."""
+        """Build the nodes of all terms that the value depends on, by term index."""
         nodes: dict[int, Node] = {}
         numbers: set[int] = set()  # terms that are never nan while names are finite
         for number in sorted(self._needed(self.root)):
@@ -131,7 +132,7 @@ class Expression:
         return nodes
 
     def evaluate(self, values: Callable[[Name], float]) -> float:
-        """Value in double precision; nan or an infinity where the mathematics has none."""
+        """Evaluate in double precision; nan or infinity where there is no finite value."""
         known: dict[int, float] = {}
         needed = self._needed(self.root)
         for number, term in enumerate(self.terms):
@@ -146,14 +147,18 @@ class Expression:
         return known[self.root]
 
     def time_breaks(self) -> tuple[float, ...]:
-        """Times, ascending, at which the expression switches exactly: where a comparison, sign,
-        abs, min or max of something linear in `t` alone changes side."""
+        """Exact switching times (s), ascending.
+
+        A comparison, sign, abs, min or max of terms that are linear in `t` alone switches there.
+        """
         times = (time for time in self.linear_switches().values() if time is not None)
         return tuple(sorted(set(times)))
 
     def linear_switches(self) -> dict[int, float | None]:
-        """Term -> the time at which it switches, for what compares straight lines in `t` alone;
-        None for one that never switches."""
+        """Switching time (s) by term index, of terms that compare linear functions of `t` alone.
+
+        None for a term that never switches.
+        """
         lines: list[_Line | None] = []
         needed = self._needed(self.root)
         found: dict[int, float | None] = {}
@@ -168,10 +173,10 @@ class Expression:
 
 
 def parse(text: str, where: str = "", constants: Mapping[str, float] | None = None) -> Expression:
-    """Parse `text`; `where` (file, element, key) begins every message, `constants` are numbers that
-    have names.
+    """Parse the text of an expression.
 
-    Raises ExpressionError with the position marked and one way out.
+    `where` (file, element, key) begins every message; `constants` are named numbers.  Raises
+    ExpressionError with the position marked and a remedy.
     """
     try:
         return _parse(_checked(text), tuple((constants or {}).items()))
@@ -181,20 +186,20 @@ def parse(text: str, where: str = "", constants: Mapping[str, float] | None = No
 
 def _checked(text: object) -> str:
     if not isinstance(text, str):
-        raise ExpressionError(f"an expression is text, not {type(text).__name__}")
+        raise ExpressionError(f"expected an expression as text, found {type(text).__name__}")
     if len(text) > MAX_LENGTH:
         raise ExpressionError(
             f"the expression has {len(text)} characters, the limit is {MAX_LENGTH}; "
-            "split it over several loads, or shorten it"
+            "shorten it, or split it into several loads"
         )
     stripped = text.strip(" \t\r\n")
     if not stripped:
-        raise ExpressionError("the expression is empty; write 0 for nothing")
+        raise ExpressionError("the expression is empty; write 0 for zero")
     return stripped
 
 
 def number(value: float) -> Expression:
-    """The expression that is this finite number."""
+    """Constant expression of a finite number."""
     return _parse(repr(float(value)))
 
 
@@ -229,7 +234,7 @@ def _node(graph: Terms, term: Term, args: list[Node], resolve: Callable[[Name], 
 
 
 def _where_false(graph: Terms, comparison: Term, nodes: Mapping[int, Node], no: Node) -> Node:
-    """What a `where` is if its comparison does not hold: `no`, or nan if a side of that is nan."""
+    """False branch of a `where`: `no`, or nan if a side of the comparison is nan."""
     a, b = (nodes[i] for i in comparison.args)
     if comparison.op in ("gt", "ge"):
         a, b = b, a
@@ -261,12 +266,12 @@ def _line(term: Term, args: list[_Line | None]) -> _Line | None:
 
 
 def _is_long(line: _Line) -> bool:
-    """Products of many long constants: not worth an exact time."""
+    """Whether a coefficient is too long for an exact switching time."""
     return any(max(abs(x.numerator), x.denominator).bit_length() > 8000 for x in line)
 
 
 def _switch(op: str, lines: list[_Line]) -> float | None:
-    """Time at which an operation on straight lines changes branch."""
+    """Time (s) at which an operation on linear functions of time changes branch."""
     if op in ("sign", "abs"):
         slope, offset = lines[0]
     else:

@@ -1,4 +1,4 @@
-"""Inputs and signals in expressions: polynomials in time whose numbers are read as it goes on."""
+"""Inputs and signals in expressions: polynomials in time with coefficients read at run time."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from .expression import Name
 #: Inputs and signals by their names.
 Inputs = Mapping[str, Pieces]
 
-#: Port of the numbers of all inputs, COUNT of each.
+#: Port of the coefficients of all inputs, COUNT of each.
 INPUTS = "inputs"
 
 
 def polynomial(numbers: Sequence[Node], time: Node) -> Node:
-    """The value at `time` of a piece (`mstmm.numbers.pieces`) whose numbers are nodes."""
+    """Value at `time` of a piece (`mstmm.numbers.pieces`) whose coefficients are nodes."""
     t0, c0, c1, c2, c3 = numbers
     s = time - t0
     return c0 + s * (c1 + s * (c2 + s * c3))
 
 
 def input_at(place: int, time: Node) -> Node:
-    """The input of this number at `time`, its numbers read from the port."""
+    """Value at `time` of the input at index `place`, its coefficients read from the port."""
     return polynomial([time.graph.element(INPUTS, COUNT * place + k) for k in range(COUNT)], time)
 
 
 class Resolved:
-    """Nodes of inputs, and the numbers of their leaves at any time."""
+    """Nodes of inputs, and the values of their leaves at a given time."""
 
     def __init__(self, time: Node, inputs: Inputs) -> None:
         self.time, self.inputs = time, inputs
@@ -36,7 +36,7 @@ class Resolved:
         self._places = {name: place for place, name in enumerate(inputs)}
 
     def node(self, name: Name) -> Node:
-        """t, or an input."""
+        """Build the node of `t` or of an input."""
         if name.text == "t":
             return self.time
         first = COUNT * self._places[name.text]
@@ -45,7 +45,7 @@ class Resolved:
         return polynomial(numbers, self.time)
 
     def leaf(self, t: float) -> Callable[[Node], float]:
-        """What the leaves are at t."""
+        """Function that returns the value of each leaf at time t (s)."""
 
         def number(node: Node) -> float:
             if node.number not in self._leaves:

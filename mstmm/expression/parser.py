@@ -1,4 +1,4 @@
-"""Text of the small expression grammar -> a flat list of terms.  No recursion, no eval.
+"""Parser of scene expressions: text to a flat list of terms, without recursion or eval.
 
     comparison := sum [("<" | "<=" | ">" | ">=") sum]
     sum        := product {("+" | "-") product}
@@ -10,7 +10,7 @@
     name       := word [place] {"." word} ["[" whole number "]"]
     place      := "[" (whole number | "last") "]"        (of a chain's member, as in rope[3].tip.x)
 
-`deg` is pi/180; a name may stand for a constant, whose number is taken then.
+`deg` is pi/180; the name of a constant is replaced by its value.
 
 An operator stack (shunting yard) replaces the call stack, so that no text can overflow it.
 """
@@ -32,7 +32,7 @@ from ..ir import OPERATIONS
 MAX_LENGTH = 4000
 MAX_DEPTH = 100
 MAX_WORD = 64
-#: An exact constant is kept as a fraction up to this many bits, and rounded to double beyond.
+#: Most bits of an exact constant; longer ones are rounded to double precision.
 _MAX_BITS = 2100
 
 #: Function name -> number of arguments (None: two or more).
@@ -67,16 +67,16 @@ _WAYS_OUT = {
     "\N{MINUS SIGN}": "write the plain - of the keyboard",
     "\N{MIDDLE DOT}": "write * for a product",
     "\N{MULTIPLICATION SIGN}": "write * for a product",
-    "'": "an expression holds no text",
-    '"': "an expression holds no text",
+    "'": "an expression cannot contain text",
+    '"': "an expression cannot contain text",
 }
 
-#: Longer expressions are shown around the fault alone.
+#: Longest expression that messages show whole; of longer ones they show the part with the error.
 _SHOWN = 80
 
 
 def marked(text: str, position: int) -> str:
-    """A place of an expression: its number, and the piece around it with an arrow."""
+    """Position in an expression as text: character number, and the text around it with an arrow."""
     before, after = text[max(0, position - 30) : position], text[position:]
     before = ("..." if position > 30 else "") + before
     after = after[:30] + ("..." if len(after) > 30 else "")
@@ -86,9 +86,9 @@ def marked(text: str, position: int) -> str:
 
 @dataclass(frozen=True)
 class Name:
-    """A name in an expression: `rod1.tip.x` has parts ("rod1", "tip", "x"), `q[1]` the index 1.
+    """Name in an expression: `rod1.tip.x` has parts ("rod1", "tip", "x"), `q[1]` the index 1.
 
-    Of a chain's members there are `rope[3].tip.x` and `rope[3].hinge.q`.
+    Names of chain members are such as `rope[3].tip.x` and `rope[3].hinge.q`.
     """
 
     parts: tuple[str, ...]
@@ -97,32 +97,32 @@ class Name:
 
     @property
     def text(self) -> str:
-        """The name as it is written."""
+        """Text of the name."""
         return ".".join(self.parts) + ("" if self.index is None else f"[{self.index}]")
 
     @property
     def owner(self) -> str:
-        """Hinge or body the name belongs to; "" for `t`, the own `q`, `u` and parameters."""
+        """Hinge or body of the name; "" for `t`, and for `q`, `u` and parameters of the element."""
         return self.parts[0] if len(self.parts) > 1 else ""
 
     @property
     def hinge(self) -> str:
-        """Hinge whose `q` or `u` it is, "shoulder" or "rope[3].hinge"; "" for the own ones."""
+        """Hinge of a `q` or `u`: "shoulder" or "rope[3].hinge"; "" for the element's own."""
         return ".".join(self.parts[:-1])
 
     @property
     def is_member(self) -> bool:
-        """True where it begins with the member of a chain."""
+        """Whether the name begins with a chain member."""
         return self.parts[0].endswith("]")
 
     @property
     def quantity(self) -> str:
-        """Last part: t, q, u, x, y, z, vx, vy, vz or the name of a parameter."""
+        """Last part of the name: t, q, u, x, y, z, vx, vy, vz or the name of a parameter."""
         return self.parts[-1]
 
 
 def around(text: str, name: Name) -> str:
-    """The expression around a name, for the end of a message: whole unless it is long."""
+    """Expression that contains a name, for the end of a message; shortened where it is long."""
     if text == name.text:
         return ""
     return f" (in {text!r})" if len(text) <= _SHOWN else f" ({marked(text, name.position)})"
@@ -130,7 +130,7 @@ def around(text: str, name: Name) -> str:
 
 @dataclass(frozen=True)
 class Term:
-    """One operation; `args` point to earlier terms of the same list.
+    """Operation of a parsed expression; `args` are indices of earlier terms of the same list.
 
     `op` is number, pi, name, a comparison (lt le gt ge), an arithmetic operation or a function.
     `exact` is the rational value of a constant term, `constant` its value in double precision.
@@ -150,11 +150,11 @@ class Term:
 
 
 def _compare(holds: Callable[[Any, Any], bool]) -> Callable[[Any, Any], float]:
-    """1 or 0; nan, which is neither, where one of the two is nan."""
+    """Comparison as a number: 1 or 0, or nan where either argument is nan."""
     return lambda a, b: float(holds(a, b)) if a == a and b == b else math.nan
 
 
-#: What each operation means in double precision, with the values that C gives.
+#: Functions of all operations in double precision, with the same values as in C.
 MEANING: dict[str, Callable[..., Any]] = {
     **{name: row.value for name, row in OPERATIONS.items()},
     **{name: _compare(getattr(operator, name)) for name in ("lt", "le", "gt", "ge")},
@@ -171,7 +171,7 @@ _EXACT = frozenset({
 
 @dataclass
 class _Pending:
-    """An operator, or an open parenthesis (op "(" or the function's name), that waits."""
+    """Operator or open parenthesis on the stack; `op` of a parenthesis is "(" or a function."""
 
     op: str
     precedence: int
@@ -181,9 +181,9 @@ class _Pending:
 
 
 class Parser:
-    """Parses one text; `terms` and `root` are the outcome of `run`.
+    """Parser of one expression; `run` fills `terms` and returns the index of the root.
 
-    `constants` are the numbers of names; `used` are those of them that the text has.
+    `constants` maps names to numbers; `used` are the constants that the text contains.
     """
 
     def __init__(self, text: str, constants: Mapping[str, float] | None = None) -> None:
@@ -196,13 +196,13 @@ class Parser:
         self._depth = 0
 
     def error(self, message: str, position: int) -> ExpressionError:
-        """The error with its position marked by an arrow in a piece of the text."""
+        """ExpressionError with its position marked by an arrow in the text."""
         return ExpressionError(f"{message} ({marked(self.text, position)})")
 
     # --- the loop over tokens ---------------------------------------------------------------
 
     def run(self) -> int:
-        """Parse everything; the number of the outermost term."""
+        """Parse the whole text; return the index of the outermost term."""
         expects_operand, position = True, 0
         while position < len(self.text):
             match = _TOKEN.match(self.text, position)
@@ -222,7 +222,7 @@ class Parser:
         self._reduce_to_group()
         if self._waiting:
             opened = self._waiting[-1].position
-            raise self.error("this parenthesis is never closed: add )", opened)
+            raise self.error("this parenthesis is not closed; add )", opened)
         return self._operands[-1][0]
 
     def _unknown_character(self, position: int) -> ExpressionError:
@@ -231,7 +231,7 @@ class Parser:
         return self.error(f"{character!a} is not part of an expression; {way_out}", position)
 
     def _operand(self, kind: str, token: str, start: int, end: int) -> tuple[bool, int]:
-        """A value is expected here: (still expecting a value, where to go on)."""
+        """Read an operand: (whether a value is still expected, position of the next token)."""
         if kind == "number":
             self._push(self._number(token, start, end), start, end)
             return False, end
@@ -285,13 +285,13 @@ class Parser:
         if len(parts) > 4:
             raise self.error("a name has at most four parts, as in body.end.velocity.x", start)
         if any(len(part.partition("[")[0]) > MAX_WORD for part in parts):
-            raise self.error(f"a word has at most {MAX_WORD} characters", start)
+            raise self.error(f"each part of a name has at most {MAX_WORD} characters", start)
         return Name(parts, int(index[:-1]) if bracket else None, start)
 
     def _operator(self, kind: str, token: str, start: int) -> bool:
-        """A value has just ended: an operator, a comma or a closing parenthesis may follow."""
+        """Read an operator, comma or closing parenthesis; return whether a value must follow."""
         if kind != "symbol" or token == "(":
-            raise self.error("an operator is missing here: write * for a product", start)
+            raise self.error("an operator is missing here; write * for a product", start)
         if token == ")":
             self._close(start)
             return False
@@ -325,7 +325,7 @@ class Parser:
         self._reduce_to_group()
         if not self._waiting or self._waiting[-1].op == "(":
             raise self.error(
-                "a comma separates the arguments of a function only; write decimals with a point",
+                "a comma only separates arguments of a function; write decimals with a point",
                 start,
             )
         self._waiting[-1].arguments += 1
@@ -333,7 +333,7 @@ class Parser:
     def _close(self, start: int) -> None:
         self._reduce_to_group()
         if not self._waiting:
-            raise self.error("this parenthesis was never opened", start)
+            raise self.error("this parenthesis has no opening one; remove it, or add (", start)
         group = self._waiting.pop()
         self._depth -= 1
         if group.op == "(":
@@ -343,7 +343,7 @@ class Parser:
         count, wanted = group.arguments + 1, FUNCTIONS[group.op]
         if count != wanted and not (wanted is None and count >= 2):
             takes = "two or more arguments" if wanted is None else _count(wanted)
-            raise self.error(f"{group.op} takes {takes}, not {count}", group.position)
+            raise self.error(f"{group.op}: expected {takes}, found {count}", group.position)
         arguments = self._operands[-count:]
         del self._operands[-count:]
         # min(a, b, c) is min(min(a, b), c)
@@ -366,10 +366,10 @@ class Parser:
     def _number(self, token: str, start: int, end: int) -> Term:
         value = float(token)
         if math.isinf(value):
-            raise self.error("this number is too large (the limit is about 1.8e308)", start)
+            raise self.error("this number is too large; the limit is about 1.8e308", start)
         if value == 0:
             if re.search("[1-9]", re.split("[eE]", token)[0]):
-                raise self.error("this number is too small (the limit is about 4.9e-324)", start)
+                raise self.error("this number is too small; the limit is about 4.9e-324", start)
             return Term("number", (), start, end, Fraction(0), 0.0)
         return Term("number", (), start, end, _limited(Fraction(token), value), value)
 
@@ -401,7 +401,7 @@ class Parser:
         self.terms.append(Term(op, args, start, end, exact, constant))
 
     def _fold(self, op: str, terms: list[Term], mark: int) -> tuple[Fraction | None, float | None]:
-        """Value of an operation on constants: (exact if rational and short, double)."""
+        """Fold an operation on constants: (exact value if rational and short, double)."""
         values = [t.constant for t in terms if t.constant is not None]
         if len(values) < len(terms):
             return None, None
@@ -424,7 +424,7 @@ _WORDS = {"pow": "power", "add": "sum", "sub": "difference", "mul": "product", "
 
 
 def _limited(exact: Fraction, value: float) -> Fraction:
-    """The exact number, or the nearest double where its digits would grow without bound."""
+    """Exact number, or the nearest double where its fraction is too long."""
     bits = max(exact.numerator.bit_length(), exact.denominator.bit_length())
     return exact if bits <= _MAX_BITS else Fraction(value)
 

@@ -1,4 +1,4 @@
-"""Slopes of an expression at a point, by the rules that compiled code follows."""
+"""Derivatives of an expression by its names, with the same rules as compiled code."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .expression import Expression, Name
 
 
 def slopes(expression: Expression, values: Callable[[Name], float]) -> dict[Name, float]:
-    """Derivative by each name in double precision, in the order of the text.
+    """Derivatives by each name in double precision, in the order of the text.
 
-    nan or an infinity where the mathematics has no finite one.
+    nan or infinity where there is no finite derivative.
     """
     graph = Graph()
     leaves = {name: graph.element("names", i) for i, name in enumerate(expression.names)}
@@ -34,9 +34,11 @@ def slopes(expression: Expression, values: Callable[[Name], float]) -> dict[Name
 def parted(
     expression: Expression, names: Sequence[Name]
 ) -> tuple[list[tuple[Name, ...] | None], bool]:
-    """What an expression is made of: per name of `names` the names on which the slope by it
-    depends, None where that slope is zero everywhere; and whether anything is left where all of
-    them are zero."""
+    """Structure of an expression in `names`: dependence of its derivatives, and a remainder.
+
+    Returns for each of `names` the names on which the derivative by it depends, None where that
+    derivative is zero everywhere; and whether the expression is nonzero where all of them are zero.
+    """
     graph = Graph()
     leaves = {name: graph.element("names", i) for i, name in enumerate(expression.names)}
     root = expression.build(graph, leaves.__getitem__)
@@ -52,7 +54,7 @@ def parted(
 
 
 def _under(root: Node) -> set[int]:
-    """Numbers of the nodes that a node depends on, itself among them."""
+    """Numbers of the nodes that a node depends on, its own included."""
     seen: set[int] = set()
     stack = [root]
     while stack:

@@ -1,4 +1,4 @@
-"""The graph of a mechanism: which hinges make its tree, and where its loops close.
+"""Graph of a mechanism: which hinges form its spanning tree, and where its loops close.
 
-Pure: bodies and hinges are numbers here, -1 is the ground.
+Bodies and hinges are integers here; -1 is the ground.  Nothing outside this package is imported.
 """

@@ -1,9 +1,9 @@
-"""Which hinges make the tree: the choice that leaves the least work to the loops.
+"""Choice of the spanning tree: the hinges that leave the least cost to the closed loops.
 
-What rows cost while they are pending is a weighted sum over fundamental cycles, whose least value
-nobody finds fast in general; single swaps from a good start find it in practice (E. Amaldi,
-L. Liberti, F. Maffioli, N. Maculan, Edge-swapping algorithms for the minimum fundamental cycle
-basis problem, 2009).
+The cost of pending rows is a weighted sum over fundamental cycles.  Its exact minimum is expensive
+to compute in general; single swaps from a good start find it in practice (E. Amaldi, L. Liberti,
+F. Maffioli, N. Maculan, Edge-swapping algorithms for the minimum fundamental cycle basis problem,
+2009).
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ from .paths import work
 from .swaps import swapped
 
 _RANDOM_STARTS = 6
-#: Work of all the starts that are improved, but for the first: a second or so.
+#: Largest total cost of the starting trees that are improved: about one second.
 _AFFORDABLE = 20_000_000
 
 
 def chosen(mechanism: Mechanism) -> Tree:
-    """Per body the hinge that holds it, hinges never turned round; the same for the same input.
+    """Choose the spanning tree of least cost: for each body its inboard hinge.
 
-    Raises ValueError where no tree reaches every body (`obstacles` says why).
+    Hinges keep their direction.  The result is deterministic.  Raises ValueError where no tree
+    reaches every body; `obstacles` gives the reason.
     """
     starts = [breadth_first(mechanism)]
     if all(len(holders) == 1 for holders in mechanism.holders):

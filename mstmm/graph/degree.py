@@ -1,22 +1,22 @@
-"""The order in which coupled groups of rows are eliminated, and what it couples anew."""
+"""Minimum-degree ordering: the elimination order of coupled groups of rows, and its fill-in."""
 
 from __future__ import annotations
 
 import heapq
 from collections.abc import Iterable, Sequence
 
-#: Per group the groups it is coupled with.
+#: For each group the groups it is coupled with.
 Couplings = list[set[int]]
 
 
 def eliminated(
     groups: Iterable[int], couplings: Couplings, rows: Sequence[int]
 ) -> list[tuple[int, tuple[int, ...]]]:
-    """(group, those it is coupled with when its turn comes) in the order of minimum degree.
+    """Order groups by minimum degree: (group, groups coupled with it when it is eliminated).
 
-    The degree of a group are the rows it is coupled with; of equals the lower number goes first.
-    An eliminated group leaves those it was coupled with coupled to each other: `couplings`, of the
-    groups that stay as well, is what is left of it afterwards.
+    The degree of a group is the number of rows coupled with it; ties go to the lower group number.
+    Eliminating a group couples all groups that were coupled with it.  `couplings` is updated in
+    place, also for the groups that are not eliminated.
     """
     waiting = set(groups)
     heap = [(sum(rows[other] for other in couplings[g]), g) for g in waiting]

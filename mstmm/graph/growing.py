@@ -1,4 +1,4 @@
-"""Trees grown from the ground along the hinges as they are written."""
+"""Spanning trees grown from the ground along the hinges, each from inboard to outboard."""
 
 from __future__ import annotations
 
@@ -8,41 +8,41 @@ from collections.abc import Callable
 
 from .mechanism import GROUND, Mechanism
 
-#: A tree: per body the hinge that holds it.
+#: A tree: for each body its inboard hinge.
 Tree = tuple[int, ...]
-#: From the number of bodies held so far to the rank of what hangs on the last of them.
+#: Maps the number of bodies in the tree to the priority of hinges outboard of the last of them.
 Rank = Callable[[int], float]
 
 
 def breadth_first(mechanism: Mechanism) -> Tree:
-    """The tree in which every body is as near to the ground as it can be."""
+    """Breadth-first tree: every body has the shortest possible path to the ground."""
     return _grown(mechanism, float)
 
 
 def depth_first(mechanism: Mechanism) -> Tree:
-    """The tree that follows each branch to its tip before the next."""
+    """Depth-first tree: each branch is followed to its tip before the next."""
     return _grown(mechanism, lambda held: -held)
 
 
 def at_random(mechanism: Mechanism, seed: int) -> Tree:
-    """A tree grown by hinges drawn at random, the same for the same seed."""
+    """Tree grown by hinges drawn at random; equal seeds give equal trees."""
     draw = random.Random(seed)
     return _grown(mechanism, lambda _: draw.random())
 
 
 def _grown(mechanism: Mechanism, rank: Rank) -> Tree:
-    """ValueError where no such tree reaches every body."""
+    """Grow a complete tree; raise ValueError where none reaches every body."""
     tree = held(mechanism, rank)
     if None in tree:
-        raise ValueError("no tree along the hinges as they are written reaches every body")
+        raise ValueError("no spanning tree along the hinges reaches every body")
     return tuple(hinge for hinge in tree if hinge is not None)
 
 
 def held(mechanism: Mechanism, rank: Rank = float) -> list[int | None]:
-    """Per body the hinge that holds it, None where no way from the ground leads to it.
+    """Grow a tree: for each body its inboard hinge, None where the ground does not reach it.
 
-    Of the hinges that hang on bodies already held the one of least rank comes next, of equals the
-    first one written.
+    The next hinge is that of least rank on a body already in the tree; ties go to the hinge that
+    comes first in the scene.
     """
     outward = _outward(mechanism)
     tree: list[int | None] = [None] * mechanism.bodies
@@ -61,7 +61,7 @@ def held(mechanism: Mechanism, rank: Rank = float) -> list[int | None]:
 
 
 def _outward(mechanism: Mechanism) -> list[list[int]]:
-    """Per body (last: the ground) the hinges that may hold others on it."""
+    """For each body (last: the ground) the hinges that may connect others outboard of it."""
     outward: list[list[int]] = [[] for _ in range(mechanism.bodies + 1)]
     for holders in mechanism.holders:
         for hinge in holders:

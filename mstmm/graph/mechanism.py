@@ -1,4 +1,4 @@
-"""What the graph knows of a mechanism: who holds whom, and how many rows a closure has."""
+"""Mechanism as a graph: bodies, hinges between them, and constraint rows of each closure."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ GROUND = -1
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A hinge: the body `inboard` (or the ground) holds the body `outboard`.
+    """Hinge as an edge from the body `inboard` (or the ground) to the body `outboard`.
 
-    `rows` is how many rows it has where it closes a loop: 6 less its coordinates, and one for
-    each coordinate that is driven or carries rotor inertia.  `cut` True: it closes a loop; False:
-    it is part of the tree; None: whichever costs less.
+    `rows` is its number of constraint rows if it is cut: 6 less its coordinates, plus one for each
+    coordinate that is driven or carries rotor inertia.  `cut` True: it closes a loop; False: it is
+    part of the tree; None: whichever costs less.
     """
 
     inboard: int
@@ -25,10 +25,10 @@ class Edge:
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Rows of a constraint or a coupling between the bodies `ends`, two or more.
+    """Group of constraint rows between the bodies `ends`, two or more.
 
-    A coupling of hinges has the bodies of both sides of each hinge for ends, cut or not: the row
-    of a coordinate begins at its hinge.
+    The ends of a coupling of hinges are the bodies on both sides of each hinge, cut or not: the
+    row of a coordinate starts at its hinge.
     """
 
     ends: tuple[int, ...]
@@ -37,9 +37,9 @@ class Rows:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Bodies 0 to `bodies` - 1, the hinges between them, and rows of other closures.
+    """Bodies 0 to `bodies` - 1, the hinges between them, and the rows of other closures.
 
-    A tree of it is one hinge for every body, that which holds it; the other hinges are cut.
+    A spanning tree has one inboard hinge for every body; the other hinges are cut.
     """
 
     bodies: int
@@ -48,7 +48,7 @@ class Mechanism:
 
     @cached_property
     def holders(self) -> tuple[tuple[int, ...], ...]:
-        """Per body the hinges one of which holds it in a tree, in their order."""
+        """For each body the candidates for its inboard hinge in a tree, in scene order."""
         free: list[list[int]] = [[] for _ in range(self.bodies)]
         kept: list[list[int]] = [[] for _ in range(self.bodies)]
         for hinge, edge in enumerate(self.hinges):
@@ -60,16 +60,16 @@ class Mechanism:
 
     @cached_property
     def groups(self) -> tuple[Rows, ...]:
-        """The rows of every hinge where it is cut, then the other rows."""
+        """Row groups: those of every hinge if it were cut, then the other rows."""
         closures = (Rows((edge.inboard, edge.outboard), edge.rows) for edge in self.hinges)
         return (*closures, *self.others)
 
     def cuts(self, tree: tuple[int, ...]) -> tuple[int, ...]:
-        """The hinges that a tree leaves."""
+        """Cut hinges: those that are not part of a tree."""
         held = set(tree)
         return tuple(hinge for hinge in range(len(self.hinges)) if hinge not in held)
 
     def closures(self, tree: tuple[int, ...]) -> tuple[int, ...]:
-        """Numbers of the groups that a tree has to close: its cuts, then the other rows."""
+        """Indices of the groups that close with a tree: its cut hinges, then the other rows."""
         first = len(self.hinges)
         return (*self.cuts(tree), *range(first, first + len(self.others)))

@@ -1,4 +1,4 @@
-"""What keeps the hinges of a mechanism from holding every body, hinges taken as written."""
+"""Reasons why the hinges of a mechanism form no spanning tree in their given direction."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .mechanism import GROUND, Mechanism
 
 @dataclass(frozen=True, slots=True)
 class KeptTwice:
-    """Two hinges that must both be part of the tree hold the same body."""
+    """Hinges with the same outboard body that must all be part of the tree."""
 
     body: int
     hinges: tuple[int, ...]
@@ -20,7 +20,7 @@ class KeptTwice:
 
 @dataclass(frozen=True, slots=True)
 class OnlyCut:
-    """Every hinge by which a body can be held must be cut."""
+    """Body all of whose inboard hinges must be cut."""
 
     body: int
     hinges: tuple[int, ...]
@@ -28,7 +28,7 @@ class OnlyCut:
 
 @dataclass(frozen=True, slots=True)
 class Turned:
-    """A body that no hinge holds, though its `hinge` joins it to bodies that are held."""
+    """Body outside the tree whose `hinge` connects to the tree in the wrong direction."""
 
     body: int
     hinge: int
@@ -36,8 +36,7 @@ class Turned:
 
 @dataclass(frozen=True, slots=True)
 class Cyclic:
-    """With what is cut or kept as asked, bodies hold each other in a circle; `hinges` are those
-    with such a wish that stand in the way."""
+    """Bodies that form a cycle without the ground because of `cut` keys of `hinges`."""
 
     body: int
     hinges: tuple[int, ...]
@@ -45,7 +44,7 @@ class Cyclic:
 
 @dataclass(frozen=True, slots=True)
 class Loose:
-    """Bodies that no hinge joins to the ground, the first of them, and one that none holds."""
+    """Bodies that no hinge connects to the ground; `base` is one without an inboard hinge."""
 
     bodies: tuple[int, ...]
     base: int
@@ -55,7 +54,7 @@ Obstacle = KeptTwice | OnlyCut | Turned | Cyclic | Loose
 
 
 def obstacles(mechanism: Mechanism) -> Iterator[Obstacle]:
-    """Everything for which there is no tree, in the order of bodies; nothing where there is one."""
+    """Yield every reason why there is no spanning tree, by bodies; nothing where there is one."""
     loose = list(_loose(mechanism))
     yield from loose
     apart = {body for one in loose for body in one.bodies}
@@ -92,7 +91,7 @@ def _wishes(mechanism: Mechanism) -> Iterator[KeptTwice | OnlyCut]:
 
 
 def _turned(mechanism: Mechanism, reached: set[int]) -> Iterator[Turned]:
-    """Hinges that, turned round, let every body be reached: one for each part beyond reach."""
+    """Hinges that connect every body once reversed: one for each unreachable part."""
     outward: list[list[int]] = [[] for _ in range(mechanism.bodies)]
     backward: deque[tuple[int, int]] = deque()
     for number, edge in enumerate(mechanism.hinges):
@@ -120,7 +119,7 @@ def _turned(mechanism: Mechanism, reached: set[int]) -> Iterator[Turned]:
 
 
 def _loose(mechanism: Mechanism) -> Iterator[Loose]:
-    """The parts that no hinge joins to the ground, whichever way it is written."""
+    """Parts that no hinge connects to the ground, in either direction."""
     joined: list[list[int]] = [[] for _ in range(mechanism.bodies + 1)]
     for edge in mechanism.hinges:
         joined[edge.inboard].append(edge.outboard)

@@ -1,4 +1,4 @@
-"""Ways inside a tree: parents before children, and where branches meet."""
+"""Paths in a tree: order of its bodies, common ancestors and pending constraint rows."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from .mechanism import GROUND, Mechanism, Rows
 
 
 class Paths:
-    """Parents, orders and common ancestors of a tree.
+    """Parents, order and common ancestors of the bodies of a tree.
 
-    `parent` per body, -1 for the ground; `order` are the bodies, each branch in one piece, parents
-    first.
+    `parent` is the inboard body of each body, -1 for the ground; `order` lists the bodies, each
+    branch contiguous, parents first.
     """
 
     def __init__(self, mechanism: Mechanism, tree: Tree) -> None:
@@ -31,7 +31,7 @@ class Paths:
 
     @cached_property
     def _rank(self) -> list[int]:
-        """Place of every body in `order`; last: the ground, before all."""
+        """Index of every body in `order`; last entry: the ground, which comes first."""
         rank = [GROUND] * (len(self.parent) + 1)
         for place, body in enumerate(self.order):
             rank[body] = place
@@ -39,8 +39,11 @@ class Paths:
 
     @cached_property
     def _heads(self) -> list[int]:
-        """Per body the first of its line; every body goes on the line of its heaviest child, so
-        that a way to the ground changes lines a logarithm of times at most."""
+        """First body of the heavy path of each body.
+
+        Each body continues the path of its largest child.  A path to the ground therefore changes
+        heavy paths O(log N) times.
+        """
         size = [1] * (len(self.parent) + 1)
         for body in reversed(self.order):
             size[self.parent[body]] += size[body]
@@ -57,7 +60,7 @@ class Paths:
         return heads
 
     def meet(self, one: int, other: int) -> int:
-        """The lowest common ancestor of two bodies, a body itself among its ancestors."""
+        """Lowest common ancestor of two bodies; a body is its own ancestor."""
         rank, heads = self._rank, self._heads
         while one != GROUND and other != GROUND and heads[one] != heads[other]:
             if rank[heads[one]] > rank[heads[other]]:
@@ -67,13 +70,15 @@ class Paths:
         return one if rank[one] < rank[other] else other
 
     def closes_at(self, ends: Iterable[int]) -> int:
-        """Where the ways inwards from all ends have met."""
+        """Lowest common ancestor of all ends."""
         by_rank = sorted(ends, key=self._rank.__getitem__)
         return self.meet(by_rank[0], by_rank[-1])
 
     def crossed(self, group: Rows) -> Iterator[tuple[int, int]]:
-        """(body, how many of the ends are on it or farther out) for every body across whose hinge
-        the rows of a group are pending."""
+        """Bodies across whose inboard hinge a group is pending, with a count of ends.
+
+        Yields (body, number of ends on it or outboard of it).
+        """
         last = self.closes_at(group.ends)
         counts: dict[int, int] = {}
         for end in group.ends:
@@ -84,10 +89,10 @@ class Paths:
         yield from counts.items()
 
     def pending(self, groups: Iterable[Rows]) -> list[int]:
-        """Per body how many rows are pending across the hinge that holds it.
+        """Number of rows pending across the inboard hinge of each body.
 
-        O(N log N), however long the ways are: ends are counted from the tips inwards, each pair of
-        neighbouring ends once less where they meet.
+        O(N log N) for any path lengths: ends are counted from the tips inwards, and each pair of
+        neighbouring ends is subtracted once at its common ancestor.
         """
         count = [0] * (len(self.parent) + 1)
         for group in groups:
@@ -103,12 +108,15 @@ class Paths:
 
 
 def work_of(rows: int) -> int:
-    """What `rows` pending rows cost at a hinge, up to a factor: each pair of them meets there, and
-    the column of each passes it, which is as much as a few pairs."""
+    """Cost of pending rows at one hinge, up to a constant factor.
+
+    Each pair of rows is combined there.  The column of each row passes the hinge as well, at the
+    cost of a few pairs.
+    """
     return rows * rows + 3 * rows
 
 
 def work(mechanism: Mechanism, tree: Tree) -> int:
-    """What the pending rows of a tree cost, all its hinges together."""
+    """Cost of the pending rows of a tree, summed over its hinges."""
     groups = [mechanism.groups[number] for number in mechanism.closures(tree)]
     return sum(map(work_of, Paths(mechanism, tree).pending(groups)))

@@ -1,7 +1,7 @@
-"""Where loops close: which rows are pending across which hinge, and in which order they close.
+"""Plan of loop closures: rows pending across each hinge, and the order of their closure.
 
-Rows close at the lowest common ancestor of their ends, where their matrix has the rank of the rows
-and no hinge farther in can change it.
+Rows close at the lowest common ancestor of their ends.  There their matrix has the rank of the
+rows, and no hinge inboard of it can change that matrix.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from .paths import Paths, work_of
 
 @dataclass(frozen=True, slots=True)
 class Closing:
-    """A group of rows closes at `body` (-1: the ground).
+    """Closure of a group of rows at `body` (-1: the ground).
 
-    `coupled` are the groups still open then that share a block of L with it, ascending: some close
-    at this body later, the others stay pending.
+    `coupled` are the groups still open that share a block of L with it, ascending.  Some of them
+    close later at this body, the others stay pending.
     """
 
     group: int
@@ -33,13 +33,13 @@ class Closing:
 
 @dataclass(frozen=True)
 class Plan:
-    """The tree of a mechanism and the closing of its loops.
+    """Spanning tree of a mechanism and the closures of its loops.
 
-    Groups of rows are numbered as `groups`: those of the cut hinges that have any, in the order of
-    the hinges, then the other rows of the mechanism in their order; `cut_of` are the hinges of the
-    first.  `tree` is per body the hinge that holds it, `cut` are all other hinges.  `pending` is
-    per body the groups that pass the hinge that holds it, ascending.  `closings` come in the order
-    in which a sweep to the ground can do them: farther bodies first.
+    `groups` are the groups of rows: those of the cut hinges that have any, in hinge order, then
+    the other rows of the mechanism in their order.  `cut_of` are the hinges of the former.  `tree`
+    gives the inboard hinge of each body, `cut` all other hinges.  `pending` gives for each body the
+    groups that pass its inboard hinge, ascending.  `closings` are in the order of the backward
+    pass: outboard bodies first.
     """
 
     mechanism: Mechanism
@@ -52,27 +52,26 @@ class Plan:
 
     @property
     def rows(self) -> int:
-        """Rows of all closures."""
+        """Number of constraint rows of all closures."""
         return sum(group.count for group in self.groups)
 
     @cached_property
     def pending_rows(self) -> tuple[int, ...]:
-        """Per body how many rows are pending across the hinge that holds it."""
+        """Number of rows pending across the inboard hinge of each body."""
         return tuple(sum(self.groups[g].count for g in groups) for groups in self.pending)
 
     @property
     def front(self) -> int:
-        """Rows pending across one hinge at most."""
+        """Largest number of rows pending across one hinge."""
         return max(self.pending_rows, default=0)
 
     @property
     def work(self) -> int:
-        """The sum of m^2 + 3 m over all hinges with m pending rows, which the tree makes least."""
+        """Cost that the tree minimises: sum of m^2 + 3 m over all hinges with m pending rows."""
         return sum(map(work_of, self.pending_rows))
 
     def loop(self, cut: int) -> tuple[int, ...]:
-        """The hinges around the loop that a cut hinge closes, in the order in which they follow
-        each other, itself first."""
+        """Hinges of the loop that a cut hinge closes, in order around the loop, itself first."""
         hinges = self.mechanism.hinges
         ways: list[list[int]] = []
         for body in (hinges[cut].outboard, hinges[cut].inboard):
@@ -88,8 +87,7 @@ class Plan:
 
     @cached_property
     def blocks(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of groups whose block of L is not zero, (group, group) among them, each pair in
-        the order in which its groups close."""
+        """Pairs of groups with a nonzero block of L, diagonal pairs included, in closing order."""
         return tuple(
             (closing.group, other)
             for closing in self.closings
@@ -98,7 +96,7 @@ class Plan:
 
 
 def planned(mechanism: Mechanism) -> Plan:
-    """The tree with the least work and how its loops close.
+    """Choose the tree of least cost and plan its loop closures.
 
     Raises ValueError where no tree reaches every body.
     """
@@ -106,7 +104,7 @@ def planned(mechanism: Mechanism) -> Plan:
 
 
 def closed_along(mechanism: Mechanism, tree: Tree) -> Plan:
-    """How loops close along a given tree."""
+    """Plan the loop closures of a given tree."""
     cut = mechanism.cuts(tree)
     cut_of = tuple(hinge for hinge in cut if mechanism.hinges[hinge].rows)
     groups = (*(mechanism.groups[hinge] for hinge in cut_of), *mechanism.others)
@@ -124,7 +122,7 @@ def closed_along(mechanism: Mechanism, tree: Tree) -> Plan:
 def _closings(
     paths: Paths, groups: tuple[Rows, ...], pending: list[list[int]], closing: dict[int, list[int]]
 ) -> Iterator[Closing]:
-    """Groups are coupled where their rows pass the same hinge."""
+    """Closures in elimination order; groups whose rows pass the same hinge are coupled."""
     couplings: Couplings = [set() for _ in groups]
     rows = [group.count for group in groups]
     for body in (*reversed(paths.order), GROUND):

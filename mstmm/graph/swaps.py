@@ -1,7 +1,7 @@
-"""Better trees by swaps: a body takes another of the hinges that hold it, while that costs less.
+"""Local search over spanning trees: bodies change their inboard hinge to lower the cost.
 
-A swap at body b changes what is pending only at b and on the way between its old and its new
-inboard body, which is the way that the rows of the new hinge take so far.
+A swap at body b changes the pending rows only at b and on the path between its old and its new
+inboard body.  This is the path along which the rows of the new hinge are pending before the swap.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from .paths import Paths, work_of
 
 
 def swapped(mechanism: Mechanism, tree: Tree) -> Tree:
-    """The tree from which no single swap leads to a cheaper one."""
+    """Improve a tree by single swaps until none lowers its cost."""
     search = _Search(mechanism, tree)
     search.run()
     return tuple(search.tree)
 
 
 class _Search:
-    """A tree with what is pending at its hinges, while it changes.
+    """Tree under change, with the groups pending at its hinges.
 
-    `across[body]` gives, per group pending across the hinge that holds the body, how many of the
-    group's ends are on the body or farther out; `rows[body]` are the rows of these groups.
+    `across[body]` maps each group pending across the inboard hinge of the body to the number of its
+    ends on the body or outboard of it.  `rows[body]` is the number of rows of these groups.
     """
 
     def __init__(self, mechanism: Mechanism, tree: Tree) -> None:
@@ -40,7 +40,7 @@ class _Search:
                 self._put(body, number, ends)
 
     def run(self) -> None:
-        """Swap until nothing is gained; bodies whose gains may have changed are asked again."""
+        """Swap while the cost falls; bodies whose gain may have changed are queued again."""
         queue = deque(body for body, holders in enumerate(self.holders) if len(holders) > 1)
         waiting = set(queue)
         while queue:
@@ -64,7 +64,7 @@ class _Search:
                     yield self.hinges[number].outboard
 
     def _put(self, body: int, group: int, ends: int) -> None:
-        """Say how many ends of a group are behind a hinge; none or all of them: not pending."""
+        """Store how many ends of a group are outboard of a hinge; none or all means not pending."""
         across, total = self.across[body], self.groups[group]
         if 0 < ends < len(total.ends):
             self.rows[body] += 0 if group in across else total.count
@@ -73,7 +73,7 @@ class _Search:
             self.rows[body] -= total.count
 
     def _way(self, body: int, group: int) -> list[int]:
-        """The bodies from `body` inwards across whose hinges a group is pending."""
+        """Bodies from `body` inwards across whose inboard hinges a group is pending."""
         way = []
         while body != GROUND and group in self.across[body]:
             way.append(body)
@@ -81,8 +81,10 @@ class _Search:
         return way
 
     def _gain(self, body: int, hinge: int) -> int:
-        """What the work changes by if the hinge takes the body; 0 where it cannot: a body cannot
-        hang on what it holds."""
+        """Change of the cost if `hinge` becomes the inboard hinge of the body.
+
+        0 where that is impossible: a body cannot be outboard of itself.
+        """
         moved = self.across[body]
         if hinge not in moved:
             return 0
@@ -104,7 +106,7 @@ class _Search:
         return gain
 
     def _swap(self, body: int, hinge: int) -> list[int]:
-        """Let the hinge take the body; the bodies whose hinges it matters to."""
+        """Make `hinge` the inboard hinge of a body; return the bodies at affected hinges."""
         old, before, after = self.tree[body], self.parent[body], self.hinges[hinge].inboard
         left, taken = self._way(before, hinge), self._way(after, hinge)
         moved = [(g, n, len(self.groups[g].ends)) for g, n in self.across[body].items()

@@ -1,1 +1,1 @@
-"""Numbers without numpy: rotations, and numbers with their derivatives."""
+"""Numerics without numpy: rotations, dual numbers, symbolic numbers, piecewise polynomials."""

@@ -1,11 +1,11 @@
-"""Numbers that carry their derivatives: exact slopes of the arithmetic from a scene to its kernels.
+"""Dual numbers: values with their exact derivatives by the parameters of a scene.
 
-The code that turns the numbers of a scene into those of its kernels (frames, mass moments, axes)
-runs unchanged on Dual numbers.  Values are computed by the same operations in the same order, so
-they are bit for bit those of plain floats.
+The code that turns the numbers of a scene into kernel data (frames, mass moments, axes) runs
+unchanged on Dual numbers.  Values are computed by the same operations in the same order, so they
+are bit for bit those of plain floats.
 
-A Dual is no float: `float(dual)`, and with it an array of doubles or of C, refuses it.  The same
-code runs on Formulas (`formula`), which the functions below take for Duals too.
+A Dual is not a float: `float(dual)` raises TypeError, and so do arrays of doubles.  The same code
+runs on Formulas (`formula`), which the functions below accept as well.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from typing import Any
 
 from .formula import Formula, formula, function, length_of, total
 
-#: Slopes by number of the parameter; those that are exactly zero are left out.
+#: Derivatives by parameter number; exact zeros are omitted.
 Slopes = Mapping[int, float]
 
 
 class Dual:
-    """value, and slope[k] = d value / d parameter k.
+    """Number `value` with its derivatives slope[k] = d value / d parameter k.
 
-    Ordered by value; equal to a float only where every slope is zero, so that a zero that moves is
-    no structural zero.
+    Ordered by value.  A Dual equals a float only where every derivative is zero, so that a zero
+    that depends on a parameter is no structural zero.
     """
 
     __slots__ = ("slope", "value")
@@ -89,24 +89,27 @@ class Dual:
         return chained(ratio, [(self, -ratio / self.value)])
 
 
-# Below, numbers are typed as floats: a Dual or Formula stands in for one wherever scene numbers go.
+# Below, numbers are typed as floats: a Dual or Formula may replace any scene number.
 
 _MOVING = frozenset({Dual, Formula})
 
 
 def value_of(number: Any) -> float:
-    """The number itself, as a float."""
+    """Value of a number as a float, without its derivatives or terms."""
     return number.value if isinstance(number, (Dual, Formula)) else float(number)
 
 
 def real(number: Any) -> float:
-    """A float; a Dual or Formula stays what it is."""
+    """Convert a number to float; leave a Dual or Formula unchanged."""
     kept: Any = number
     return kept if type(number) in (float, Dual, Formula) else float(number)
 
 
 def chained(value: float, partials: Iterable[tuple[Any, float]]) -> Any:
-    """`value` whose derivative with respect to each number is given; a float where none moves."""
+    """Dual of `value` by the chain rule, from (number, partial derivative) pairs.
+
+    Returns a plain float where no number is a Dual.
+    """
     slope: dict[int, float] = {}
     moves = False
     for number, partial in partials:
@@ -119,7 +122,7 @@ def chained(value: float, partials: Iterable[tuple[Any, float]]) -> Any:
 
 def moving(numbers: Iterable[object]) -> bool:
     """Whether any of the numbers is a Dual or a Formula."""
-    return not _MOVING.isdisjoint(map(type, numbers))  # far faster than a loop here
+    return not _MOVING.isdisjoint(map(type, numbers))  # much faster than a Python loop
 
 
 def formulas(numbers: Iterable[object]) -> bool:

@@ -1,14 +1,14 @@
-"""Numbers that carry how they follow from named ones: sums of products of symbols, in normal form.
+"""Symbolic numbers: values with their polynomial in named symbols, in normal form.
 
-The code that turns the numbers of a scene into those of its kernels, and the kernels themselves,
-run on Formulas as they run on floats.  Beside the formula goes the value, computed by the same
-operations in the same order, so that it is bit for bit that of plain floats; where a computation
-takes branches, the value decides.
+The code that turns the numbers of a scene into kernel data, and the kernels themselves, run on
+Formulas as they run on floats.  Each Formula also carries its value, computed by the same
+operations in the same order.  The value is therefore bit for bit that of plain floats; it decides
+which branch a computation follows.
 
-A formula is a polynomial in symbols and in atoms sin, cos, sqrt, 1 / sum and other functions of
-formulas.  Products are multiplied out, with sin^2 = 1 - cos^2 and sqrt^2 resolved, so that what
-cancels is gone.  Coefficients are fractions where a double is a short decimal or a simple fraction,
-and doubles elsewhere.
+A formula is a polynomial in symbols and in atoms: sin, cos, sqrt, 1 / sum and other functions of
+formulas.  Products are expanded, with sin^2 = 1 - cos^2 and sqrt^2 resolved, so that terms cancel.
+Coefficients are fractions where a double is a short decimal or a simple fraction, and doubles
+elsewhere.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from typing import Any
 
 from ..errors import SceneError
 
-#: Digits of decimals, and denominators, for which a double is taken as the fraction it stands for.
+#: Most decimal digits, and largest denominator, for which a double is replaced by a fraction.
 _DIGITS, _DENOMINATOR = 12, 1000
-#: Units in the last place between a double and that fraction.
+#: Largest relative difference between a double and that fraction: two units in the last place.
 _NEAR = 2.0**-51
 
-#: Products of terms that are not counted, and terms of a sum that count as one.
+#: Most products of terms that are not counted, and terms of a sum that count as one product.
 _FEW, _LONG = 8, 32
 
 Coefficient = Fraction | float
-#: Atoms and their powers, in the order of their places.
+#: Atoms and their powers, in the order in which the atoms were created.
 Monomial = tuple[tuple["Atom", int], ...]
 Terms = dict[Monomial, Coefficient]
 
 
 class Atom:
-    """What a polynomial is made of: a symbol, or a function `op` of formulas."""
+    """Indeterminate of a polynomial: a symbol, or a function `op` of formulas."""
 
     __slots__ = ("args", "book", "name", "op", "place", "value")
 
@@ -48,44 +48,47 @@ class Atom:
 
 
 class Book:
-    """The atoms of one derivation: equal ones are one.  It ends with a SceneError where sums have
-    taken more than `most` products of terms."""
+    """Table of the atoms of one derivation, each stored once.
+
+    Raises SceneError when the sums and products of a derivation need more than `most` products of
+    terms.
+    """
 
     def __init__(self, most: int) -> None:
         self._most, self._products, self._places = most, 0, 0
         self._known: dict[object, Atom] = {}
 
     def symbol(self, name: str, value: float) -> Formula:
-        """A new symbol with the value it has."""
+        """Create a symbol with its value."""
         return Formula(value, {((Atom(self, "symbol", (), value, name), 1),): Fraction(1)})
 
     def atom(self, op: str, args: tuple[Formula, ...], value: float) -> Atom:
-        """The atom of a function of formulas."""
+        """Atom of the function `op` of formulas, created at the first call."""
         key = (op, *(frozenset(x.terms.items()) for x in args))
         if key not in self._known:
             self._known[key] = Atom(self, op, args, value)
         return self._known[key]
 
     def next_place(self) -> int:
-        """Place of the next atom."""
+        """Reserve the order number of the next atom."""
         self._places += 1
         return self._places
 
     def count(self, products: int) -> None:
-        """Products of terms that are about to be taken."""
+        """Count products of terms before they are computed; raise SceneError above the limit."""
         self._products += products
         if self._products > self._most:
             raise SceneError(
-                f"formulas take {self._products} products of terms so far; the limit is "
-                f"{self._most}; keep fewer names as symbols, or take a smaller scene"
+                f"formulas: {self._products} products of terms exceed the limit of "
+                f"{self._most}; keep fewer names as symbols, or use a smaller scene"
             )
 
 
 class Formula:
-    """value, and the terms of a polynomial that it is the value of.
+    """Number `value` with the terms of the polynomial that gives it.
 
-    Ordered by value; equal to a float only where no symbol is in it, so that a zero that stands for
-    a formula is no structural zero.
+    Ordered by value.  A Formula equals a float only where it contains no symbol, so that a formula
+    whose value is zero is no structural zero.
     """
 
     __slots__ = ("terms", "value")
@@ -95,7 +98,7 @@ class Formula:
 
     @property
     def fixed(self) -> bool:
-        """Whether it is a number whatever the symbols are."""
+        """Whether the formula contains no symbol."""
         return not self.terms or (len(self.terms) == 1 and () in self.terms)
 
     def __bool__(self) -> bool:
@@ -152,17 +155,17 @@ class Formula:
 
 
 def formula(number: Any) -> Formula:
-    """The number itself if it is a formula, else the constant."""
+    """Convert a number to a Formula; a Formula is returned unchanged."""
     return number if isinstance(number, Formula) else Formula(float(number), _terms(number))
 
 
 def value_of(number: Any) -> float:
-    """The value of a formula or a plain number."""
+    """Value of a formula or a plain number as a float."""
     return number.value if isinstance(number, Formula) else float(number)
 
 
 def share(x: Formula, symbol: Formula) -> Formula:
-    """The factor of a symbol, in which x is linear and which is 1."""
+    """Factor of a symbol in a formula x that is linear in it; the value of the symbol is 1."""
     ((((atom, _),), _),) = symbol.terms.items()
     found = {
         tuple(factor for factor in monomial if factor[0] is not atom): c
@@ -174,7 +177,7 @@ def share(x: Formula, symbol: Formula) -> Formula:
 
 @lru_cache(maxsize=4096)
 def exact(x: float) -> Coefficient:
-    """The short decimal or simple fraction that a double stands for, else the double."""
+    """Short decimal or simple fraction nearest to a double within rounding, else the double."""
     if not math.isfinite(x):
         return x
     for near in (Fraction(f"{x:.{_DIGITS}g}"), Fraction(x).limit_denominator(_DENOMINATOR)):
@@ -183,14 +186,14 @@ def exact(x: float) -> Coefficient:
     return x
 
 
-# Below, results are Formulas; typed as Any, for scene numbers are typed as floats.
+# Below, results are Formulas.  They are typed as Any because scene numbers are typed as floats.
 
 
 # --- functions ------------------------------------------------------------------------------------
 
 
 def root(x: Formula, value: float | None = None) -> Formula:
-    """The square root; of a product of squares the product, with the sign that it has there."""
+    """Square root of a formula; the root of a single even term is that term, with its sign."""
     found = math.sqrt(x.value) if value is None else value
     if x.fixed:
         return Formula(found, _constant(exact(found)))
@@ -199,14 +202,14 @@ def root(x: Formula, value: float | None = None) -> Formula:
 
 
 def function(op: str, args: tuple[Formula, ...], value: float) -> Any:
-    """Any other function by its name in the IR, whose value is known."""
+    """Function of formulas by its name in the IR, with its known value."""
     if all(x.fixed for x in args):
         return Formula(value, _constant(exact(value)))
     return Formula(value, _atom(op, args, value))
 
 
 def total(numbers: Sequence[Any], value: float) -> Any:
-    """A sum whose value is known."""
+    """Sum of numbers with its known value."""
     found: Terms = {}
     for number in numbers:
         found = _sum(found, _terms(number), 1)
@@ -214,18 +217,18 @@ def total(numbers: Sequence[Any], value: float) -> Any:
 
 
 def length_of(numbers: Sequence[Any], value: float) -> Any:
-    """Euclidean length of a vector, whose value is known."""
+    """Euclidean length of a vector, with its known value."""
     squares = [formula(x) * x for x in numbers]
     return root(total(squares, sum(x.value for x in squares)), value)
 
 
 def turn(angle: Formula, cosine: float, sine: float) -> tuple[Any, Any]:
-    """cos and sin of an angle, whose values are known."""
+    """Cosine and sine of an angle (rad), with their known values."""
     return function("cos", (angle,), cosine), function("sin", (angle,), sine)
 
 
 def direction(v: Sequence[Any], values: Sequence[float]) -> tuple[Any, ...]:
-    """v / |v|, whose values are known."""
+    """Unit vector v / |v|, with its known values."""
     size = length_of(v, math.hypot(*map(value_of, v)))
     return tuple(Formula(n, (formula(x) / size).terms) for x, n in zip(v, values, strict=True))
 
@@ -254,7 +257,7 @@ def _sum(a: Terms, b: Terms, sign: int) -> Terms:
 
 
 def _add(found: Terms, more: Terms, factor: Coefficient) -> None:
-    """Terms times a factor on top of what was found."""
+    """Add terms times a factor to the terms found, in place."""
     for monomial, c in more.items():
         rest = found.get(monomial, 0) + factor * c
         if rest:
@@ -298,7 +301,7 @@ def _is_normal(factor: tuple[Atom, int]) -> bool:
 
 
 def _resolved(monomial: Monomial) -> Terms:
-    """The normal form of a product of powers."""
+    """Resolve powers of sin, sqrt and inverse in a product: its normal form."""
     plain = tuple(factor for factor in monomial if _is_normal(factor))
     found: Terms = {plain: Fraction(1)}
     for atom, power in monomial:
@@ -353,7 +356,7 @@ def _reciprocal(c: Coefficient) -> Coefficient:
 
 
 def _even_root(x: Formula) -> Terms | None:
-    """The root of one term with even powers; None for anything else."""
+    """Square root of a single term with even powers; None for anything else."""
     if len(x.terms) > 1:
         return None
     ((monomial, c),) = x.terms.items()
@@ -370,5 +373,5 @@ def _atom(op: str, args: tuple[Formula, ...], value: float) -> Terms:
 
 
 def _book(terms: Terms) -> Book:
-    """The book of terms with a symbol."""
+    """Atom table of terms, at least one of which contains an atom."""
     return next(monomial[0][0].book for monomial in terms if monomial)

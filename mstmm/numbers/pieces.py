@@ -1,7 +1,7 @@
-"""A number that changes with time as polynomials, piece by piece: what signals and inputs are.
+"""Piecewise polynomials of time, as which signals and inputs are stored.
 
-At its knots one piece ends and the next begins, which holds there already.  Before the first knot
-and behind the last one the number stands still.
+A piece is valid from its knot on, the knot included.  Before the first knot and after the last one
+an interpolated quantity is constant.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-#: How many numbers a piece has: t0, c0, c1, c2, c3.
+#: Numbers of a piece: t0, c0, c1, c2, c3.
 COUNT = 5
 
 #: A piece: c0 + c1 s + c2 s^2 + c3 s^3, where s = t - t0.
@@ -20,40 +20,43 @@ Piece = tuple[float, float, float, float, float]
 
 INTERPOLATIONS = ("hold", "line", "cubic")
 
-#: What jumps by less than this, of numbers above 1 relatively, does not.
+#: Largest jump that counts as rounding, relative to values above 1.
 _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """`pieces[0]` before the first of the knots (s, ascending), `pieces[k]` from knot k - 1 on."""
+    """Piecewise polynomial of time with knots in s, ascending.
+
+    `pieces[0]` is valid before the first knot, `pieces[k]` from knot k - 1 on.
+    """
 
     knots: tuple[float, ...]
     pieces: tuple[Piece, ...]
 
     @property
     def varies(self) -> bool:
-        """Whether it is more than one piece."""
+        """Whether there is more than one piece."""
         return bool(self.knots)
 
     @property
     def stands(self) -> bool:
-        """Whether it is one number at all times."""
+        """Whether the value is constant in time."""
         return not self.knots and not any(self.pieces[0][2:])
 
     def at(self, t: float) -> Piece:
-        """The piece that holds at t."""
+        """Piece that is valid at time t (s)."""
         return self.pieces[bisect_right(self.knots, t)]
 
     def value(self, t: float) -> float:
-        """The number at t."""
+        """Value at time t (s)."""
         t0, c0, c1, c2, c3 = self.at(t)
         s = t - t0
         return c0 + s * (c1 + s * (c2 + s * c3))
 
 
 def rough(number: Pieces) -> list[float]:
-    """The knots at which the number or its rate jumps, but for rounding."""
+    """Knots at which the value or its rate jumps by more than rounding."""
     found = []
     for knot, before, behind in zip(number.knots, number.pieces, number.pieces[1:], strict=False):
         ends = zip(_value_and_rate(before, knot), _value_and_rate(behind, knot), strict=True)
@@ -69,17 +72,19 @@ def _value_and_rate(piece: Piece, t: float) -> tuple[float, float]:
 
 
 def steady(value: float, rate: float = 0.0, second_rate: float = 0.0) -> Pieces:
-    """One piece for all times: a number at t = 0, its rate and the rate of that."""
+    """Single piece for all times, from value, rate and second rate at t = 0."""
     return Pieces((), ((0.0, value, rate, second_rate / 2, 0.0),))
 
 
 def through(times: Sequence[float], values: Sequence[float], interpolation: str) -> Pieces:
-    """The number that has these values at these times (ascending): each held up to the next, on
-    lines, or on a cubic spline (twice continuously differentiable, "not a knot" at both ends: C. de
-    Boor, A Practical Guide to Splines, Springer 1978, ch. IV).
+    """Interpolate values at ascending times (s): steps, lines or a cubic spline.
 
-    A line or a spline keeps its rate up to and at the last of the times: what ends there with it
-    has not stopped.
+    "hold" keeps each value until the next time.  The cubic spline is twice continuously
+    differentiable, with "not a knot" conditions at both ends (C. de Boor, A Practical Guide to
+    Splines, Springer 1978, ch. IV).
+
+    Lines and splines keep their rate up to and including the last time, so that a run that ends
+    there still sees the rate.
     """
     made: list[Piece] = [(times[0], values[0], 0.0, 0.0, 0.0)]
     if interpolation == "hold":
@@ -97,7 +102,7 @@ def through(times: Sequence[float], values: Sequence[float], interpolation: str)
 
 
 def _slopes(x: Sequence[float], y: Sequence[float]) -> list[float]:
-    """Slopes of the cubic spline at its knots, three or more: a tridiagonal system."""
+    """Derivatives of the cubic spline at its three or more knots, from a tridiagonal system."""
     n = len(x)
     h = [b - a for a, b in pairwise(x)]
     d = [(b - a) / step for (a, b), step in zip(pairwise(y), h, strict=True)]

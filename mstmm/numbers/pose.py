@@ -1,4 +1,4 @@
-"""Frames in other frames."""
+"""Poses: position and orientation of one frame in another."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ ZERO: Vector = (0.0, 0.0, 0.0)
 
 
 class Pose(NamedTuple):
-    """A frame in another one: its origin (m) and its axes."""
+    """Pose of a frame in another one: origin (m) and rotation matrix."""
 
     position: Vector = ZERO
     rotation: Matrix = IDENTITY
 
     def then(self, inner: Pose) -> Pose:
-        """A frame given in this one, in the one that this one is given in."""
+        """Compose two poses: `inner` is given in this frame; the result in this frame's parent."""
         x, y, z = apply(self.rotation, inner.position)
         a, b, c = self.position
         return Pose((a + x, b + y, c + z), product(self.rotation, inner.rotation))
 
     @property
     def inverse(self) -> Pose:
-        """The other frame in this one."""
+        """Pose of the parent frame in this frame."""
         back = transpose(self.rotation)
         x, y, z = apply(back, self.position)
         return Pose((-x, -y, -z), back)
 
 
-#: The frame itself.
+#: Identity pose.
 IN_PLACE = Pose()

@@ -1,6 +1,6 @@
-"""Rotations as plain numbers: roll-pitch-yaw, quaternions (w, x, y, z) and matrices.  No numpy.
+"""Rotations without numpy: roll-pitch-yaw, quaternions (w, x, y, z) and matrices.
 
-Every function but `to_quaternion` takes Duals for floats: their slopes are exact; and Formulas.
+Every function except `to_quaternion` also accepts Duals, with exact derivatives, and Formulas.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ def norm(v: Sequence[float]) -> float:
 
 
 def unit(v: Sequence[float]) -> tuple[float, ...]:
-    """v / |v|, also for very small or large entries.  A vector that already has unit length to
-    rounding is returned as it is, so that normalising twice changes nothing.
+    """Unit vector v / |v|, also for very small or large entries.
 
-    Raises ValueError for a vector without direction.
+    A vector that already has unit length to rounding is returned unchanged, so that normalising
+    twice changes nothing.  Raises ValueError for a zero or non-finite vector.
     """
     if moving(v):
         return _moving_unit(v)
@@ -44,7 +44,7 @@ def unit(v: Sequence[float]) -> tuple[float, ...]:
 
 
 def _moving_unit(v: Sequence[float]) -> tuple[float, ...]:
-    """d(v/|v|) = (1 - n n^T) dv / |v|, where v has unit length to rounding as well."""
+    """Unit vector of Duals: d(v/|v|) = (1 - n n^T) dv / |v|, also where |v| is 1 to rounding."""
     values = [value_of(x) for x in v]
     n, length = unit(values), norm(values)
     if formulas(v):
@@ -56,7 +56,7 @@ def _moving_unit(v: Sequence[float]) -> tuple[float, ...]:
 
 
 def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
-    """a x b."""
+    """Cross product a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
@@ -66,13 +66,13 @@ def dot(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 def rows(matrix: Sequence[Sequence[float]]) -> Matrix:
-    """The matrix as nested tuples."""
+    """Convert a 3 x 3 matrix to nested tuples."""
     a, b, c = (tuple(real(x) for x in row) for row in matrix)
     return ((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2]))
 
 
 def product(a: Matrix, b: Matrix) -> Matrix:
-    """a b."""
+    """Matrix product a b."""
     if a is IDENTITY or b is IDENTITY:
         return b if a is IDENTITY else a
     if moving((*a[0], *a[1], *a[2], *b[0], *b[1], *b[2])):
@@ -83,7 +83,7 @@ def product(a: Matrix, b: Matrix) -> Matrix:
 
 
 def _row_times(row: Vector, b: Matrix) -> Vector:
-    """A row times a matrix of plain numbers, each entry rounded once."""
+    """Product of a row and a matrix of floats, each entry rounded once."""
     (b00, b01, b02), (b10, b11, b12), (b20, b21, b22) = b
     x, y, z = row
     return (
@@ -94,7 +94,7 @@ def _row_times(row: Vector, b: Matrix) -> Vector:
 
 
 def transpose(a: Matrix) -> Matrix:
-    """Rows and columns exchanged."""
+    """Transpose of a 3 x 3 matrix."""
     if a is IDENTITY:
         return a
     first, second, third = zip(*a, strict=True)
@@ -102,7 +102,7 @@ def transpose(a: Matrix) -> Matrix:
 
 
 def apply(a: Matrix, v: Sequence[float]) -> Vector:
-    """a v."""
+    """Matrix-vector product a v."""
     if a is IDENTITY:
         return (real(v[0]), real(v[1]), real(v[2]))
     x, y, z = (dot(row, v) for row in a)
@@ -120,7 +120,7 @@ def from_quaternion(q: Sequence[float]) -> Matrix:
 
 
 def cos_sin(angle: float) -> tuple[float, float]:
-    """cos and sin, exact where the angle is the double nearest to a multiple of pi/2."""
+    """Cosine and sine of an angle (rad), exact at the doubles nearest to multiples of pi/2."""
     if moving([angle]):
         c, s = cos_sin(value_of(angle))
         if formulas([angle]):
@@ -133,10 +133,10 @@ def cos_sin(angle: float) -> tuple[float, float]:
 
 
 def from_rpy(angles: Sequence[float]) -> Matrix:
-    """R = Rz(yaw) Ry(pitch) Rx(roll) from (roll, pitch, yaw), rad.
+    """Rotation matrix Rz(yaw) Ry(pitch) Rx(roll) from (roll, pitch, yaw), rad.
 
-    An angle that is the double nearest to a quarter turn gives exact zeros and ones, so that
-    frames turned by right angles stay aligned.
+    An angle that is the double nearest to a multiple of a quarter turn gives exact zeros and ones,
+    so that frames rotated by right angles stay aligned.
     """
     if tuple(angles) == (0.0, 0.0, 0.0):
         return IDENTITY
@@ -149,10 +149,10 @@ def from_rpy(angles: Sequence[float]) -> Matrix:
 
 
 def to_rpy(matrix: Matrix) -> Vector:
-    """(roll, pitch, yaw), rad, of a rotation matrix; at a pitch of a quarter turn with yaw 0.
+    """Roll, pitch and yaw (rad) of a rotation matrix; yaw is 0 at a pitch of a quarter turn.
 
-    Roll is found behind yaw and in its axes, so that the three give the matrix again near such a
-    pitch too, where each of them is nearly undetermined.
+    Roll is computed after yaw and in the axes rotated by it.  The three angles therefore reproduce
+    the matrix also near such a pitch, where each of them is nearly undetermined.
     """
     (xx, xy, xz), (yx, yy, yz), (zx, _, _) = matrix
     yaw = math.atan2(yx, xx)
@@ -167,7 +167,7 @@ def from_orientation(orientation: Sequence[float]) -> Matrix:
 
 
 def about(axis: Sequence[float], angle: float) -> Matrix:
-    """Rotation by `angle` (rad) about `axis` (normalised first)."""
+    """Rotation matrix of a rotation by `angle` (rad) about `axis` (normalised first)."""
     x, y, z = unit(axis)
     c, s = cos_sin(angle)
     k = 1 - c
@@ -179,7 +179,7 @@ def about(axis: Sequence[float], angle: float) -> Matrix:
 
 
 def perpendicular(axis: Sequence[float]) -> Vector:
-    """A unit vector at right angles to `axis`: x made perpendicular, or y where x is too near."""
+    """Unit vector perpendicular to `axis`: from x, or from y where x is nearly parallel."""
     a = unit(axis)
     for start in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
         if abs(dot(a, start)) < 0.9:
@@ -188,7 +188,7 @@ def perpendicular(axis: Sequence[float]) -> Vector:
 
 
 def reject(v: Sequence[float], axis: Sequence[float]) -> Vector:
-    """The unit vector along the part of `v` at right angles to `axis`.
+    """Unit vector along the component of `v` perpendicular to `axis`.
 
     Raises ValueError where the two are collinear.
     """

@@ -193,10 +193,10 @@ BAD = [
     ("sin t", "sin needs its argument in parentheses"),
     ("sin()", "a value is missing before )"),
     ("()", "a value is missing before )"),
-    ("sin(1, 2)", "sin takes one argument, not 2"),
-    ("atan2(1)", "atan2 takes 2 arguments, not 1"),
-    ("min(1)", "min takes two or more arguments, not 1"),
-    ("where(t < 1, 2)", "where takes 3 arguments, not 2"),
+    ("sin(1, 2)", "sin: expected one argument, found 2"),
+    ("atan2(1)", "atan2: expected 2 arguments, found 1"),
+    ("min(1)", "min: expected two or more arguments, found 1"),
+    ("where(t < 1, 2)", "where: expected 3 arguments, found 2"),
     ("where(t, 1, 2)", "begins with a comparison such as t < 1"),
     ("(t < 1)*2", "write where(condition, 1, 0)"),
     ("sin(t < 1)", "write where(condition, 1, 0)"),
@@ -209,9 +209,9 @@ BAD = [
     ("2 ** 3", "write ^ for a power"),
     ("3,5", "write decimals with a point"),
     ("(1, 2)", "write decimals with a point"),
-    ("(1", "never closed"),
-    ("sin(1", "never closed"),
-    ("1)", "never opened"),
+    ("(1", "not closed"),
+    ("sin(1", "not closed"),
+    ("1)", "has no opening one"),
     ("q[-1]", "an index follows its name directly"),
     ("q[i]", "an index follows its name directly"),
     ("q [0]", "an index follows its name directly"),
@@ -237,7 +237,7 @@ BAD = [
     ("__import__('os')", "unknown function '__import__'"),
     ("lambda: 1", "not part of an expression"),
     ("t if t else 1", "an operator is missing"),
-    ("'text'", "holds no text"),
+    ("'text'", "cannot contain text"),
     ("t; t", "not part of an expression"),
     ("t#1", "not part of an expression"),
     ("t@1", "not part of an expression"),
@@ -269,7 +269,7 @@ def test_position_is_marked() -> None:
 
 
 def test_not_text() -> None:
-    with pytest.raises(ExpressionError, match="an expression is text, not float"):
+    with pytest.raises(ExpressionError, match="expected an expression as text, found float"):
         parse(1.0)  # type: ignore[arg-type]
 
 

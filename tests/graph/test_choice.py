@@ -117,7 +117,7 @@ def test_a_mechanism_without_loops_keeps_its_tree() -> None:
 
 
 def test_a_tree_that_cannot_be_is_an_error() -> None:
-    with pytest.raises(ValueError, match="no tree along the hinges"):
+    with pytest.raises(ValueError, match="no spanning tree along the hinges"):
         chosen(pins(2, [(GROUND, 0), (1, 0)]))
 
 

@@ -306,7 +306,7 @@ def test_scenes_that_are_too_large_are_refused() -> None:
 
 def test_expressions_that_are_too_large_are_refused() -> None:
     angles = [f"pin{k}.angle" for k in range(1, 10)]
-    with pytest.raises(SceneError, match=r"products of terms so far; the limit is 300000; keep"):
+    with pytest.raises(SceneError, match=r"products of terms exceed the limit of 300000; keep"):
         pendulum(9).linearize().symbolic(angles)
 
 
