@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from . import interrupts
 
-if interrupts.is_the_program():  # first of all, for what follows takes a while
+if interrupts.is_the_program():  # before the imports below, which take time
     interrupts.end_at_once()
 
 from importlib import import_module
@@ -77,7 +77,7 @@ __all__ = [
 ]  # fmt: skip
 
 
-if not TYPE_CHECKING:  # to whom every name would be there
+if not TYPE_CHECKING:  # a type checker would accept any name
 
     def __getattr__(name: str) -> Any:
         if name not in _LAZY:

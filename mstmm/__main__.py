@@ -1,4 +1,4 @@
-"""`mstmm` and `python -m mstmm`."""
+"""Entry point of `mstmm` and `python -m mstmm`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 
 
 def main() -> None:
-    """Run the command line and leave with its exit code."""
+    """Run the command line and exit with its code."""
     from .cli.guard import leave
 
     leave(sys.argv[1:])

@@ -1,4 +1,4 @@
-"""Arguments that are no numbers, as they come from users: paths, texts and lists of them."""
+"""Validation of arguments other than numbers: paths, texts, lists of texts, truth values."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .errors import SceneError
 
 
 def number_in(text: Any) -> float:
-    """The number that a text says, without the underscores that Python allows in one.
+    """Parse a number; unlike in Python, underscores in it are not allowed.
 
     Raises ValueError or TypeError for anything else.
     """
@@ -21,14 +21,14 @@ def number_in(text: Any) -> float:
 
 
 def path_of(what: str, value: Any) -> Path:
-    """The path of a file, a text or a `Path`; SceneError for anything else."""
+    """Validate the path of a file, a text or a `Path`; SceneError for anything else."""
     if isinstance(value, str | os.PathLike) and isinstance(os.fspath(value), str) and str(value):
         return Path(value)
     raise SceneError(f"{what} {short(value)}: expected the name of a file, such as 'run'")
 
 
 def texts_of(what: str, value: Any, such_as: str) -> tuple[str, ...]:
-    """Texts one by one; a single one counts as a list of one."""
+    """Validate a list of texts; a single text is a list of one.  SceneError for anything else."""
     found = (value,) if isinstance(value, str) else value
     there = tuple(found) if isinstance(found, Iterable) else (None,)
     if isinstance(found, Mapping) or not all(isinstance(one, str) for one in there):
@@ -38,27 +38,27 @@ def texts_of(what: str, value: Any, such_as: str) -> tuple[str, ...]:
 
 
 def text_of(what: str, value: Any) -> str | None:
-    """A text, or None where there is to be none."""
+    """Validate an optional text, a text or None; SceneError for anything else."""
     if value is None or isinstance(value, str):
         return value
     raise SceneError(f"{what} = {short(value)}: expected a text")
 
 
 def word_of(what: str, value: Any, such_as: str) -> str:
-    """One word, whichever; SceneError for what is no text, saying what is expected."""
+    """Validate a text; otherwise SceneError, with `such_as` as the expected values."""
     if isinstance(value, str):
         return value
     raise SceneError(f"{what} = {short(value)}: expected {such_as}")
 
 
 def yes_or_no(what: str, value: Any) -> bool:
-    """True or False, and nothing that Python takes for one of them."""
+    """Validate a bool, exactly True or False; SceneError for anything else."""
     if isinstance(value, bool):
         return value
     raise SceneError(f"{what} = {short(value)}: expected True or False")
 
 
 def short(value: Any) -> str:
-    """What was given, on one line of at most 60 characters."""
+    """Representation of a value on one line of at most 60 characters, for messages."""
     shown = " ".join(repr(value).split())
     return shown if len(shown) <= 60 else f"{shown[:57]}..."

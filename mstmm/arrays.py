@@ -1,4 +1,4 @@
-"""Numbers and arrays that users give, checked in one place: kind, finite, shape, leading axes."""
+"""Validation of numbers and arrays given by users: type, finiteness, shape, leading axes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ _DOUBLE = np.dtype(np.float64)
 
 
 def real(name: str, value: Any, expected: str = "a finite number") -> float:
-    """A finite Python float of any library's real number (not of text, truth values, arrays)."""
+    """Convert a real number to a finite float.
+
+    SceneError for texts, truth values, arrays and numbers that are not finite.
+    """
     if type(value) is float and math.isfinite(value):
         return value
     number = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
@@ -29,34 +32,34 @@ def real(name: str, value: Any, expected: str = "a finite number") -> float:
         raise SceneError(f"{name} = {short(value)}: expected {expected}")
     try:
         found = float(number)
-    except OverflowError:  # a whole number beyond all floats, which may not even have a text
-        raise SceneError(f"{name} is beyond 1.8e308: expected {expected}") from None
+    except OverflowError:  # an integer beyond all floats, whose text may exceed Python's limit
+        raise SceneError(f"{name} exceeds 1.8e308: expected {expected}") from None
     if not math.isfinite(found):
         raise SceneError(f"{name} = {found}: expected {expected}")
     return found
 
 
 def whole(name: str, value: Any, least: int, expected: str) -> int:
-    """A whole number from `least` up."""
+    """Validate an integer not below `least`; SceneError for anything else."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, Integral) or value < least:
         raise SceneError(f"{name} = {short(value)}: expected {expected}")
     return int(value)
 
 
 def threads_of(value: int | None) -> int | None:
-    """How many threads to start; None for as many as there are processors."""
+    """Validate a number of threads; None for as many as there are processors."""
     if value is None:
         return None
     return whole("threads", value, 1, "a whole number from 1 up, or None")
 
 
 def numbers(name: str, value: ArrayLike) -> Array:
-    """A new contiguous array of finite numbers; SceneError for anything else."""
+    """Copy finite numbers to a new contiguous array; SceneError for anything else."""
     try:
         array = value.copy() if _ready(value) else _converted(value)
     except (TypeError, ValueError, OverflowError):
         raise SceneError(
-            f"{name} = {short(value)}: expected an array of real numbers, every row as long"
+            f"{name} = {short(value)}: expected an array of real numbers, with rows of equal length"
         ) from None
     if not _surely_finite(array) and not np.isfinite(array).all():
         if array.ndim == 0:
@@ -68,7 +71,7 @@ def numbers(name: str, value: ArrayLike) -> Array:
 
 
 def _surely_finite(array: Array) -> bool:
-    """Of few numbers by a sum of small parts of them, which is quick and does not overflow."""
+    """Whether few numbers are finite, by a sum of small parts: fast, and without overflow."""
     row = array if array.ndim == 1 else array.ravel()
     return row.size <= _PARTS.size and math.isfinite(row.dot(_PARTS[: row.size]))
 
@@ -77,12 +80,15 @@ _PARTS = np.full(256, 1e-9)
 
 
 def _ready(value: ArrayLike) -> TypeGuard[Array]:
-    """Whether it is what most calls give, for which less is to be done."""
+    """Whether a value is a plain array of doubles, the common case, which needs no conversion."""
     return type(value) is np.ndarray and value.dtype is _DOUBLE
 
 
 def _masked(value: Any) -> bool:
-    """Whether a mask hides some of it; without numpy.ma, which takes its time, there are none."""
+    """Whether a value has masked entries; impossible unless numpy.ma is loaded already.
+
+    numpy.ma is not imported for this check, because that is slow.
+    """
     known = sys.modules.get("numpy.ma")
     if known is None:
         return False
@@ -100,22 +106,22 @@ def _converted(value: ArrayLike) -> Array:
 
 
 def one_row(name: str, value: ArrayLike) -> Array:
-    """One finite number or more, (n,); SceneError for anything else."""
+    """Validate a row of one or more finite numbers, (n,); SceneError for anything else."""
     found = numbers(name, value)
     if found.ndim != 1 or not found.size:
-        raise SceneError(f"{name}: expected one number or more in a row, found {found.shape}")
+        raise SceneError(f"{name}: expected a row of one or more numbers, found {found.shape}")
     return found
 
 
 def by_name(name: str, value: Any, what: str = "numbers") -> dict[str, Any]:
-    """A table of values by their names, not yet looked into."""
+    """Validate a mapping from names to values, which are not checked here."""
     if not isinstance(value, Mapping):
         raise SceneError(f"{name}: expected {what} by their names, found {short(value)}")
     return {str(key): entry for key, entry in value.items()}
 
 
 def pair(name: str, value: Any) -> tuple[ArrayLike, ArrayLike]:
-    """(q, u), not yet looked into."""
+    """Split a state (q, u) into its two arrays, which are not checked here."""
     try:
         q, u = value
     except (TypeError, ValueError):
@@ -124,12 +130,12 @@ def pair(name: str, value: Any) -> tuple[ArrayLike, ArrayLike]:
 
 
 def _row(array: Array, width: object) -> Array:
-    """A number alone stands for the row that holds nothing else."""
+    """Convert a single number to a row of one, where a row of one is expected."""
     return array.reshape(1) if width == 1 and array.ndim == 0 else array
 
 
 def one(name: str, value: ArrayLike, width: int, instead: str) -> Array:
-    """(width,) of one state.  `instead` says what to do with several."""
+    """Validate the numbers of one state, (width,); `instead` is the remedy for several states."""
     array = _row(numbers(name, value), width)
     if array.shape != (width,):
         several = array.ndim > 1 and array.shape[-1] == width
@@ -139,9 +145,9 @@ def one(name: str, value: ArrayLike, width: int, instead: str) -> Array:
 
 
 def columns(name: str, value: ArrayLike, width: int) -> tuple[bool, Array]:
-    """(whether it is one vector, its columns (..., width, n)).
+    """Validate right-hand sides: (whether it is one vector, its columns (..., width, n)).
 
-    As `numpy.linalg.solve` has it: (width,) is a vector, (..., width, n) holds n columns.
+    As in `numpy.linalg.solve`, (width,) is a vector and (..., width, n) holds n columns.
     """
     array = _row(numbers(name, value), width)
     if array.shape == (width,):
@@ -153,15 +159,16 @@ def columns(name: str, value: ArrayLike, width: int) -> tuple[bool, Array]:
     return False, array
 
 
-#: How many numbers there are per state: one, a row of so many, or an array of such a shape.
+#: Numbers per state: None for one, the length of a row, or the shape of an array.
 Width = int | tuple[int, int] | None
 
 
 def batch(*given: tuple[str, ArrayLike, Width]) -> tuple[tuple[int, ...], list[Array]]:
-    """Leading axes, and for each (name, value, width) a contiguous copy (n, width) over all states.
+    """Validate arrays over states: leading axes, and a contiguous copy (n, width) of each array.
 
-    The leading axes are broadcast against each other.  Width None stands for one number per state:
-    then the copy is (n,).  SceneError for a misfit or for what is no finite number.
+    Each argument is (name, value, width).  The leading axes are broadcast against each other.
+    Width None means one number per state: then the copy is (n,).  SceneError for shapes that do
+    not match and for numbers that are not finite.
     """
     arrays = [_row(numbers(name, value), width) for name, value, width in given]
     tails = [_tail(width) for _, _, width in given]
@@ -176,7 +183,9 @@ def batch(*given: tuple[str, ArrayLike, Width]) -> tuple[tuple[int, ...], list[A
         lead = leads[0] if len(set(leads)) == 1 else np.broadcast_shapes(*leads)
     except ValueError:
         shapes = ", ".join(f"{g[0]} {a.shape}" for g, a in zip(given, arrays, strict=True))
-        raise SceneError(f"shapes do not fit: {shapes}; expected as many states in each") from None
+        raise SceneError(
+            f"shapes do not match: {shapes}; expected the same number of states in each"
+        ) from None
     n = math.prod(lead)
     return lead, [
         _spread(array, lead + tail).reshape(n, *tail)
@@ -185,7 +194,7 @@ def batch(*given: tuple[str, ArrayLike, Width]) -> tuple[tuple[int, ...], list[A
 
 
 def into(out: Array | None, found: Array) -> Array:
-    """What was found, written into `out` where one is given; SceneError unless that holds it."""
+    """Return a result, written to `out` if given; SceneError unless `out` fits."""
     if out is None:
         return found
     holds = type(out) is np.ndarray and out.dtype is _DOUBLE and out.shape == found.shape
@@ -197,12 +206,12 @@ def into(out: Array | None, found: Array) -> Array:
 
 
 def _tail(width: Width) -> tuple[int, ...]:
-    """The axes behind those of the states."""
+    """Shape of the axes that follow those of the states."""
     if width is None:
         return ()
     return width if isinstance(width, tuple) else (width,)
 
 
 def _spread(array: Array, shape: tuple[int, ...]) -> Array:
-    """The array, or a contiguous copy of it broadcast to `shape`."""
+    """Broadcast an array to `shape`, as a contiguous copy unless it has that shape."""
     return array if array.shape == shape else np.array(np.broadcast_to(array, shape), order="C")

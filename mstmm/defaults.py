@@ -1,14 +1,14 @@
-"""What a run does unless it is told otherwise: said here, and nowhere else."""
+"""Default settings of runs, defined only here."""
 
-#: Method of fixed steps, sessions and batches.  Other runs are made by "auto", which begins by it.
+#: Method of fixed steps, sessions and batches.  Other runs use "auto", which starts with it.
 METHOD = "dop853"
 
 #: Relative and absolute tolerance (the latter in the units of q and u).
 RTOL, ATOL = 1e-9, 1e-12
 
-#: A chart: seconds of the clock, error for which a setting is recommended, times at which errors
-#: are looked at, rounds in which processor times are taken again.
+#: Work-precision chart: wall-clock seconds, target error of the recommended setting, output times
+#: at which errors are evaluated, repetitions of the measurement of CPU times.
 CHART_BUDGET, CHART_ERROR, CHART_SAMPLES, CHART_ROUNDS = 60.0, 1e-3, 101, 3
 
-#: An advice: times at which errors are looked at.
+#: Advice: output times at which errors are evaluated.
 ADVICE_SAMPLES = 201

@@ -1,7 +1,7 @@
-"""Every error a user can meet: one base class, few subclasses, one exit code each.
+"""Exceptions of the package: one base class, few subclasses, one exit code each.
 
-A message says which file, which element and which key, what was expected (with units), what was
-found, and one way out.  The command line prints the message alone and exits with `exit_code`.
+A message names file, element and key, what was expected (with units), what was found, and a remedy.
+The command line prints only the message and exits with `exit_code`.
 """
 
 from __future__ import annotations
@@ -11,18 +11,21 @@ from typing import Any
 
 
 class MstmmError(Exception):
-    """Base of every error raised on purpose; `exit_code` is what the command line returns."""
+    """Base class of the package's exceptions; `exit_code` is that of the command line."""
 
     exit_code = 2
 
 
 class SceneError(MstmmError):
-    """A scene (file or Python object) that does not describe a system; names file and key."""
+    """Invalid scene (file or Python object) or argument; the message names file and key."""
 
 
 class OpenLoop(SceneError):
-    """A loop that cannot close; `gap` is what the row that misses most lacks (m, rad or the unit of
-    a coupling), `pose` the coordinates of the nearest pose, of hinges and shapes by their names."""
+    """Loop that cannot be closed.
+
+    `gap` is the largest position gap of a constraint row (m, rad or the unit of a coupling).
+    `pose` has the coordinates of the nearest pose, of hinges and shapes by name.
+    """
 
     def __init__(
         self, message: str = "", gap: float = 0.0, pose: Mapping[str, Sequence[float]] | None = None
@@ -32,29 +35,29 @@ class OpenLoop(SceneError):
 
 
 class ExpressionError(MstmmError):
-    """Text that is not an expression of the small grammar (`mstmm.expression.expression`)."""
+    """Text that is no valid expression (grammar: `mstmm.expression.expression`)."""
 
 
 class ElementError(MstmmError):
-    """A hinge, body or force definition that contradicts itself; names the equation."""
+    """Contradictory definition of a hinge, body or force; the message names the equation."""
 
 
 class EnvironmentFailure(MstmmError):
-    """Something the machine lacks: a compiler, an optional package, a writable folder."""
+    """Missing part of the environment: a compiler, an optional package, a writable folder."""
 
     exit_code = 3
 
 
 class NumericalFailure(MstmmError):
-    """A computation that has no trustworthy answer; names time, element and cause."""
+    """Computation without a reliable answer; the message names time, element and cause."""
 
     exit_code = 4
 
 
 class UndeterminedMotion(NumericalFailure):
-    """A hinge whose acceleration nothing determines: what it carries has no inertia there.
+    """Undetermined acceleration of a hinge: the bodies it carries have no inertia there.
 
-    `place` is that of the hinge's body in the tree, -1 where it is not known.
+    `place` is the index of the hinge's body in the tree, -1 if unknown.
     """
 
     def __init__(self, message: str = "", place: int = -1) -> None:
@@ -63,10 +66,10 @@ class UndeterminedMotion(NumericalFailure):
 
 
 class RiskRefused(NumericalFailure):
-    """A run whose risks were not to be taken (`on_risk="refuse"`).
+    """Run rejected because of its risks (`on_risk="refuse"`).
 
-    `risks` are the rows that speak against it (`mstmm.risk.Risk`); `result` is what was computed,
-    None where they were seen before the run.
+    `risks` are the objections (`mstmm.risk.Risk`); `result` is the result that was computed, None
+    if they were found before the run.
     """
 
     def __init__(self, message: str = "", risks: Sequence[Any] = (), result: Any = None) -> None:
@@ -75,6 +78,6 @@ class RiskRefused(NumericalFailure):
 
 
 class Interrupted(MstmmError):
-    """An interrupt (Ctrl-C, SIGTERM) after which there is more to say than that it came."""
+    """Interrupt (Ctrl-C, SIGTERM) with a message, for instance how to continue the run."""
 
     exit_code = 130

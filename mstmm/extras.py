@@ -1,4 +1,4 @@
-"""Packages that come with an extra, imported when they are needed."""
+"""Optional packages of the extras of mstmm, imported when they are needed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from .errors import EnvironmentFailure
 
-#: Extra -> what is imported for it.
+#: Extra -> packages that it provides.
 PACKAGES = {
     "io": ("xarray", "h5netcdf", "h5py"), "plot": ("matplotlib",), "view": ("viser",),
     "fem": ("skfem", "meshio"),
@@ -17,19 +17,22 @@ PACKAGES = {
 
 
 def absent(extra: str) -> list[str]:
-    """Packages of an extra that are not installed; asked before anything is computed."""
+    """Packages of an extra that are not installed; to be checked before a computation."""
     return [name for name in PACKAGES[extra] if find_spec(name) is None]
 
 
 def missing(name: str, what: str, error: ImportError) -> EnvironmentFailure:
-    """A package of an extra is missing or does not load: which one, what for, and how to get it."""
+    """Error for a package of an extra that is not installed or cannot be loaded.
+
+    The message names the package, its purpose `what`, and how to install it.
+    """
     package = (error.name or "").partition(".")[0]
     if not isinstance(error, ModuleNotFoundError) or (
         package in sys.modules and find_spec(package)
     ):
         return EnvironmentFailure(
-            f"{what} needs the package {error.name or 'of an extra'}, which does not load "
-            f"({error}); give the process more memory, or install it anew: "
+            f"{what} needs the package {error.name or 'of an extra'}, which cannot be loaded "
+            f"({error}); give the process more memory, or reinstall the package: "
             f"pip install 'mstmm[{name}]'"
         )
     return EnvironmentFailure(
@@ -39,8 +42,10 @@ def missing(name: str, what: str, error: ImportError) -> EnvironmentFailure:
 
 
 def figures(what: str = "a picture") -> Any:
-    """The class `matplotlib.figure.Figure`, which from then on a notebook shows; the one in which
-    this runs need not have asked for pictures.  EnvironmentFailure without the extra `plot`."""
+    """Class `matplotlib.figure.Figure`, registered for display in notebooks.
+
+    The notebook needs no magic command for that.  EnvironmentFailure without the extra `plot`.
+    """
     try:
         from matplotlib import figure
     except ImportError as error:

@@ -1,11 +1,11 @@
-"""Ctrl-C and SIGTERM for the program `mstmm`: never a traceback, from its first line to its last.
+"""Handling of Ctrl-C and SIGTERM in the program `mstmm`, without a traceback at any time.
 
-Until the command begins there is nothing to tidy up: an interrupt ends the process at once, with a
-word.  Then it is a KeyboardInterrupt, so that compilers are stopped and files closed; a second one
-ends the process at once.  A signal that the process was told to ignore (nohup, a script's
-background job) stays ignored.
+Until the command begins there is nothing to clean up: an interrupt ends the process at once, with a
+message.  Later it is a KeyboardInterrupt, so that compilers are stopped and files closed; a second
+interrupt ends the process at once.  A signal that the process inherits as ignored (nohup,
+background job of a script) stays ignored.
 
-This is the first module that the program loads, so it loads nothing itself but built-in ones.
+The program loads this module first, so it imports only built-in modules.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ CODE = 130
 
 _SIGNALS = (_signal.SIGINT, _signal.SIGTERM)
 
-#: Seconds after which an interrupt comes again that met code which cannot raise, and those that an
-#: import has to come to its end.
+#: Seconds until an interrupt is repeated that arrived in code which cannot raise, and seconds that
+#: an import has to finish.
 _AGAIN, _IMPORT = 0.001, 1.0
 
 _seen: list[int] = []
 
 
 def is_the_program() -> bool:
-    """True in `mstmm ...` and `python -m mstmm ...`, where nothing but this may handle signals."""
+    """Whether the process is `mstmm ...` or `python -m mstmm ...`, so that signals are ours."""
     name = os.path.basename(sys.argv[0]) if sys.argv else ""
     words = sys.orig_argv
     as_module = name == "-m" and "mstmm" in words[words.index("-m") + 1 :][:1]
@@ -44,26 +44,26 @@ def is_the_program() -> bool:
 
 
 def seen() -> bool:
-    """True if an interrupt has been raised in this process."""
+    """Whether an interrupt has been raised in this process."""
     return bool(_seen)
 
 
 def end_at_once(code: int = CODE, word: bytes = b"mstmm: interrupted\n") -> None:
-    """From now on an interrupt ends the process with this code, with a word on standard error."""
+    """Let an interrupt end the process with this code and a message on standard error."""
 
     def end(number: int, frame: FrameType | None) -> None:
         _end(code, word)
 
     _handle(end)
-    if _seen and _signal.setitimer(_signal.ITIMER_REAL, 0.0)[0]:  # one was to come again
+    if _seen and _signal.setitimer(_signal.ITIMER_REAL, 0.0)[0]:  # a repetition was pending
         _end(CODE, b"mstmm: interrupted\n")
 
 
 def raise_in_the_command() -> None:
-    """From now on an interrupt is a KeyboardInterrupt, and the second one ends the process.
+    """Let an interrupt raise KeyboardInterrupt, and a second one end the process.
 
-    An import is not cut off in its middle, unless it takes long: what it loads may tell of the
-    exception in its own words, as libraries written in other languages do.
+    An import is not interrupted unless it takes long: libraries written in other languages may
+    print their own messages about the exception.
     """
 
     def interrupt(number: int, frame: FrameType | None) -> None:
@@ -99,14 +99,14 @@ def _handle(handler: Handler) -> None:
 def _end(code: int, word: bytes) -> NoReturn:
     try:
         os.write(2, word)
-    except OSError:  # nobody listens
+    except OSError:  # standard error is closed
         pass
     finally:
         os._exit(code)
 
 
 def _lost(unraisable: sys.UnraisableHookArgs) -> None:
-    """An interrupt inside a finalizer or a callback of C, which Python would print and forget."""
+    """Repeat an interrupt raised in a finalizer or C callback, where Python only prints it."""
     if not issubclass(unraisable.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(unraisable)
         return

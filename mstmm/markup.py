@@ -1,4 +1,4 @@
-"""What notebooks show: tables and boxes of HTML, escaped, for reports too; bundles of formats."""
+"""HTML for notebooks and reports: escaped text, tables, lists, and bundles of formats."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from .printable import printable
 
 
 def text(words: object) -> str:
-    """Anything as text that a page can hold."""
+    """Convert anything to printable text, escaped for HTML."""
     return escape(printable(str(words)))
 
 
 def table(rows: Iterable[Sequence[object]], head: Sequence[str] = ()) -> str:
-    """Rows of text; without a head the first of each row names it."""
+    """HTML table of rows; without a head the first cell of each row is its header."""
     first = "".join(f"<th>{text(one)}</th>" for one in head)
     lines = [f"<tr>{first}</tr>"] if head else []
     for row in rows:
@@ -26,26 +26,26 @@ def table(rows: Iterable[Sequence[object]], head: Sequence[str] = ()) -> str:
 
 
 def bullets(sentences: Iterable[object]) -> str:
-    """A list of sentences."""
+    """HTML list of sentences."""
     return f"<ul>{''.join(f'<li>{text(one)}</li>' for one in sentences)}</ul>"
 
 
 def folded(summary: str, body: str) -> str:
-    """What is read by those who ask for it."""
+    """HTML section that is collapsed until the reader opens it."""
     return f"<details><summary>{text(summary)}</summary>{body}</details>"
 
 
 class Displayed:
-    """What a notebook shows by itself: in one bundle whatever formats its class has."""
+    """Base class of objects that notebooks display, in all formats that the class provides."""
 
     def _plain(self) -> str:
-        """What is shown where nothing but text can be."""
+        """Plain text, for displays without other formats."""
         return repr(self)
 
     def _repr_mimebundle_(
         self, include: Collection[str] | None = None, exclude: Collection[str] | None = None
     ) -> dict[str, str]:
-        """Formats by their MIME types; of these `include` alone, where it is given."""
+        """Representations by MIME type: those of `include` if given, without `exclude`."""
         makers: dict[str, Callable[[], str] | None] = {
             "text/plain": self._plain,
             "text/html": getattr(self, "_repr_html_", None),

@@ -1,4 +1,4 @@
-"""Text to show: short lists, and text from outside made safe."""
+"""Text for display: short lists, and foreign text made safe to print."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 
 def abbreviate(names: Sequence[str], count: int = 4) -> str:
-    """The first `count` names in one line, and how many more there are."""
+    """First `count` names on one line, and the number of the others."""
     more = len(names) - count
     return ", ".join(names[:count]) + (f" and {more} more" if more > 0 else "")
 
 
 def printable(text: str) -> str:
-    """The text with control characters, of which a terminal would obey some, written out."""
+    """Escape control characters of a text, which a terminal might execute."""
     return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in text)

@@ -1,7 +1,7 @@
-"""Risks: reasons not to take the numbers of a run as they are, whoever sees them.
+"""Risks: findings about the reliability of an answer, in one form for all checks.
 
-A scene, the start of a run and what became of it are looked at by different rooms; all of them say
-what they see as rows of this one kind.  docs/use/risks.md lists their names.
+Different packages check a scene, the start of a run and its result; all of them report their
+findings as rows of this one type.  docs/use/risks.md lists their names.
 """
 
 from __future__ import annotations
@@ -13,26 +13,26 @@ from typing import Any
 
 from .markup import Displayed, bullets, text
 
-#: What a run may do about its risks.
+#: Reactions of a run to its risks.
 ON_RISK = ("warn", "refuse", "ignore")
 
-#: The element of what concerns a run as a whole.
+#: Element of findings about a run as a whole.
 RUN = "the run"
 
 
 @dataclass(frozen=True)
 class Risk:
-    """One of them.
+    """Finding about an answer, with a remedy.
 
     Attributes:
         name: of the kind, such as "step-stability".
-        element: what it is about, such as 'hinge "elbow"'; RUN for the run as a whole.
-        means: what was seen and what follows from it, a sentence without its end.
-        remedy: what to do about it.
-        figure, limit: what was looked at, and from where on it is a risk; None without a number.
+        element: element concerned, such as 'hinge "elbow"'; RUN for the run as a whole.
+        means: the finding and its consequence, a sentence without a full stop.
+        remedy: how to resolve or check it.
+        figure, limit: value found, and the limit beyond which it is a risk; None without a number.
         unit: of both; "1" for ratios.
-        doubt: it speaks against the numbers; else it is only worth knowing.
-        before: it was seen before the run, in the scene and its start.
+        doubt: whether it is an objection to the numbers; otherwise it is only information.
+        before: whether it was found before the run, in the scene and its initial state.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Risk:
     before: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("figure", "limit"):  # plain numbers, whatever they were computed by
+        for name in ("figure", "limit"):  # plain numbers, whatever type they were computed in
             value = getattr(self, name)
             if isinstance(value, Real):
                 object.__setattr__(self, name, float(value))
@@ -56,17 +56,20 @@ class Risk:
 
 
 def advice(name: str, element: str, means: str, remedy: str) -> Risk:
-    """A row that is only worth knowing."""
+    """Create a risk that is information, no objection to the numbers."""
     return Risk(name, element, means, remedy, doubt=False)
 
 
 def sentences(risks: Iterable[Risk]) -> tuple[str, ...]:
-    """Their texts, each once."""
+    """Texts of the risks, without duplicates."""
     return tuple(dict.fromkeys(map(str, risks)))
 
 
 def order_risks(found: Iterable[Risk]) -> tuple[Risk, ...]:
-    """Doubts first, each once; of what was seen before a run and in it the later row."""
+    """Order risks: objections first, without duplicates.
+
+    A finding made both before and during a run keeps only the later row.
+    """
     rows = tuple(dict.fromkeys(found))
     seen = {(risk.name, risk.element) for risk in rows if not risk.before}
     kept = (risk for risk in rows if not risk.before or (risk.name, risk.element) not in seen)
@@ -74,7 +77,7 @@ def order_risks(found: Iterable[Risk]) -> tuple[Risk, ...]:
 
 
 class DeferredRisks:
-    """Risks that are looked for when somebody asks for them, once: an answer costs nothing more."""
+    """Risks that are determined once, at their first use, so that the answer costs no more."""
 
     def __init__(self, find: Callable[[], Iterable[Risk]]) -> None:
         self._find: Callable[[], Iterable[Risk]] | None = find
@@ -90,26 +93,26 @@ class DeferredRisks:
 
 
 class Assessed(Displayed):
-    """An answer that says how far it can be trusted.
+    """Base class of answers that report their reliability.
 
-    Its class gives `findings`, the rows that its checks found, in any order.
+    A subclass provides `findings`, the rows of its checks, in any order.
     """
 
     findings: Iterable[Risk]
 
     @property
     def risks(self) -> tuple[Risk, ...]:
-        """Everything that asks for attention, doubts first; empty for a clean answer."""
+        """All findings, objections first; empty if the checks found nothing."""
         return order_risks(self.findings)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The risks, one sentence each."""
+        """Risks, one sentence each."""
         return sentences(self.risks)
 
     @property
     def trusted(self) -> bool:
-        """True where no risk speaks against the numbers."""
+        """True if no risk is an objection to the numbers."""
         return not any(risk.doubt for risk in self.risks)
 
     @property
@@ -117,12 +120,12 @@ class Assessed(Displayed):
         """Whether the answer can be trusted, and if not why, in one sentence."""
         objections = [risk for risk in self.risks if risk.doubt]
         if not objections:
-            return "trusted: no check speaks against it"
+            return "trusted: no check objects to it"
         more = f" (and {len(objections) - 1} more)" if len(objections) > 1 else ""
         return f"NOT trusted: {objections[0].means}{more}"
 
     def assessment(self) -> dict[str, Any]:
-        """Verdict and risks as plain data, for files."""
+        """Verdict and risks as plain data, for files and JSON output."""
         return {
             "trusted": self.trusted, "warnings": list(self.warnings), "risks": to_rows(self.risks)
         }  # fmt: skip
@@ -132,12 +135,12 @@ class Assessed(Displayed):
 
 
 def to_rows(risks: Iterable[Risk]) -> list[dict[str, Any]]:
-    """Plain data, for files."""
+    """Convert risks to plain data, for files."""
     return [asdict(risk) for risk in risks]
 
 
 def from_rows(rows: Iterable[Mapping[str, Any]]) -> tuple[Risk, ...]:
-    """What `to_rows` gave.  TypeError where that is something else."""
+    """Restore risks from the result of `to_rows`.  TypeError for values of other types."""
     found = tuple(Risk(**row) for row in rows)
     for risk in found:
         words = (risk.name, risk.element, risk.means, risk.remedy, risk.unit)
@@ -145,5 +148,5 @@ def from_rows(rows: Iterable[Mapping[str, Any]]) -> tuple[Risk, ...]:
         if not all(isinstance(word, str) for word in words) or not all(
             x is None or isinstance(x, (int, float)) for x in (*numbers, risk.doubt, risk.before)
         ):
-            raise TypeError("a risk that holds something else than words and numbers")
+            raise TypeError("a risk holds values other than texts and numbers")
     return found

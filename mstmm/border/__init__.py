@@ -1,1 +1,1 @@
-"""What Python and C agree on: names, signatures and layouts of compiled code."""
+"""Interface between Python and C: names, signatures and layouts of compiled code."""

@@ -1,17 +1,17 @@
-"""The border of a library of derivatives, as data: ABI number, descriptor, name of the symbol."""
+"""ABI of a derivative library, as data: ABI number, descriptor and name of the symbol."""
 
 from __future__ import annotations
 
-#: Number of the layout below; changed with every change of it, and checked when a library opens.
+#: Number of the layout below: changed with the layout, and checked when a library is opened.
 ABI = 1
 
 #: Name of the one variable that a library exports.
 SYMBOL = "mstmm_columns_library"
 
 #: `run` gives the derivatives of each of `states` states along n directions.  `inputs` are those of
-#: the kernel "accelerations" in its order, the rows of one state behind those of another by
-#: `strides` (0: all states share them); directions (n, width_in) by `direction_stride`.  The result
-#: is (states, n, width_out).
+#: the kernel "accelerations" in its order; `strides` is the distance of the rows of two states (0:
+#: all states share them), `direction_stride` that of directions (n, width_in).  The result is
+#: (states, n, width_out).
 DECLARATIONS = """\
 typedef struct {
     const double *inputs[6];

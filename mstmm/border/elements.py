@@ -1,7 +1,7 @@
-"""The border between Python and C, as data: ABI number, C declarations, names of C functions.
+"""ABI of element kernels, as data: ABI number, C declarations, names of C functions.
 
-The header that generated C includes and the text that cffi parses are both made from the
-declarations below, so that neither can say something the other does not.
+The header that generated C includes and the text that cffi parses are both built from the
+declarations below, so that they cannot differ.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from collections.abc import Collection
 from ..ir import LOOPS, KernelIR, Port, Solve
 from ..ir.spec import ElementSpec
 
-#: Number of the layout below; changed with every change of it, and checked when a module opens.
+#: Number of the layout below: changed with the layout, and checked when a module is opened.
 ABI = 2
 
 #: Scalar type of every array.
 REAL = "double"
 
-#: Layout of the descriptors.  `length` of a port multiplies the whole-number extents of its shape
-#: and `power` counts how often the size symbol occurs: the array holds length * n^power numbers.
+#: Layout of the descriptors.  `length` of a port is the product of the integer extents of its shape
+#: and `power` the number of axes of the size symbol: the array holds length * n^power numbers.
 ELEMENT_DECLARATIONS = """\
 typedef struct {
     const char *name;
@@ -60,14 +60,14 @@ typedef struct {
 } mstmm_element;
 """
 
-#: What `registry.c` defines.
+#: Variables that `registry.c` defines.
 REGISTRY_DECLARATIONS = """\
 extern const mstmm_element *const mstmm_elements[];
 extern const int mstmm_element_count;
 """
 
-#: A tape (`mstmm.ir.tape`) as C reads it.  Instructions are five whole numbers each: operation,
-#: destination, three operands; outputs four each: array, place in it, slot, accumulate.
+#: Layout of a tape (`mstmm.ir.tape`) in C.  An instruction is five integers: operation,
+#: destination, three operands.  An output is four integers: array, index in it, slot, accumulate.
 TAPE_DECLARATIONS = """\
 typedef struct {
     int n_inputs;
@@ -85,12 +85,12 @@ int mstmm_tape_run(const mstmm_tape *tape, const real *const *inputs, real *work
                    real *const *outputs);
 """
 
-#: What has no C function, for no C calls it: the fused engine replays these kernels from their IR,
-#: and the fields of beams are evaluated over whole arrays when a scene is packed.
+#: Kernels and elements without a C function, because no C code calls them: fused code inlines them
+#: from their IR, and the fields of beams are evaluated over arrays when a scene is packed.
 _REPLAYED_KERNELS = frozenset({"eliminate", "recover_factored"})
 _REPLAYED_ELEMENTS = frozenset({("sweep", "screw"), ("sweep", "beam")})
 
-#: Words a C parameter may not be called: C17 keywords, what the kernels call, and their locals.
+#: Names that a C parameter must not have: C17 keywords, functions and locals of the kernels.
 _RESERVED_WORDS = (
     "auto break case char const continue default do double else enum extern float for goto if "
     "inline int long register restrict return short signed sizeof static struct switch typedef "
@@ -105,7 +105,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 def cdef(*, registry: bool = True, tape: bool = False, opened: bool = True) -> str:
     """Declarations for `cffi.FFI.cdef`: the descriptors, and on request registry and tape.
 
-    `opened` for a library opened in ABI mode, where cffi reads no constant but reads a variable;
+    `opened` is True for a library opened in ABI mode, where cffi reads variables but no constants;
     False for a module that cffi compiles.
     """
     parts = [f"typedef {REAL} real;\n", ELEMENT_DECLARATIONS]
@@ -117,7 +117,7 @@ def cdef(*, registry: bool = True, tape: bool = False, opened: bool = True) -> s
 
 
 def c_kernels(spec: ElementSpec) -> tuple[KernelIR, ...]:
-    """The kernels of an element that have a C function; of the others there is the IR alone."""
+    """Kernels of an element that have a C function; the others exist only as IR."""
     if (spec.kind, spec.name) in _REPLAYED_ELEMENTS:
         return ()
     return tuple(kernel for kernel in spec.kernels if kernel.name not in _REPLAYED_KERNELS)
@@ -129,34 +129,34 @@ def has_c(spec: ElementSpec) -> bool:
 
 
 def element_symbol(kind: str, name: str) -> str:
-    """Name of the C descriptor of an element.  ValueError if it would not be a C name."""
+    """Name of the C descriptor of an element.  ValueError if it is no valid C name."""
     for part in (kind, name):
         if not _NAME.fullmatch(part):
-            raise ValueError(f"{part!r} is not a name C accepts (letters, digits, underscores)")
+            raise ValueError(f"{part!r} is no valid C name (letters, digits, underscores)")
     return f"mstmm_{kind}_{name}"
 
 
 def kernel_symbol(kind: str, name: str, kernel: str) -> str:
-    """Name of the C function of a kernel.  ValueError if it would not be a C name."""
+    """Name of the C function of a kernel.  ValueError if it is no valid C name."""
     return element_symbol(kind, name) + element_symbol(kind, kernel)[len(f"mstmm_{kind}") :]
 
 
 def needs_work(kernel: KernelIR) -> bool:
-    """Whether the C function takes a last array of n * n numbers to keep a factor in."""
+    """Whether the C function needs a last argument, n * n numbers of work space for a factor."""
     return any(isinstance(statement, Solve) for statement in kernel.statements)
 
 
 def parameter_names(kernel: KernelIR) -> dict[str, str]:
-    """C name of every port, in port order; a name C cannot use gets an underscore behind it.
+    """C name of every port, in port order; a reserved name gets a trailing underscore.
 
-    ValueError if a port's name has characters C does not know.
+    ValueError if the name of a port has characters that C does not allow.
     """
     names: dict[str, str] = {}
     loops = LOOPS if kernel.size_symbol else ()
     taken = {port.name for port in (*kernel.inputs, *kernel.outputs)}
     for port in (*kernel.inputs, *kernel.outputs):
         if not _NAME.fullmatch(port.name):
-            raise ValueError(f"{kernel.name}: port {port.name!r} is not a name C accepts")
+            raise ValueError(f"{kernel.name}: port {port.name!r} is no valid C name")
         name = port.name
         while name in _RESERVED or name in loops or _TEMPORARY.fullmatch(name):
             name += "_"
@@ -168,7 +168,7 @@ def parameter_names(kernel: KernelIR) -> dict[str, str]:
 
 
 def work_name(kernel: KernelIR) -> str:
-    """C name of the work array: `work`, or with underscores where a port is called so."""
+    """C name of the work array: `work`, with underscores where a port has that name."""
     taken = set(parameter_names(kernel).values())
     name = "work"
     while name in taken:
@@ -177,7 +177,7 @@ def work_name(kernel: KernelIR) -> str:
 
 
 def c_outputs(kernel: KernelIR) -> tuple[Port, ...]:
-    """Output arrays of the C function: the kernel's, then the work array if it needs one."""
+    """Output arrays of the C function: those of the kernel, then the work array if needed."""
     if not needs_work(kernel):
         return kernel.outputs
     size = kernel.size_symbol or "n"
@@ -185,15 +185,18 @@ def c_outputs(kernel: KernelIR) -> tuple[Port, ...]:
 
 
 def scalar(port: str, plain: Collection[str]) -> str:
-    """C type of a port's numbers."""
+    """C type of the numbers of a port."""
     return REAL if port in plain else "real"
 
 
 def prototype(
     kind: str, name: str, kernel: KernelIR, suffix: str = "", plain: Collection[str] = ()
 ) -> str:
-    """C declaration of a kernel's function, without the semicolon; `suffix` ends its name, `plain`
-    are inputs that stay `REAL` where other arrays are of another type."""
+    """C declaration of the function of a kernel, without the semicolon.
+
+    `suffix` is appended to its name; `plain` are inputs of the type `REAL` where other arrays have
+    another type.
+    """
     names = parameter_names(kernel)
     parameters = ["int n"] if kernel.size_symbol else []
     parameters += [

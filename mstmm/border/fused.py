@@ -1,24 +1,24 @@
-"""The border of a fused library, as data: ABI number, descriptor, flags of the compiler.
+"""ABI of a fused library, as data: ABI number, descriptor and compiler flags.
 
-Both the printer of the C text and the opener of the library read it; no other module says it again.
+The printer of the C text and the loader of the library both use this one definition.
 """
 
 from __future__ import annotations
 
-#: Number of the layout below; changed with every change of it, and checked when a library opens.
+#: Number of the layout below: changed with the layout, and checked when a library is opened.
 ABI = 10
 
 #: Name of the one variable that a library exports.
 SYMBOL = "mstmm_fused_library"
 
-#: Contraction to fused multiply-add is wanted; -ffast-math would break the inlined sine, and -O1
-#: takes minutes.  Scalar statements are not to be merged into vectors (measured: slower).
+#: Contraction to fused multiply-add is intended; -ffast-math would break the inlined sine, and -O1
+#: takes minutes.  Merging scalar statements into vectors is off, because it is slower (measured).
 FLAGS = (
     "-O2", "-std=gnu17", "-march=native", "-ffp-contract=fast", "-fno-math-errno",
     "-fno-trapping-math", "-fno-tree-slp-vectorize",
 )  # fmt: skip
 
-#: Those of the flags that some compilers do not know (clang) and that change no result.
+#: Flags that some compilers do not support (clang) and that change no result.
 TUNING = ("-fno-tree-slp-vectorize",)
 
 _AT = "const double *p, const double *t, const double *q, const double *u, const double *memory, "
@@ -27,9 +27,9 @@ _GIVEN = _AT + "const double *a"
 _END = _AT + "const double *end"
 
 #: `failures` holds (reason, element, code) of guard codes 1, 2, ... as mstmm_failure has them.
-#: Functions that a library does not hold are NULL.  A kernel returns 0 or a guard's code; then what
-#: it wrote means nothing.  In lanes entry i of an array stands at [i * lanes + lane], for p too;
-#: codes[lane] is set, and the result is non-zero if any lane failed.
+#: Functions that a library does not contain are NULL.  A kernel returns 0 or a guard's code; its
+#: outputs are invalid after a guard.  In lanes, entry i of an array is at [i * lanes + lane], for p
+#: too; codes[lane] is set, and the result is non-zero if any lane failed.
 DECLARATIONS = f"""\
 /* n states, each array row by row: entry i of a state at [state * width + i].  With a stride of 0
  * all states share one row, otherwise the stride is the distance of rows.  Efforts and

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Scalar:
-    """A real type: the numpy type of its arrays, how many of them make one value, its roundoff."""
+    """Real type: numpy type of its arrays, numbers of that type per value, and roundoff."""
 
     array: str
     parts: int
@@ -17,15 +17,15 @@ class Scalar:
 SCALARS = {
     "float": Scalar("float32", 1, 2.0**-24),
     "double": Scalar("float64", 1, 2.0**-53),
-    #: IEEE binary128; values travel as sums of two doubles, which keep 107 of its 113 bits.
+    #: IEEE binary128; values are passed as sums of two doubles, which keep 107 of its 113 bits.
     "quadruple": Scalar("float64", 2, 2.0**-106),
 }
 
-#: The function that a library of one kernel exports.
+#: Name of the function that a library of one kernel exports.
 SYMBOL = "mstmm_scalar_call"
 
-#: Flags of the compiler.  No contraction: every operation of the IR is rounded.
+#: Compiler flags.  Contraction is off, so that every operation of the IR is rounded.
 FLAGS = ("-O2", "-std=gnu17", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 
-#: Flags that a scalar type needs besides.
+#: Additional flags by scalar type.
 NEEDS = {"quadruple": ("-Wl,--no-as-needed,-lquadmath",)}

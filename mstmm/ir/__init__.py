@@ -1,15 +1,15 @@
-"""KernelIR: the one intermediate form between derived equations and everything that computes.
+"""KernelIR: intermediate representation between derived equations and the code that runs them.
 
 A kernel is a list of scalar statements in single-assignment order over typed inputs and outputs.
-It holds plain text and whole numbers only (no SymPy), is frozen, hashable, and stored as JSON.
+It holds text and integers only (no SymPy), is frozen and hashable, and is stored as JSON.
 
-Shapes are whole numbers, or one declared size symbol `n` (modal sizes).  With `n` present there
-are three loops and no others: an indexed sum over k < n or l < n, a store over k, l or both, and
-the primitive `solve`.  A sum may stand inside another loop over the other letter, so that loops are
-at most two deep.  There are no branches except `select` and guards.
+Shapes are integers, or one declared size symbol `n` (modal sizes).  With `n` present there are
+exactly three loops: an indexed sum over k < n or l < n, a store over k, l or both, and the
+primitive `solve`.  A sum may be nested in a loop over the other letter, so that loops are at most
+two deep.  There are no branches except `select` and guards.
 
 With `n` present an output that is complete (every entry stored, or solved for) and does not
-accumulate may be read by the statements behind.
+accumulate may be read by later statements.
 """
 
 from __future__ import annotations

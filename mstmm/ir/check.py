@@ -1,4 +1,4 @@
-"""The walk over a kernel that refuses what no backend could run; `mstmm.ir.check` is its face."""
+"""Validation of a kernel, which rejects what no backend could run; call it by `mstmm.ir.check`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .statements import (
 
 
 class Check:
-    """One walk over a kernel's statements; what is readable and defined grows as it goes."""
+    """Validation pass over the statements of a kernel, with the values defined so far."""
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class Check:
 
     def run(self, statements: tuple[Statement, ...]) -> None:
         if len({port.name for port in self.ports}) != len(self.ports):
-            self.fail("two ports share a name")
+            self.fail("two ports have the same name")
         for port in self.ports:
             sizes = {extent for extent in port.shape if isinstance(extent, str)}
             if sizes - {self.size_symbol}:
@@ -77,13 +77,13 @@ class Check:
     def store(self, store: Store) -> None:
         letters = [entry for entry in store.index if isinstance(entry, str)]
         if len(set(letters)) != len(letters):
-            self.fail(f"{store.port}{list(store.index)} stores a diagonal alone")
+            self.fail(f"{store.port}{list(store.index)} stores only a diagonal")
         self.body(store.body, store.value, store.loops)
         self.index(store.port, store.index, self.writable, store.loops)
         if self.size_symbol is None:
             return
         if store.port in self.readable:
-            self.fail(f"{store.port} is stored again where it is complete")
+            self.fail(f"{store.port} is stored again although it is complete")
         places = self.stored.setdefault(store.port, set())
         places.add(tuple("" if isinstance(entry, str) else entry for entry in store.index))
         port = self.writable[store.port]
@@ -141,7 +141,7 @@ class Check:
         for entry, extent in zip(index, shape, strict=True):
             if isinstance(entry, str) and entry not in loops:
                 self.fail(f"{name}{list(index)} outside a loop")
-            # A loop runs over the run-time size and nothing else does.
+            # Loop indices belong to axes of the run-time size, and only to these.
             if isinstance(entry, str) != isinstance(extent, str):
                 self.fail(f"{name}{list(index)} does not fit {shape}")
             if isinstance(entry, int) and isinstance(extent, int) and not 0 <= entry < extent:
@@ -161,5 +161,5 @@ class Check:
             self.fail(f"solve: {solve.port}, {solve.matrix}, {solve.right} do not fit")
         if solve.port in self.readable:
             self.fail(f"{solve.port} is solved for twice")
-        # A solved array is an output that later statements may read.
+        # Later statements may read an output that has been solved for.
         self.readable[solve.port] = output

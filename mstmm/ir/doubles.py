@@ -1,6 +1,6 @@
-"""Functions of doubles with the values C gives where Python raises.
+"""Functions of doubles that return the values of C where Python would raise an exception.
 
-Where a real value does not exist: NaN outside the domain, infinities at poles and on overflow.
+The values are NaN outside the domain, and infinities at poles and on overflow.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ Function = Callable[[float], float]
 
 
 def guarded(function: Function, overflow: Function | None = None) -> Function:
-    """NaN outside the domain of `function`, an infinity on overflow."""
+    """Wrap `function`: NaN outside its domain, an infinity on overflow."""
 
     def call(a: float) -> float:
         try:
@@ -26,7 +26,7 @@ def guarded(function: Function, overflow: Function | None = None) -> Function:
 
 
 def divide(a: float, b: float) -> float:
-    """a / b."""
+    """Quotient a / b, NaN or an infinity for b = 0."""
     if b != 0:
         return a / b
     if a == 0 or math.isnan(a):
@@ -35,17 +35,17 @@ def divide(a: float, b: float) -> float:
 
 
 def log(a: float) -> float:
-    """The natural logarithm."""
+    """Natural logarithm, minus infinity at 0."""
     return -math.inf if a == 0 else guarded(math.log)(a)
 
 
 def floor(a: float) -> float:
-    """The largest whole number that is not above."""
+    """Largest integer not above `a`, as a double with the sign of `a`."""
     return math.copysign(float(math.floor(a)), a) if math.isfinite(a) else a
 
 
 def power(a: float, b: float) -> float:
-    """a to the power b."""
+    """Power a ** b; NaN where no real value exists."""
     try:
         return math.pow(a, b)
     except ValueError:

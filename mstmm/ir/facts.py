@@ -1,7 +1,7 @@
-"""HingeFacts: what a hinge leaves free, read once from its motion subspace H and its rates.
+"""Kinematic properties of a hinge, derived from its motion subspace H and its rates.
 
-Nobody asks for the name of a hinge to learn how it moves: frames of beams, warnings, links and
-results ask these facts, which a built-in hinge and one of the user's have alike.
+Code never depends on the name of a hinge: frames of beams, warnings, links and results use these
+properties, which built-in and user-defined hinges have in the same form.
 """
 
 from __future__ import annotations
@@ -21,36 +21,36 @@ from .statements import Assign, Constant, Element, Operand, Store, Temporary
 
 Vector = tuple[float, float, float]
 
-#: How the frame of a hinge lies in the axes of the ends it joins, and which keys of the scene say
-#: so: as the ends lie; z along `axis`; z along `axis` inboard and along `axis2` outboard, x normal
-#: to both; z along the normal `axis` and x along `axis2`.
+#: Orientations of the frame of a hinge in the axes of its ends, by keys of the scene: as the ends;
+#: z along `axis`; z along `axis` inboard and along `axis2` outboard, x normal to both; z along the
+#: normal `axis` and x along `axis2`.
 FRAMES = ("own", "axis", "crossing", "plane")
 
-#: Entries of two rotations closer than this are the same.
+#: Largest difference between entries of two rotations that count as equal.
 _SAME = 1e-9
-#: An entry of H that is never stored.
+#: Value of an entry of H that is never stored.
 _ZERO = Constant("0")
 
 
 @dataclass(frozen=True)
 class HingeFacts:
-    """What is known of one type of hinge; vectors and columns of H in its outboard axes.
+    """Kinematic properties of a hinge type; vectors and columns of H are in its outboard axes.
 
     Attributes:
-        allows: what it allows, in a few words.
+        allows: short description of the motions that it allows.
         coordinates, speeds: names and SI units of the entries of q and u.
         parameters: numbers of its kernel, in order; those named in `keys` are keys of the scene.
-        frame: one of FRAMES.  keys: keys of a hinge, besides the common ones, that it reads.
-        runs_as: the element whose kernels move it, its own name but where two share them.
-        quaternion: place in q of the first entry (w) of a unit quaternion, None without one.
-        straight: the speeds are the rates of the coordinates.
-        in_place: at the start values the kernel neither turns nor shifts the ends, whatever the
-            parameters: they lie as the scene says.
+        frame: one of FRAMES.  keys: keys of the scene that it reads besides the common ones.
+        runs_as: name of the element with its kernels; another name where two hinges share them.
+        quaternion: index in q of the first entry (w) of a unit quaternion, None without one.
+        straight: whether the speeds are the rates of the coordinates.
+        in_place: whether, for any parameters, the kernel neither rotates nor shifts the ends at
+            the start values: they coincide as in the scene.
         varies: per speed, six letters for the rows v, w of H: "0" zero and "1" one in every
-            position, "p" a number of the parameters alone, "q" any other.
+            position, "p" depends only on parameters, "q" any other.
         start_motion: kernel p -> H (6 nu) at the start values of the coordinates.
-        rates: kernel p, q, u -> rates of the coordinates; None where these are the speeds, and of a
-            definition that was generated before there was one.
+        rates: kernel p, q, u -> rates of the coordinates; None where these are the speeds, and for
+            definitions generated before this kernel was introduced.
     """
 
     name: str
@@ -70,58 +70,61 @@ class HingeFacts:
 
     @property
     def start(self) -> tuple[float, ...]:
-        """The default q: zero, with the quaternion of no rotation."""
+        """Default q: zero, with the quaternion of no rotation."""
         return start_of(len(self.coordinates), self.quaternion)
 
     @property
     def welds(self) -> bool:
-        """Nothing moves, and both ends are one."""
+        """Whether the hinge is a weld: no speeds, and both ends coincide."""
         return not self.speeds and self.in_place
 
     @property
     def turns(self) -> tuple[int, ...]:
-        """Speeds that turn the outboard body."""
+        """Indices of speeds that rotate the outboard body."""
         return tuple(k for k, rows in enumerate(self.varies) if rows[3:] != "000")
 
     @property
     def slides(self) -> tuple[int, ...]:
-        """Speeds that move the hinge point."""
+        """Indices of speeds that move the hinge point."""
         return tuple(k for k, rows in enumerate(self.varies) if rows[:3] != "000")
 
     @property
     def free_body(self) -> bool:
-        """All six motions are free."""
+        """Whether all six motions are free."""
         return len(self.speeds) == 6
 
     @property
     def steady(self) -> bool:
-        """The motions are the same in every position, seen from the outboard body."""
+        """Whether H is constant in outboard axes, the same in every position."""
         return not any("q" in rows for rows in self.varies)
 
     @property
     def goes_anywhere(self) -> bool:
-        """The hinge point is not held on a line: two translations or more are free."""
+        """Whether two or more translations of the hinge point are free."""
         return len(self.slides) > 1
 
     @property
     def axial(self) -> bool:
-        """It moves about and along z alone, the same way in every position."""
+        """Whether it moves only about and along z, in the same way in every position."""
         along = all(rows[:2] == "00" and rows[3:5] == "00" for rows in self.varies)
         return bool(self.speeds) and along and self.steady
 
     @property
     def keeps_z(self) -> bool:
-        """Everything stays in planes normal to z, about which alone it turns."""
+        """Whether it moves only in planes normal to z and rotates only about z."""
         return all(rows[2:5] == "000" for rows in self.varies)
 
     def own_parameters(self) -> tuple[Param, ...]:
-        """Numbers that the table `parameters` of a scene's hinge gives."""
+        """Parameters that a scene gives in the table `parameters` of the hinge."""
         from_frame = 1 if self.frame == "crossing" else 0
         return tuple(p for p in self.parameters[from_frame:] if p.name not in self.keys)
 
     def at_start(self, p: Sequence[float] = ()) -> list[tuple[Vector, Vector]]:
-        """(translation, rotation) per unit of each speed at the start values; `p` as the kernel
-        takes them."""
+        """(translation, rotation) per unit of each speed at the start values.
+
+        `p` holds the parameters of the kernel.  ValueError if H depends on them and their number
+        is wrong.
+        """
         nu = len(self.speeds)
         if any("p" in rows for rows in self.varies) and len(p) != len(self.parameters):
             raise ValueError(f"{self.name}: expected {len(self.parameters)} parameters")
@@ -132,7 +135,7 @@ class HingeFacts:
 
 
 def start_of(count: int, quaternion: int | None) -> tuple[float, ...]:
-    """Zeros, with the quaternion of no rotation."""
+    """Default coordinates: `count` zeros, with the quaternion of no rotation."""
     return tuple(1.0 if i == quaternion else 0.0 for i in range(count))
 
 
@@ -154,7 +157,7 @@ def facts_of(
     keys: tuple[str, ...] = ("axis",),
     allows: str = "",
 ) -> HingeFacts:
-    """Facts of a hinge from its kernel "hinge": H, R and qdot over p, q and u."""
+    """Derive the properties of a hinge from its kernel "hinge": H, R, qdot over p, q, u."""
     nu, values = len(speeds), _stored(hinge)
     depends = _Dependence(hinge)
     quaternion = _quaternion(hinge, len(coordinates), nu)
@@ -174,7 +177,7 @@ def facts_of(
 
 
 def same_motion(one: KernelIR, other: KernelIR) -> bool:
-    """Whether two hinges have one and the same kernel, whatever they are called."""
+    """Whether two hinges have the same kernel, whatever their names."""
 
     def bare(kernel: KernelIR) -> tuple[Any, ...]:
         ports = [(p.name, p.shape) for p in (*kernel.inputs, *kernel.outputs)]
@@ -184,7 +187,7 @@ def same_motion(one: KernelIR, other: KernelIR) -> bool:
 
 
 def _stored(kernel: KernelIR) -> dict[tuple[str, int], Operand]:
-    """(output, place) -> what is stored there."""
+    """Stored operands by (output, row-major index)."""
     ports = {port.name: port for port in kernel.outputs}
     return {
         (s.port, ports[s.port].offset(s.index)): s.value
@@ -194,7 +197,7 @@ def _stored(kernel: KernelIR) -> dict[tuple[str, int], Operand]:
 
 
 class _Dependence:
-    """What the values of a kernel depend on."""
+    """Dependence of the values of a kernel on parameters and coordinates."""
 
     def __init__(self, kernel: KernelIR) -> None:
         self._of: dict[int, str] = {}
@@ -204,7 +207,7 @@ class _Dependence:
                 self._of[statement.number] = max(letters, default="")
 
     def _reads(self, operand: Operand) -> str:
-        """Nothing for a constant, "p" for parameters alone, "q" for coordinates (or speeds) too."""
+        """Dependence: "" none, "p" on parameters only, "q" on coordinates or speeds too."""
         if isinstance(operand, Temporary):
             return self._of[operand.number]
         if isinstance(operand, Element):
@@ -212,14 +215,14 @@ class _Dependence:
         return ""
 
     def letter(self, operand: Operand) -> str:
-        """One of the letters of `HingeFacts.varies`."""
+        """Letter of an operand in `HingeFacts.varies`."""
         if isinstance(operand, Constant) and operand.text in "01":
             return operand.text
         return self._reads(operand) or "p"
 
 
 def _at(kernel: KernelIR, start: Sequence[float]) -> KernelIR:
-    """The kernel p -> H at these coordinates, at rest."""
+    """Kernel p -> H at the coordinates `start`, at zero speed."""
 
     def fixed(operand: Operand) -> Operand:
         if isinstance(operand, Element) and operand.port in "qu":
@@ -238,7 +241,7 @@ def _at(kernel: KernelIR, start: Sequence[float]) -> KernelIR:
 
 
 def _only(kernel: KernelIR, output: str, name: str) -> KernelIR:
-    """The part of a kernel that makes one of its outputs."""
+    """Part of a kernel that computes one of its outputs."""
     port = next(port for port in kernel.outputs if port.name == output)
     kept: list[Assign | Store] = []
     needed: set[int] = set()
@@ -257,7 +260,10 @@ def _numbers(operands: Sequence[Operand]) -> set[int]:
 
 
 def _quaternion(hinge: KernelIR, nq: int, nu: int) -> int | None:
-    """Place of the four coordinates whose length does not matter to the rotation, if there are."""
+    """Index of the first of four coordinates that form a quaternion, None without one.
+
+    The rotation must not depend on their common length.
+    """
     if nq != nu + 1:
         return None
     sizes = {port.name: port.length() for port in hinge.inputs}
@@ -280,7 +286,7 @@ def _quaternion(hinge: KernelIR, nq: int, nu: int) -> int | None:
 
 
 def _in_place(hinge: KernelIR, start: Sequence[float], frame: str) -> bool:
-    """Whether R and d join the ends as the scene lays them, whatever the parameters."""
+    """Whether, for any parameters, R and d at `start` leave the ends as in the scene."""
     sizes = {port.name: port.length() for port in hinge.inputs}
     for first in (0.7, 1.1):
         p = [first + 0.1 * k for k in range(sizes["p"])]
@@ -304,7 +310,7 @@ def _apart(one: Sequence[float], other: Sequence[float]) -> float:
 
 
 def facts_to_data(facts: HingeFacts) -> dict[str, Any]:
-    """Plain lists, numbers and texts; `facts_from_data` is the inverse."""
+    """Convert properties to lists, numbers and texts; `facts_from_data` is the inverse."""
     groups = {
         key: [list(astuple(p)) for p in getattr(facts, key)]
         for key in ("coordinates", "speeds", "parameters")
@@ -319,7 +325,7 @@ def facts_to_data(facts: HingeFacts) -> dict[str, Any]:
 
 
 def facts_from_data(data: dict[str, Any]) -> HingeFacts:
-    """The facts again."""
+    """Restore properties from the result of `facts_to_data`."""
     groups: dict[str, Any] = {
         key: tuple(Param(*entry) for entry in data[key])
         for key in ("coordinates", "speeds", "parameters")
@@ -335,6 +341,6 @@ def facts_from_data(data: dict[str, Any]) -> HingeFacts:
 
 @cache
 def builtin_hinges() -> dict[str, HingeFacts]:
-    """Facts of the built-in hinges by name, in the order in which they are listed to users."""
+    """Properties of the built-in hinges by name, in the order of the user's listing."""
     text = files("mstmm.generated").joinpath("hinges.json").read_text(encoding="utf-8")
     return {data["name"]: facts_from_data(data) for data in json.loads(text)}

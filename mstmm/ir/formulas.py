@@ -1,7 +1,7 @@
-"""The operations of the IR on numbers that carry formulas (`numbers.formula`).
+"""Operations of the IR on numbers that carry formulas (`numbers.formula`).
 
-Where an operation takes branches (select, min, abs, comparisons) the values decide, so that what
-comes out is the formula of the branch that is taken.
+Operations with branches (select, min, abs, comparisons) follow the values, so that the result is
+the formula of the active branch.
 """
 
 from __future__ import annotations
@@ -16,13 +16,15 @@ from .operations import OPERATIONS, true
 from .replay import Operations
 from .statements import Constant
 
-#: Powers that are multiplied out.
+#: Largest whole exponent that is multiplied out.
 _WHOLE = 16
 
 
 class FormulaArithmetic:
-    """Arithmetic of `ir.replay.run` on Formulas; with `branches` every branch stays in what comes
-    out, and holds for all values."""
+    """Arithmetic of `ir.replay.run` on Formulas.
+
+    With `branches` the result keeps every branch, and is valid for all values.
+    """
 
     def __init__(self, branches: bool = False) -> None:
         every = {op: partial(_function, op) for op in OPERATIONS}
@@ -43,12 +45,12 @@ def _function(op: str, *args: Formula) -> Formula:
 
 
 def _decided(op: str, *args: Formula) -> Formula:
-    """0, 1 or another number that the values alone decide, as of branches that are not taken."""
+    """Numerical result of an operation, without a formula."""
     return formula(OPERATIONS[op].value(*(x.value for x in args)))
 
 
 def _power(base: Formula, exponent: Formula) -> Formula:
-    """Whole powers multiplied out."""
+    """Power, multiplied out for small whole exponents."""
     if not exponent.fixed or exponent.value % 1 or abs(exponent.value) > _WHOLE:
         return _function("pow", base, exponent)
     found = formula(1.0)
@@ -67,14 +69,14 @@ def _root(x: Formula) -> Formula:
 
 
 def _choice(condition: Formula, a: Formula, b: Formula) -> Formula:
-    """a where the condition holds, else b."""
+    """Selection that keeps both branches unless they are equal or the condition is constant."""
     if condition.fixed or a.terms == b.terms:
         return a if true(condition.value) else b
     return _function("select", condition, a, b)
 
 
 def _positive_root(x: Formula) -> Formula:
-    """The root, which is negative nowhere."""
+    """Square root, wrapped in abs where its formula could become negative."""
     found = _root(x)
     plain = found.fixed or any(atom.op == "sqrt" for m in found.terms for atom, _ in m)
     return found if plain else _function("abs", found)

@@ -1,7 +1,7 @@
-"""Builds KernelIR by value numbering: equal terms are one node, constants fold as they arise.
+"""Graph that builds KernelIR by value numbering: equal terms share a node, constants are folded.
 
 Derivations are lowered through this graph, and expressions of scene files are parsed into it, so
-that both reach C, the tape and the evaluator in the same form.  No SymPy.
+that C, the tape and the interpreter receive both in the same form.  No SymPy.
 """
 
 from __future__ import annotations
@@ -17,15 +17,18 @@ __all__ = ["Graph", "Node", "Number"]
 
 
 class Graph(Terms):
-    """Hash-consed expression graph of one kernel."""
+    """Hash-consed expression graph of one kernel: equal expressions are the same node."""
 
     def __init__(self) -> None:
         super().__init__()
-        #: Guards, solves and stores in the order in which they were asked for.
+        #: Guards, solves and stores in the order of their requests.
         self._requests: list[GuardRequest | Solve | StoreRequest] = []
 
     def guard(self, condition: Node, code: int, message: str) -> None:
-        """Leave with `code` unless `condition` holds."""
+        """Leave the kernel with `code` unless `condition` holds.
+
+        ValueError if the condition is known to be false.
+        """
         if condition.value is None:
             self._requests.append(GuardRequest(condition, code, message))
         elif condition.value == 0:
@@ -34,14 +37,14 @@ class Graph(Terms):
     def solve(
         self, output: str, matrix: str, right: str, code: int, message: str, symmetric: bool = True
     ) -> None:
-        """Run-time sized solve between readable arrays; the result is the named output."""
+        """Request a run-time sized solve between readable arrays; the result is `output`."""
         self._requests.append(Solve(output, matrix, right, code, message, symmetric=symmetric))
 
     def store(self, port: Port, value: object) -> None:
-        """Write an output now (kernels with run-time size), so that it can be read afterwards.
+        """Write an output at once (kernels with run-time size), so that it can be read afterwards.
 
-        `value` is what `kernel` takes as `values[port]`.  With a store asked for, guards, solves
-        and stores keep the order in which they were asked for.
+        `value` has the form of `values[port]` of `kernel`.  Once a store is requested, guards,
+        solves and stores keep the order of their requests.
         """
         self._requests.append(StoreRequest(port, value))
 
@@ -58,15 +61,15 @@ class Graph(Terms):
         sources: Iterable[str] = (),
         as_made: bool = False,
     ) -> KernelIR:
-        """Order what the outputs need (dead terms drop out) into a frozen kernel.
+        """Build a frozen kernel from the terms that the outputs need (others are dropped).
 
-        With `as_made` values stand in the order in which they were made, each guard and store
-        right behind what it waits for (kernels without run-time size); otherwise in the order in
-        which guards and outputs ask for them.
+        With `as_made` values keep the order of their creation, each guard and store right after
+        its operands (kernels without run-time size).  Otherwise they are ordered by the first
+        guard or output that needs them.
 
         `values[port]` is a node, or a nested list of nodes in the port's shape; an entry None is
         not stored.  An axis of the size symbol has no list: one value, which may contain
-        `LOOP_INDEX` (for a second such axis `INNER_INDEX`), stands for all k < n.
+        `LOOP_INDEX` (for a second such axis `INNER_INDEX`), holds for all k < n.
         """
         writer = Writer(self)
         if as_made:

@@ -1,8 +1,8 @@
-"""Kernels run symbolically: the statements of a KernelIR replayed on the nodes of another graph.
+"""Inlining of kernels: the statements of a KernelIR interpreted on the nodes of another graph.
 
-What is known of the arguments (zeros, ones, terms already computed) folds as the statements are
-replayed, so a general kernel becomes the special one that its place needs.  Loops of a run-time
-size are replayed as often as the size says, and its solves unrolled.  No SymPy.
+Known arguments (zeros, ones, terms already computed) are folded on the way, so that a general
+kernel becomes the special one that its caller needs.  Loops over a run-time size are unrolled, and
+so are its solves.  No SymPy.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from .unrolled import solve_by_rows, solve_symmetric
 
 Nodes = list[Node]
 Guarding = Callable[[Node, int], None]
-#: Takes a condition, and the guard or the solve that asks for it.
+#: Receives a condition, and the guard or the solve that requires it.
 Judge = Callable[[Node, Guard | Solve], None]
 
 
 class Inliner:
-    """Replays kernels into one graph."""
+    """Interpreter that inlines kernels into one graph."""
 
     def __init__(self, graph: Graph) -> None:
         self.graph = graph
@@ -41,8 +41,8 @@ class Inliner:
         """Outputs by port, flat and row-major; accumulating outputs give their increment.
 
         `inputs[port]` holds the port's numbers, flat; `n` is the size of a kernel that has one.
-        `guard(condition, code)` receives every guard that is not decided by what is known; without
-        it they are dropped.
+        `guard(condition, code)` receives every guard that the known values do not decide; without
+        it such guards are dropped.
         """
 
         def judge(condition: Node, judged: Guard | Solve) -> None:
@@ -57,12 +57,12 @@ class Inliner:
 
 
 def unrolled(kernel: KernelIR, n: int) -> KernelIR:
-    """The kernel for one value of its run-time size: no loops, solves by elimination."""
+    """Specialise a kernel for one run-time size: no loops, solves by elimination."""
     return instance(kernel, elements, lambda _, found: found, n)
 
 
 def elements(graph: Graph, port: Port) -> Nodes:
-    """The entries of an array, row-major."""
+    """Nodes of the entries of an array, row-major."""
     places = product(*(range(int(extent)) for extent in port.shape))
     return [graph.element(port.name, *place) for place in places]
 
@@ -74,12 +74,13 @@ def instance(
     n: int = 0,
     laid: Callable[[Port], Port] = lambda port: port,
 ) -> KernelIR:
-    """The kernel of what is known of its arguments, for one value of a run-time size.
+    """Specialise a kernel for known arguments and one value of its run-time size.
 
-    `given` tells the numbers of an input, flat; inputs all of whose numbers are known are none of
-    the instance.  `kept` tells what is written of an output, None for an output that nobody wants.
-    `laid` tells how an array is laid out in the instance, which `given` reads and `kept` writes.
-    Guards and failure codes are those of `kernel`; a guard behind a store stands before it.
+    `given` returns the numbers of an input, flat; an input of which all numbers are known is no
+    input of the instance.  `kept` returns the entries to write of an output, None for an output
+    that is not needed.  `laid` returns the port of the instance for an array, in whose layout
+    `given` reads and `kept` writes.  Guards and failure codes are those of `kernel`; a guard after
+    a store moves before it.
     """
 
     def fixed(port: Port) -> Port:
@@ -108,7 +109,7 @@ def instance(
 
 
 class _Replay(Counted):
-    """One run of one kernel."""
+    """Interpretation of one kernel on the nodes of a graph."""
 
     def __init__(
         self,
@@ -128,7 +129,7 @@ class _Replay(Counted):
         self._judge(condition, judged)
 
     def solve(self, solve: Solve) -> None:
-        """Elimination as `Solve` has it."""
+        """Unroll the elimination that `Solve` specifies."""
         n, a, b = self.n, self.arrays[solve.matrix], self.arrays[solve.right]
         width = len(b) // n if n else 0
         right = [list(b[width * i : width * (i + 1)]) for i in range(n)]
@@ -148,7 +149,7 @@ class _Replay(Counted):
 
 
 def _nested(shape: tuple[int | str, ...], row: Sequence[Node]) -> object:
-    """Nested lists in a port's shape of its numbers, row-major."""
+    """Nest the numbers of a port (row-major) in lists of its shape."""
     if not shape:
         return row[0]
     step = len(row) // int(shape[0]) if shape[0] else 0

@@ -1,4 +1,4 @@
-"""One kernel: what it reads, what it writes, the statements in between, and its stored form."""
+"""KernelIR: inputs, outputs and statements of one kernel, and its stored form."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .statements import (
 
 @dataclass(frozen=True)
 class KernelIR:
-    """One kernel: what it reads, what it writes, and the statements in between."""
+    """Kernel in intermediate representation: inputs, outputs and statements."""
 
     name: str
     inputs: tuple[Port, ...]
@@ -42,24 +42,24 @@ class KernelIR:
         check(self)
 
     def operation_counts(self) -> dict[str, int]:
-        """Operations by name (bodies of loops counted once)."""
+        """Number of operations by name (bodies of loops counted once)."""
         counts: dict[str, int] = {}
         for statement in assignments(self):
             counts[statement.op] = counts.get(statement.op, 0) + 1
         return dict(sorted(counts.items()))
 
     def flops(self) -> int:
-        """Additions, subtractions, multiplications and divisions (loop bodies once)."""
+        """Number of additions, subtractions, multiplications, divisions (loop bodies once)."""
         counts = self.operation_counts()
         return sum(counts.get(name, 0) for name in ("add", "sub", "mul", "div"))
 
     def hash(self) -> str:
-        """SHA-256 of the stored form: equal text, equal kernel."""
+        """SHA-256 of the stored form, equal for equal kernels."""
         return hashlib.sha256(to_json(self).encode()).hexdigest()
 
 
 def assignments(kernel: KernelIR) -> Iterator[Assign]:
-    """Every assignment, those inside loops too, in order."""
+    """Iterate over all assignments in order, including those inside loops."""
     yield from _assignments(kernel.statements)
 
 
@@ -72,7 +72,7 @@ def _assignments(statements: Iterable[Statement]) -> Iterator[Assign]:
 
 
 def elements(kernel: KernelIR) -> list[Element]:
-    """What statements read of inputs and complete outputs."""
+    """Entries of inputs and complete outputs that statements read."""
     operands = [operand for statement in assignments(kernel) for operand in statement.args]
     operands += [s.value for s in kernel.statements if isinstance(s, (Store, Sum))]
     operands += [s.condition for s in kernel.statements if isinstance(s, Guard)]
@@ -85,11 +85,11 @@ def reads(kernel: KernelIR, port: str) -> bool:
 
 
 def check(kernel: KernelIR) -> None:
-    """Refuse what no backend could run, with a ValueError that names kernel and place.
+    """Check that every backend can run a kernel; a ValueError names the kernel and the place.
 
-    Unknown names, operations or constants; a value used before it is defined or defined twice;
-    an index outside its array or a loop index outside a loop; a size that is not the kernel's; a
-    `solve` whose arrays do not fit; a guard whose code would read as success.
+    It rejects unknown names, operations or constants; a value that is used before it is defined,
+    or defined twice; an index outside its array, or a loop index outside a loop; a size that is
+    not the kernel's; a `solve` whose arrays do not fit; a guard whose code means success.
     """
     Check(kernel.name, kernel.inputs, kernel.outputs, kernel.size_symbol).run(kernel.statements)
 
@@ -177,7 +177,7 @@ def _statement_from_data(data: Any) -> Statement:
 
 
 def to_json(kernel: KernelIR) -> str:
-    """The stored form: one statement a line, the same bytes on every machine."""
+    """Convert a kernel to JSON: one statement per line, the same bytes on every machine."""
 
     def port(p: Port) -> list[Any]:
         data = [p.name, list(p.shape), p.unit, p.meaning]
@@ -199,7 +199,7 @@ def to_json(kernel: KernelIR) -> str:
 
 
 def from_json(text: str) -> KernelIR:
-    """Inverse of `to_json`."""
+    """Restore a kernel from the result of `to_json`.  ValueError if it is invalid."""
     data = json.loads(text)
 
     def port(p: list[Any]) -> Port:

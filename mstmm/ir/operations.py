@@ -1,8 +1,9 @@
-"""What the IR computes: one row for each operation, with all that others ask of it.
+"""Table of the operations of the IR, one row each, with all their properties.
 
 C, the tape, numpy, SymPy, the listing, folding, differentiation, expressions and the passes over
-fused code read this table.  A new operation is one row here, a function each in the C texts
-`fused_real.c` and `fused_lanes.c`, and what mpmath computes otherwise (`derive.audit.arithmetic`).
+fused code read this table.  A new operation needs a row here, a function in each of the C texts
+`fused_real.c` and `fused_lanes.c`, and an entry in `derive.audit.arithmetic` if mpmath computes it
+in another way.
 """
 
 from __future__ import annotations
@@ -25,29 +26,29 @@ Slope = Callable[[Call, Any, Sequence[Any], Sequence[Any]], Any]
 
 @dataclass(frozen=True)
 class Operation:
-    """One row.  Texts name the operands {0}, {1}, {2}."""
+    """Operation of the IR.  Texts refer to the operands as {0}, {1}, {2}."""
 
     name: str
     arity: int
-    #: Cycles until the result can be used, on current processors; only ratios matter.
+    #: Cycles until the result is available, on current processors; only ratios matter.
     latency: int
-    #: In doubles, as C computes it; what needs but comparison and signs takes any real number.
+    #: Function of doubles, as in C; comparisons and signs accept any type of real number.
     value: Callable[..., Any]
-    #: Along a direction, branch by branch at kinks; None where it is flat.
+    #: Derivative along a direction, of the active branch at kinks; None where it is zero.
     slope: Slope | None = None
-    #: {t0}, {t1} ask whether an operand is true, that is neither zero nor NaN.
+    #: C text; {t0}, {t1} test whether an operand is true, that is neither zero nor NaN.
     c: str = ""
-    #: As the listing shows it, if not as C.
+    #: Text in the listing, if it differs from C.
     text: str = ""
-    #: Names of the functions of numpy and SymPy; SymPy's "" where it has no function but a form.
+    #: Names of the functions of numpy and SymPy; "" for SymPy where it is built from other terms.
     numpy: str = ""
     sympy: str = ""
-    #: Its value is 0 or 1.
+    #: Whether its value is 0 or 1.
     truth: bool = False
-    #: Operands in front that it asks for their truth.
+    #: Number of leading operands that are used as conditions.
     conditions: int = 0
     commutative: bool = False
-    #: Exact value where the first operand is 0, if one number.
+    #: Exact value where the first operand is 0, if it is unique.
     at_zero: int | None = None
 
     def __post_init__(self) -> None:
@@ -58,13 +59,13 @@ class Operation:
 
     @cached_property
     def sign(self) -> str:
-        """C's sign between the two operands; "" where it writes something else."""
+        """Operator of C between the two operands; "" if it is not a binary operator."""
         found = re.fullmatch(r"\{t?0\} (\S+) \{t?1\}", self.c)
         return found[1] if found else ""
 
     @cached_property
     def of_the_library(self) -> bool:
-        """Whether C calls a function of one argument and this name."""
+        """Whether it is a C library function of one argument with this name."""
         return self.c == f"{self.name}({{0}})"
 
 
@@ -74,7 +75,7 @@ def true(value: Any) -> bool:
 
 
 def _truth(condition: Callable[..., bool]) -> Callable[..., Any]:
-    """1 or 0, in the type of the operands."""
+    """Wrap a condition so that it returns 1 or 0 in the type of the operands."""
     return lambda *a: type(a[0])(condition(*a))
 
 
@@ -83,13 +84,13 @@ def _power_slope(call: Call, y: Any, a: Sequence[Any], d: Sequence[Any]) -> Any:
     slope = exponent * call("pow", base, exponent - 1) * d[0]
     if d[1].value == 0:
         return slope
-    # Where the exponent stands still, a negative base has a slope but no logarithm.
+    # For a constant exponent a negative base has a derivative but no logarithm.
     still = call("eq", d[1], 0)
     return call("select", still, slope, slope + y * call("log", base) * d[1])
 
 
 def _arc_slope(call: Call, y: Any, a: Sequence[Any], d: Sequence[Any]) -> Any:
-    """Derivative of asin; that of acos is its opposite."""
+    """Derivative of asin; that of acos is its negative."""
     return d[0] / call("sqrt", 1 - a[0] * a[0])
 
 
@@ -157,5 +158,5 @@ _ROWS = (
               text="{1} if {0} else {2}", numpy="where", conditions=1),
 )  # fmt: skip
 
-#: Operation name -> its row.  The order is that of the tape's instructions.
+#: Operation name -> row.  The order is that of the tape's instructions.
 OPERATIONS: dict[str, Operation] = {row.name: row for row in _ROWS}

@@ -1,4 +1,4 @@
-"""A named number of an element."""
+"""Parameter or coordinate of an element, with unit and bounds."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Param:
-    """A named number of an element: unit in SI, bounds inclusive, None where there is none."""
+    """Named number of an element: SI unit, default and inclusive bounds (None: no bound)."""
 
     name: str
     unit: str = ""

@@ -1,8 +1,8 @@
-"""The one walk over the statements of a KernelIR that computes: what a number is, others say.
+"""Interpreter of KernelIR, independent of the type of number.
 
-`run` takes any arithmetic of plain numbers.  Nodes of a graph (`inline`, `tangent`) and
-numpy arrays (`runtime.kernels.vectorized`) come as classes of their own: they differ in what an
-entry of an array is, and in what becomes of guards and of solves.
+`run` accepts any arithmetic of plain numbers.  Nodes of a graph (`inline`, `tangent`) and numpy
+arrays (`runtime.kernels.vectorized`) have separate subclasses: they differ in the entries of an
+array, and in the treatment of guards and solves.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from .statements import (
     Temporary,
 )
 
-#: What an input may be: a number, or nested or flat sequences of numbers, row-major.
+#: Type of an input: a number, or nested or flat sequences of numbers, row-major.
 Values = Any
 #: Operation name -> function.
 Operations = Mapping[str, Callable[..., Any]]
 
 
 class GuardFailure(NumericalFailure):
-    """A guard did not hold, or a pivot of `solve` vanished; `code` is what C returns."""
+    """A guard is violated, or a pivot of a solve vanishes; `code` is the return code of C."""
 
     def __init__(self, kernel: str, code: int, message: str) -> None:
         super().__init__(f"{kernel}: {message} (code {code})")
@@ -47,11 +47,11 @@ class GuardFailure(NumericalFailure):
         self.message = message
 
 
-# --- the walk ----------------------------------------------------------------------------------
+# --- interpretation ----------------------------------------------------------------------------
 
 
 class Replay(ABC):
-    """One run of one kernel."""
+    """Interpretation of one kernel, once; subclasses define numbers, arrays and loops."""
 
     def __init__(self, kernel: KernelIR, operations: Operations, n: int) -> None:
         self.kernel, self.operations, self.n = kernel, operations, n
@@ -60,7 +60,7 @@ class Replay(ABC):
         self.results: Any = {}
 
     def run(self) -> Any:
-        """Every statement in order; the results."""
+        """Execute every statement in order and return the results."""
         for statement in self.kernel.statements:
             if isinstance(statement, (Assign, Sum)):
                 self.inner(statement)
@@ -73,7 +73,7 @@ class Replay(ABC):
         return self.results
 
     def inner(self, statement: Inner) -> None:
-        """A statement that may stand inside a loop."""
+        """Execute a statement that is allowed inside a loop."""
         if isinstance(statement, Assign):
             operation = self.operations[statement.op]
             self.temporaries[statement.number] = operation(*map(self.value, statement.args))
@@ -81,36 +81,36 @@ class Replay(ABC):
             self.temporaries[statement.number] = self.total(statement)
 
     def inside(self, loop: Sum | Store) -> Any:
-        """The value of a loop where it stands, once its body has been run."""
+        """Value of a loop for the current indices, after a pass through its body."""
         for statement in loop.body:
             self.inner(statement)
         return self.value(loop.value)
 
     def value(self, operand: Operand) -> Any:
-        """What an operand stands for."""
+        """Value of an operand."""
         if isinstance(operand, Temporary):
             return self.temporaries[operand.number]
         return self.constant(operand) if isinstance(operand, Constant) else self.entry(operand)
 
     @abstractmethod
     def constant(self, constant: Constant) -> Any:
-        """A number of the kernel."""
+        """Value of a constant of the kernel."""
 
     @abstractmethod
     def entry(self, element: Element) -> Any:
-        """An entry of an array."""
+        """Value of an entry of an array."""
 
     @abstractmethod
     def total(self, statement: Sum) -> Any:
-        """The value of a sum over a loop."""
+        """Value of a sum over a loop."""
 
     @abstractmethod
     def store(self, store: Store) -> None:
-        """Write an output."""
+        """Write an entry of an output, or all entries of a loop."""
 
     @abstractmethod
     def guard(self, guard: Guard) -> None:
-        """Leave the kernel, or take down that it is to be left."""
+        """Leave the kernel if the condition is false, or record that it has to be left."""
 
     @abstractmethod
     def solve(self, solve: Solve) -> None:
@@ -118,7 +118,7 @@ class Replay(ABC):
 
 
 class Counted(Replay):
-    """Loops run place by place; arrays are flat lists, row-major, outputs full of `zero`."""
+    """Interpreter that runs through loops; arrays are flat row-major lists, outputs start at 0."""
 
     def __init__(
         self,
@@ -142,8 +142,8 @@ class Counted(Replay):
         row = inputs[port.name]
         if len(row) != port.length(self.n):
             raise ValueError(
-                f"{self.kernel.name}: {port.name} holds {port.length(self.n)} numbers "
-                f"{list(port.shape)}, not {len(row)}"
+                f"{self.kernel.name}: {port.name}: expected {port.length(self.n)} numbers "
+                f"{list(port.shape)}, found {len(row)}"
             )
         return row
 
@@ -174,31 +174,31 @@ class Counted(Replay):
 
     @abstractmethod
     def judge(self, condition: Any, judged: Guard | Solve) -> None:
-        """What becomes of the condition of a guard, or of a pivot of a solve."""
+        """Handle the condition of a guard, or of a pivot of a solve."""
 
 
 # --- plain numbers -----------------------------------------------------------------------------
 
 
 class Arithmetic(Protocol):
-    """What `run` needs: conversion of inputs and constants, and the operations."""
+    """Type of number of `run`: conversion of inputs and constants, and the operations."""
 
     @property
     def operations(self) -> Operations:
         """Operation name -> function."""
 
     def number(self, value: Any) -> Any:
-        """An input as a number of this arithmetic."""
+        """Convert an input to a number of this arithmetic."""
 
     def constant(self, constant: Constant) -> Any:
-        """A constant of the kernel as a number of this arithmetic."""
+        """Convert a constant of the kernel to a number of this arithmetic."""
 
     def true(self, value: Any) -> bool:
         """Whether the value is neither zero nor NaN."""
 
 
 class Doubles:
-    """Doubles, with the values C gives."""
+    """Arithmetic of doubles, with the values that C gives."""
 
     operations: ClassVar[Operations] = {name: row.value for name, row in OPERATIONS.items()}
 
@@ -215,9 +215,9 @@ class Doubles:
 def evaluate_floats(
     kernel: KernelIR, inputs: Mapping[str, Values], n: int | None = None
 ) -> dict[str, list[float]]:
-    """Outputs of the kernel in doubles, with the operations and the order of the generated C.
+    """Evaluate a kernel in doubles, with the operations and the order of the generated C.
 
-    What inputs may be and errors raised: as for `run`.
+    Inputs, result and errors are those of `run`.
     """
     return run(kernel, inputs, Doubles(), n)
 
@@ -225,12 +225,12 @@ def evaluate_floats(
 def run(
     kernel: KernelIR, inputs: Mapping[str, Values], arithmetic: Arithmetic, n: int | None
 ) -> dict[str, list[Any]]:
-    """Outputs in any arithmetic, each a flat list, row-major.
+    """Evaluate a kernel in any arithmetic; each output is a flat list, row-major.
 
     `inputs[port]` is a number or a nested or flat sequence of them; `n` is the run-time size of a
     kernel that has one.  An output flagged `accumulate` holds the increment; an entry that is never
-    stored is 0.  Values that no port asks for are ignored.  Raises GuardFailure, and ValueError for
-    a missing input, a wrong length or no `n`.
+    stored is 0.  Values without a port are ignored.  Raises GuardFailure, and ValueError for a
+    missing input, a wrong length or a missing `n`.
     """
     if kernel.size_symbol is not None and n is None:
         raise ValueError(f"{kernel.name}: give n, the run-time size {kernel.size_symbol!r}")
@@ -244,7 +244,7 @@ def run(
 
 
 class _Numbers(Counted):
-    """Guards that do not hold end the run."""
+    """Interpreter of plain numbers; a violated guard raises GuardFailure."""
 
     def __init__(
         self, kernel: KernelIR, arithmetic: Arithmetic, n: int, inputs: Mapping[str, list[Any]]
@@ -264,12 +264,12 @@ class _Numbers(Counted):
             raise GuardFailure(self.kernel.name, judged.code, judged.message)
 
     def solve(self, solve: Solve) -> None:
-        """In the order of the generated C."""
+        """Solve with the order of operations of the generated C."""
         how = self._by_diagonal if solve.symmetric else self._by_rows
         self.results[solve.port][:] = how(solve)
 
     def _by_rows(self, solve: Solve) -> list[Any]:
-        """LU with row exchange; right-hand sides are eliminated alongside."""
+        """Solve by LU with row exchange; right-hand sides are eliminated in the same pass."""
         n, a, b = self.n, self.arrays[solve.matrix], self.arrays[solve.right]
         m = len(b) // n if n else 0
         limit, one = (self.arithmetic.number(x) for x in (solve.relative_pivot, 1.0))
@@ -297,7 +297,7 @@ class _Numbers(Counted):
         return [x for row in rows for x in row[n:]]
 
     def _by_diagonal(self, solve: Solve) -> list[Any]:
-        """LDL^T without pivoting."""
+        """Solve by LDL^T without pivoting."""
         n, a, b = self.n, self.arrays[solve.matrix], self.arrays[solve.right]
         limit = self.arithmetic.number(solve.relative_pivot)
         work = [self.zero] * (n * n)
@@ -323,7 +323,7 @@ class _Numbers(Counted):
 
 
 def _flat(values: Values) -> list[Any]:
-    """Numbers of a nested sequence, row-major; a number is a sequence of one."""
+    """Flatten a nested sequence, row-major; a single number gives a list of one."""
     if isinstance(values, str) or not isinstance(values, Iterable):
         return [values]
     return [number for entry in values for number in _flat(entry)]

@@ -1,4 +1,4 @@
-"""ElementSpec: one element as numbers and text, ready to print as C.  No SymPy."""
+"""ElementSpec: one element as numbers and text, ready to be printed as C.  No SymPy."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from .param import Param
 
 __all__ = ["ENTRY_POINTS", "ElementSpec", "Param"]
 
-#: Entry points in which installed packages name their elements: a class, or a module of them.
+#: Entry point group in which installed packages list their elements: a class, or a module of them.
 ENTRY_POINTS = "mstmm.elements"
 
 
 @dataclass(frozen=True)
 class ElementSpec:
-    """What generation needs of an element: its coordinates, parameters and kernels.
+    """Coordinates, parameters and kernels of an element, as code generation needs them.
 
     `kind` is one of hinge, body, force, law, sweep, classical; hinges have `facts`.
     """
@@ -33,7 +33,7 @@ class ElementSpec:
     facts: HingeFacts | None = None
 
     def hash(self) -> str:
-        """SHA-256 over everything that reaches the C file."""
+        """SHA-256 of everything that appears in the C file."""
         parts = [self.kind, self.name]
         for group in (self.coordinates, self.speeds, self.parameters):
             parts += [f"{p.name}|{p.unit}" for p in group]

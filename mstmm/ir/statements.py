@@ -1,4 +1,4 @@
-"""What a kernel is made of: arrays, operands, and the statements of a KernelIR."""
+"""Parts of a KernelIR: arrays (ports), operands and statements."""
 
 from __future__ import annotations
 
@@ -6,19 +6,20 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 
-#: Index that stands for the loop variable of an indexed sum or store.
+#: Loop variable of an indexed sum or store, used as an index.
 LOOP_INDEX = "k"
-#: That of a second loop, inside the first.
+#: Loop variable of a second loop, inside the first.
 INNER_INDEX = "l"
 LOOPS = (LOOP_INDEX, INNER_INDEX)
 
 
 @dataclass(frozen=True)
 class Port:
-    """One array a kernel reads or writes.  Arrays are dense and row-major.
+    """Array that a kernel reads or writes.  Arrays are dense and row-major.
 
-    `shape` holds whole numbers or the kernel's size symbol; () is a scalar (one number).
-    An output with `accumulate` is added to what the array holds (contributions to a parent body).
+    `shape` holds integers or the kernel's size symbol; () is a scalar (one number).
+    An output with `accumulate` is added to the contents of the array (contributions to a parent
+    body).
     """
 
     name: str
@@ -28,14 +29,14 @@ class Port:
     accumulate: bool = False
 
     def length(self, n: int = 0) -> int:
-        """Numbers in the array when the size symbol equals `n`."""
+        """Count of numbers in the array for the value `n` of the size symbol."""
         total = 1
         for extent in self.shape:
             total *= n if isinstance(extent, str) else extent
         return total
 
     def offset(self, index: tuple[int | str, ...], n: int = 0, k: int = 0, inner: int = 0) -> int:
-        """Row-major place of an entry; in it `LOOP_INDEX` is `k`, `INNER_INDEX` is `inner`."""
+        """Row-major index of an entry, for `LOOP_INDEX` = `k` and `INNER_INDEX` = `inner`."""
         place = 0
         for entry, extent in zip(index, self.shape, strict=True):
             width = n if isinstance(extent, str) else extent
@@ -47,19 +48,19 @@ class Port:
 
 @dataclass(frozen=True)
 class Constant:
-    """An exact rational number, written "3", "-1/3"; or "pi"."""
+    """Exact rational number, written "3", "-1/3"; or "pi"."""
 
     text: str
 
     @property
     def number(self) -> float:
-        """The nearest double.  ValueError if the text is no number or has no finite double."""
+        """Nearest double.  ValueError if the text is no number, or is not finite as a double."""
         if self.text == "pi":
             return math.pi
         try:
             return float(Fraction(self.text))
         except (ValueError, ZeroDivisionError, OverflowError):
-            raise ValueError(f"{self.text!r} is no constant that a double can hold") from None
+            raise ValueError(f"{self.text!r} is no number within the range of a double") from None
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Temporary:
-    """Value of the statement with this number."""
+    """Operand: value of the statement with this number."""
 
     number: int
 
@@ -82,7 +83,7 @@ Operand = Constant | Element | Temporary
 
 @dataclass(frozen=True)
 class Assign:
-    """t[number] = op(args)."""
+    """Assignment t[number] = op(args)."""
 
     number: int
     op: str
@@ -91,7 +92,7 @@ class Assign:
 
 @dataclass(frozen=True)
 class Sum:
-    """t[number] = sum over k < n (or the letter `over`) of `value`, once `body` has been run."""
+    """Sum t[number] of `value` over k < n (or the letter `over`); `body` is run in each pass."""
 
     number: int
     body: tuple[Assign | Sum, ...]
@@ -99,13 +100,13 @@ class Sum:
     over: str = LOOP_INDEX
 
 
-#: What stands inside a loop.
+#: Statements that are allowed inside a loop.
 Inner = Assign | Sum
 
 
 @dataclass(frozen=True)
 class Store:
-    """output[index] = value; with `k` or `l` in the index, `body` is run for every k, l < n."""
+    """Write output[index] = value; with `k` or `l` in the index, run `body` for all k, l < n."""
 
     port: str
     index: tuple[int | str, ...]
@@ -114,33 +115,33 @@ class Store:
 
     @property
     def loops(self) -> tuple[str, ...]:
-        """Letters that are run through, the outermost first."""
+        """Letters of the loops, outermost first."""
         return tuple(letter for letter in LOOPS if letter in self.index)
 
 
 @dataclass(frozen=True)
 class Guard:
-    """Leave the kernel with `code` unless `condition` is non-zero; `message` says what failed."""
+    """Leave the kernel with `code` unless `condition` is non-zero; `message` states the failure."""
 
     condition: Operand
     code: int
     message: str
 
 
-#: What C returns behind a whole kernel if a matrix that is not symmetric, of which it is not known
-#: to be positive definite, has a negative determinant: all results are there.
+#: Code that C returns after a complete kernel if an unsymmetric matrix, not known to be positive
+#: definite, has a negative determinant; all results are valid.
 NEGATIVE = 2
 
 
 @dataclass(frozen=True)
 class Solve:
-    """output = A^-1 B for a run-time sized A (n x n), B (n,) or (n, m).
+    """Linear solve, output = A^-1 B, for a run-time sized A (n x n), B (n,) or (n, m).
 
-    Of a symmetric positive definite A the lower half is read: LDL^T without pivoting; a pivot below
-    `relative_pivot` times its own diagonal entry leaves with `code`.  Otherwise LU with row
-    exchange; there it is a pivot below `relative_pivot` times the magnitude of its column in A (the
-    sum of the entries').  Fixed sizes are unrolled when the kernel is lowered and never reach this
-    statement.
+    A symmetric positive definite A is factored as LDL^T without pivoting, from its lower half; a
+    pivot below `relative_pivot` times its diagonal entry of A leaves the kernel with `code`.
+    Otherwise A is factored as LU with row exchange; the limit of a pivot is then `relative_pivot`
+    times the sum of magnitudes in its column of A.  Solves of fixed size are unrolled when the
+    kernel is lowered and never become this statement.
     """
 
     port: str

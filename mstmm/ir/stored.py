@@ -1,4 +1,4 @@
-"""Stored form of an ElementSpec: one JSON file an element, kernels as `ir.to_json` writes them."""
+"""JSON form of an ElementSpec: one file per element, kernels as written by `ir.to_json`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from .spec import ElementSpec, Param
 
 
 def element_to_json(spec: ElementSpec) -> str:
-    """The same bytes on every machine; `element_from_json` is the inverse."""
+    """Convert an element to JSON, with the same bytes on every machine.
+
+    `element_from_json` is the inverse.
+    """
     head: dict[str, Any] = {
         "kind": spec.kind,
         "name": spec.name,
@@ -30,7 +33,7 @@ def element_to_json(spec: ElementSpec) -> str:
 
 
 def element_from_json(text: str) -> ElementSpec:
-    """The element again.  ValueError if the text is not JSON, or a kernel in it is refused."""
+    """Restore an element from JSON.  ValueError if the text or one of its kernels is invalid."""
     data = json.loads(text)
     groups: dict[str, Any] = {
         group: tuple(Param(*entry) for entry in data[group])
@@ -40,7 +43,7 @@ def element_from_json(text: str) -> ElementSpec:
     facts = None
     if "facts" in data:
         facts = facts_from_data(data["facts"])
-    elif data["kind"] == "hinge":  # stored before hinges brought theirs
+    elif data["kind"] == "hinge":  # stored by a version whose hinges had no facts
         motion = [kernel for kernel in kernels if kernel.name == "hinge"]
         facts = facts_of(motion[0], data["name"], **groups) if motion else None
     return ElementSpec(
@@ -50,7 +53,9 @@ def element_from_json(text: str) -> ElementSpec:
 
 
 def kernel_from_json(text: str, name: str) -> KernelIR:
-    """One kernel of a stored element, without making the others.  KeyError if it has none of this
-    name, ValueError as above."""
+    """Restore one kernel of a stored element, without building the others.
+
+    KeyError if the element has no kernel of this name; ValueError as for `element_from_json`.
+    """
     stored = {kernel["name"]: kernel for kernel in json.loads(text)["kernels"]}
     return from_json(json.dumps(stored[name]))

@@ -1,8 +1,8 @@
-"""Structure: what of a scene decides its fused code; everything else is a number read at run time.
+"""Structure of a scene: the part that determines its fused code; the rest is run-time data.
 
-A number of the scene that is exactly zero, or exactly +-1 where it is an axis, is part of the
-structure: code for it is never generated, and touching it means another structure (and another
-library).  Every other number is a place in the parameter vector p.
+A number of the scene that is exactly zero, or exactly +-1 in an axis, is part of the structure: no
+code is generated for it, and changing it requires another structure (and another library).  Every
+other number is an index into the parameter vector p.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from .facts import builtin_hinges
 from .kernel import KernelIR
 
-#: A structural constant (float) or a place in p (int).
+#: A structural constant (float) or an index into p (int).
 Entry = float | int
 Entries = tuple[Entry, ...]
 #: (kind, name) of an element; its kernels are looked up by name.
@@ -31,10 +31,10 @@ class ExpressionStructure:
 
 @dataclass(frozen=True)
 class ModalStructure:
-    """Internal coordinates of a flexible body whose floating frame is this body.
+    """Modal coordinates of a flexible body whose floating frame is this body.
 
-    `moments` and `drag` (empty: none) are the inputs of the kernel "momentum" of ("sweep", "modal")
-    from p to M, by name; stiffness and damping (n x n) row by row.
+    `moments` and `drag` (empty: none) are inputs of the kernel "momentum" of ("sweep", "modal"),
+    from p to M, by name.  Stiffness and damping (n x n) are row-major.
     """
 
     n: int
@@ -48,10 +48,11 @@ class ModalStructure:
 
 @dataclass(frozen=True)
 class SectionStructure:
-    """A section of the flexible body with floating frame `frame`, which a connection passes:
-    outward from the frame to an end, or inward from the end that is held.
+    """Section of the flexible body with floating frame `frame` at an end of a connection.
 
-    `numbers` are the inputs r, phi, theta, g_x .. g_z, h_x .. h_z of the kernel "section", by name.
+    The connection leads outward from the frame to an end, or inward from the end at the inboard
+    hinge.  `numbers` are the inputs r, phi, theta, g_x .. g_z, h_x .. h_z of the kernel "section",
+    by name.
     """
 
     frame: int
@@ -62,13 +63,14 @@ class SectionStructure:
 
 @dataclass(frozen=True)
 class BodyStructure:
-    """One body with its inboard hinge, in the engine's internal frames.
+    """Body with its inboard hinge, in the internal frames of the engine.
 
-    rotation, position: inboard hinge axes in the parent (9, row by row) and its point Q (3).
-    link: instead of both, cosine, sine and shift of a screw about x, then the constant angle and
-    shift of the hinge's own screw about z; empty where the connection is none.
-    `imposed[k]` marks a driven speed; `rotor` is the reflected inertia per speed.  `pending` are
-    the rows of closed loops that are open across the hinge, `bent` those that pass its own modes.
+    rotation, position: inboard hinge axes in the parent (9, row-major) and its point Q (3).
+    link: replaces both by cosine, sine and shift of a screw about x, then the constant angle and
+    shift of the hinge's screw about z; empty where the connection has no such form.
+    `imposed[k]` marks a speed of prescribed motion; `rotor` is the reflected inertia per speed.
+    `pending` are the constraint rows of loops that pass the hinge and are not eliminated yet,
+    `bent` those that involve the modes of the body.
     """
 
     parent: int
@@ -87,14 +89,14 @@ class BodyStructure:
     imposed: tuple[int, ...]
     modal: ModalStructure | None = None
     section: SectionStructure | None = None
-    idle: bool = False  #: an end that nothing hangs on or acts on
+    idle: bool = False  #: an end without hinges and loads
     pending: tuple[int, ...] = ()
     bent: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
 class LawStructure:
-    """Law `kernel` on n speeds of a body's hinge; effort[k] is a place among the values, or -1."""
+    """Hinge law `kernel` on n speeds of a body's hinge; effort[k] indexes the values, or is -1."""
 
     body: int
     kernel: str
@@ -109,7 +111,7 @@ class LawStructure:
 
 @dataclass(frozen=True)
 class LoadStructure:
-    """Force and moment at a point of a body; components are places among the values, or -1."""
+    """Force and moment at a point of a body; components are indices of the values, or -1."""
 
     body: int
     axes: int
@@ -121,7 +123,7 @@ class LoadStructure:
 
 @dataclass(frozen=True)
 class ForceStructure:
-    """Massless element between an end F and an end T; body -1 is the ground."""
+    """Massless force element between an end F and an end T; body -1 is the ground."""
 
     element: Key
     body_f: int
@@ -136,10 +138,13 @@ class ForceStructure:
 
 @dataclass(frozen=True)
 class ClosureStructure:
-    """A hinge that closes a loop: body `frame`, without mass, is to be where an end of `outboard`
-    is, which lies in that body by `turn` (9, row by row) and `end` (3).  `rows` are those of its
-    six directions, own speeds first; -1 where a direction has none, -2 where nothing is asked of
-    it.  Constraints ask less: as `kind` says, by the numbers `p`."""
+    """Cut hinge of a loop, or constraint between two bodies.
+
+    The massless body `frame` has to coincide with an end of `outboard`, which `turn` (9, row-major)
+    and `end` (3) locate in that body.  `rows` are the constraint rows of its six directions, those
+    of the hinge's speeds first; -1 where a direction has no row, -2 where it is unconstrained.
+    Other constraints restrict fewer directions, according to `kind` and the numbers `p`.
+    """
 
     frame: int
     outboard: int
@@ -152,10 +157,13 @@ class ClosureStructure:
 
 @dataclass(frozen=True)
 class RowStructure:
-    """A row that is closed on a body, coupled with `others` that are open yet; a pivot up to
-    `floor` is rounding.  `soft` is the rotor inertia of the speed whose row it is; empty: the row
-    is met.  One `of_speeds` asks nothing of positions.  `rest` is the place in memory that is
-    non-zero while others are met instead; -1: never."""
+    """Constraint row that is eliminated on a body, coupled with `others` eliminated later.
+
+    A pivot up to `floor` is rounding.  `soft` is the rotor inertia of the speed that the row
+    belongs to; empty: the row is satisfied exactly.  A row `of_speeds` does not constrain
+    positions.  `rest` is the index into the memory that is non-zero while other rows are active
+    instead; -1: never.
+    """
 
     body: int
     others: tuple[int, ...]
@@ -165,15 +173,18 @@ class RowStructure:
     rest: int = -1
 
 
-#: Numbers of a coupling, in their order; behind them stands -C of each of its hinges.
+#: Numbers of a coupling, in this order; -C of each of its hinges follows.
 COUPLING = ("drift", "gap", "slip", "still")
 
 
 @dataclass(frozen=True)
 class CouplingStructure:
-    """A coupling of coordinates: its row (-1: others do what it asks), where its numbers begin
-    among those of `Structure.coupled`, the value that it keeps, and (body, where -C begins) of
-    every hinge that it names."""
+    """Coupling of coordinates, a constraint between coordinates of hinges.
+
+    It has its row (-1: redundant), the index of its first number among those of
+    `Structure.coupled`, the value that it keeps constant, and (body, first index of -C) of every
+    hinge that it names.
+    """
 
     row: int
     first: int
@@ -184,10 +195,13 @@ class CouplingStructure:
 
 @dataclass(frozen=True)
 class Structure:
-    """A scene without its numbers.  `values` gives efforts and load components, `drives` each
-    drive's value, rate and acceleration (three in a row; `driven` says whose: body, coordinate).
-    `closures` stand in the order of their frames, `rows` in that in which they are closed;
-    `coupled` gives the numbers of all `couplings`."""
+    """Scene without its numerical values.
+
+    `values` gives efforts and load components, `drives` each prescribed motion's value, rate and
+    acceleration (three in a row; `driven` has the body and coordinate of each).  `closures` are in
+    the order of their frames, `rows` in the order of their elimination; `coupled` gives the numbers
+    of all `couplings`.
+    """
 
     nq: int
     nu: int
@@ -206,21 +220,21 @@ class Structure:
     couplings: tuple[CouplingStructure, ...] = ()
     coupled: ExpressionStructure | None = None
     elements: Mapping[Key, str] = field(default_factory=dict)  #: hashes of users' elements
-    #: (place among the numbers of inputs, place in p) of those that are read: they change with time
+    #: (index among the numbers of inputs, index in p) of the inputs in use: they change with time
     inputs: tuple[tuple[int, int], ...] = field(default=(), repr=False, compare=False)
     refines: int = 0  #: how often accelerations of a tree are refined
 
     @property
     def closes(self) -> bool:
-        """Whether anything closes but the tree."""
+        """Whether the scene has loops, constraints or couplings besides the tree."""
         return bool(self.closures or self.couplings)
 
     def identity(self) -> str:
-        """SHA-256 over everything that decides the fused code, kernels of mstmm itself aside."""
+        """SHA-256 of everything that determines the fused code, except the kernels of mstmm."""
         return hashlib.sha256(repr(self).encode()).hexdigest()
 
 
 def angle_of(hinge: Key) -> int | None:
-    """The coordinate that turns a built-in hinge about z, of those that move about and along z."""
+    """Coordinate that rotates a built-in hinge about z, if it moves only about and along z."""
     facts = builtin_hinges().get(hinge[1])
     return facts.turns[0] if facts is not None and facts.axial and facts.turns else None

@@ -1,11 +1,11 @@
 """Exact derivatives of graphs and kernels by forward differentiation of every operation.
 
-`derivative` works on the nodes of one graph; `tangent` turns a kernel into one that computes its
-outputs and their derivative along a given direction.  Value numbering shares what value and
-derivative have in common, and a derivative that is zero whatever the numbers costs nothing.
+`derivative` works on the nodes of one graph; `tangent` converts a kernel into one that computes its
+outputs and their derivative along a given direction.  Value numbering shares the common terms of
+value and derivative, and a derivative that vanishes identically costs nothing.
 
-Kinks are taken branch by branch: abs, min, max and select give the slope of the branch that is
-taken; sign, floor, comparisons and logic are flat.  No SymPy.
+At kinks the active branch counts: abs, min, max and select have the slope of that branch; the
+slopes of sign, floor, comparisons and logic are zero.  No SymPy.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from .replay import Replay
 from .statements import LOOPS, Constant, Element, Guard, Port, Solve, Store, Sum
 from .terms import Node, Number
 
-#: Name of the derivative of a port.
+#: Prefix of the name of a port's derivative.
 PREFIX = "d_"
 
 
 def derivative(node: Node, seeds: Mapping[Node, Node | Number]) -> Node:
-    """Exact directional derivative: `seeds` gives the derivative of each independent leaf."""
+    """Exact directional derivative of a node; `seeds` has the derivative of each free leaf."""
     return derivatives([node], seeds)[0]
 
 
 def derivatives(nodes: Sequence[Node], seeds: Mapping[Node, Node | Number]) -> list[Node]:
-    """Exact directional derivatives of several nodes of one graph, common parts once."""
+    """Exact directional derivatives of several nodes of one graph, which share common terms."""
     known = {leaf.number: leaf.graph.node(d) for leaf, d in seeds.items()}
     for node in nodes:
         stack = [node]
@@ -51,7 +51,7 @@ def derivatives(nodes: Sequence[Node], seeds: Mapping[Node, Node | Number]) -> l
 
 
 def _differentiated(node: Node, d: list[Node]) -> Node:
-    """Derivative of one operation given the derivatives of its operands; without a rule flat."""
+    """Derivative of an operation from those of its operands; zero if it has no rule."""
     graph = node.graph
     if all(slope.value == 0 for slope in d):
         return graph.constant(0)
@@ -68,28 +68,29 @@ def tangent(
     values: bool = True,
     guards: bool = True,
 ) -> KernelIR:
-    """The kernel that computes `kernel`'s outputs y(x) and d_y = (dy/dx) d_x.
+    """Differentiate a kernel: outputs y(x) and d_y = (dy/dx) d_x.
 
-    Behind the inputs of `kernel` stands one `d_<port>` for each of `ports` (names of inputs, in
-    the order of the kernel), of the same shape: the direction.  Behind its outputs stands one
+    The inputs of `kernel` are followed by a direction `d_<port>` of the same shape for each of
+    `ports` (names of inputs, in the order of the kernel).  Its outputs are followed by a derivative
     `d_<port>` for each of `outputs` (default: all), which accumulates where the output does.  With
-    `values` False the outputs themselves are left out, with `guards` False the guards (for callers
-    that run `kernel` as well), and what only they need.
+    `values` False the outputs of `kernel` are left out, with `guards` False the guards (for callers
+    that run `kernel` as well), and terms that only they need.
 
     A run-time sized `solve` x = A^-1 b is differentiated as A^-1 db, by a second solve.  An output
-    that the kernel reads again is an input where its value is left out: behind those of `kernel`.
+    that the kernel reads again, and whose value is left out, becomes an input after those of
+    `kernel`.
 
-    Raises ValueError for names that the kernel does not have, for a `solve` of what the kernel has
-    stored itself, and where A depends on `ports`: the right side db - dA x is then no array that a
-    `solve` can read.
+    Raises ValueError for names that the kernel does not have, for a `solve` of an array that the
+    kernel has stored, and where A depends on `ports`: the right-hand side db - dA x is then no
+    array that a `solve` can read.
     """
     return _Tangent(kernel, set(ports), outputs, values, guards).run()
 
 
 def jacobian(kernel: KernelIR, port: str, output: str) -> KernelIR:
-    """The kernel that computes J = (d output / d port)^T: a row an entry of `port`.
+    """Kernel that computes J = (d output / d port)^T, with one row per entry of `port`.
 
-    For kernels of fixed size whose `port` and `output` are vectors.
+    The kernel must have a fixed size; `port` and `output` must be vectors.
     """
     return _Jacobian(kernel, {port}, [output], values=False, guards=False).run()
 
@@ -98,8 +99,7 @@ Index = tuple[int | str, ...]
 
 
 class _Tangent(Replay):
-    """One pass over a kernel: its statements replayed on a graph, loops as they are, then their
-    derivatives."""
+    """Differentiation of one kernel: interpret it on a graph, keeping loops, then differentiate."""
 
     def __init__(
         self,
@@ -115,7 +115,7 @@ class _Tangent(Replay):
         solved = {s.port for s in kernel.statements if isinstance(s, Solve)}
         wanted = (set(names) if outputs is None else set(outputs)) | solved
         for name in (ports - {port.name for port in kernel.inputs}) | (wanted - set(names)):
-            raise ValueError(f"{kernel.name}: it has no port {name!r} to differentiate")
+            raise ValueError(f"{kernel.name}: no port {name!r} to differentiate")
         self.directions = [port for port in kernel.inputs if port.name in ports]
         self.moving = {port.name: port for port in self.directions}
         self.wanted = [port for port in kernel.outputs if port.name in wanted]
@@ -156,7 +156,7 @@ class _Tangent(Replay):
     def _put(
         self, contents: dict[str, object], port: Port, entries: Mapping[Index, Node], name: str
     ) -> None:
-        """Stored at the kernel's end, or at once where the kernel reads the output again."""
+        """Store an output at the kernel's end, or at once where the kernel reads it again."""
         nested = _nested(port.shape, entries)
         if name in self.read_again:
             self.graph.store(port, nested)
@@ -186,18 +186,18 @@ class _Tangent(Replay):
     def _refuse_stored(self, name: str) -> None:
         if name in self.stores:
             raise ValueError(
-                f"{self.kernel.name}: it solves with {name!r}, which it has stored; differentiate "
-                "the kernel at a fixed size"
+                f"{self.kernel.name}: a solve reads {name!r}, which the kernel has stored; "
+                "differentiate the kernel at a fixed size"
             )
 
     def solve(self, solve: Solve) -> None:
-        """The solve itself, and that of its derivative where it is not zero."""
+        """Request the solve, and that of its derivative unless the derivative is zero."""
         self._refuse_stored(solve.matrix)
         self._refuse_stored(solve.right)
         if solve.matrix in self.moving:
             raise ValueError(
                 f"{self.kernel.name}: the matrix {solve.matrix!r} of a run-time sized solve "
-                "depends on what is differentiated; differentiate the kernel at a fixed size"
+                "depends on differentiated inputs; differentiate the kernel at a fixed size"
             )
         how = solve.code, solve.message, solve.symmetric
         self.graph.solve(solve.port, solve.matrix, solve.right, *how)
@@ -210,7 +210,7 @@ class _Tangent(Replay):
             self.still.append(port)
 
     def _seeds(self) -> dict[Node, Node | Number]:
-        """The derivative of every entry that moves: an entry of `d_<port>`."""
+        """Derivative of every entry that varies: an entry of `d_<port>`."""
         element = self.graph.element
         return {
             element(port.name, *index): element(PREFIX + port.name, *index)
@@ -220,7 +220,7 @@ class _Tangent(Replay):
 
 
 class _Jacobian(_Tangent):
-    """The derivatives along every entry of one port, side by side."""
+    """Derivatives along every entry of one port, as rows of a matrix."""
 
     def run(self) -> KernelIR:
         Replay.run(self)
@@ -243,20 +243,20 @@ def _slope(port: Port) -> Port:
 
 
 def _places(shape: Index) -> list[Index]:
-    """Every index of the shape; along the run-time size a loop index stands for all."""
+    """All indices of a shape; along the run-time size one loop index represents all."""
     letters = iter(LOOPS)
     ranges = [(next(letters),) if isinstance(extent, str) else range(extent) for extent in shape]
     return list(product(*ranges))
 
 
 def _readings(shape: Index) -> list[Index]:
-    """Every index by which a kernel may read an array: either letter along the run-time size."""
+    """All indices by which a kernel may read an array: both letters along the run-time size."""
     ranges = [LOOPS if isinstance(extent, str) else range(extent) for extent in shape]
     return list(product(*ranges))
 
 
 def _nested(shape: Index, entries: Mapping[Index, Node], at: Index = ()) -> Any:
-    """Nested lists as `Graph.kernel` takes them; None where nothing is stored."""
+    """Nest entries in lists, as `Graph.kernel` expects; None where nothing is stored."""
     if not shape:
         return entries.get(at)
     if isinstance(shape[0], str):

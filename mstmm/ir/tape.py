@@ -1,7 +1,7 @@
-"""The IR tape: a kernel as a flat list of whole numbers that prebuilt C can interpret.
+"""Tape: bytecode of a kernel, a flat list of integers that prebuilt C interprets.
 
-Expressions of scenes, and hinges on machines without a compiler, run this way.  Slots of the
-workspace lie as [inputs | constants | temporaries].  No SymPy, no numpy.
+Expressions of scenes, and hinges on machines without a compiler, run this way.  The layout of the
+workspace is [inputs | constants | temporaries].  No SymPy, no numpy.
 """
 
 from __future__ import annotations
@@ -12,25 +12,25 @@ from .kernel import KernelIR
 from .operations import OPERATIONS
 from .statements import Assign, Constant, Element, Guard, Operand, Store, Temporary
 
-#: Operation name -> number of the instruction, in the order of `ir.OPERATIONS`.
+#: Operation name -> opcode, in the order of `ir.OPERATIONS`.
 OPCODES: dict[str, int] = {name: number for number, name in enumerate(OPERATIONS)}
 
-#: Number of the instruction that leaves with `destination` as code unless operand a holds.
+#: Opcode of a guard, which leaves with `destination` as code unless operand a is true.
 GUARD_OPCODE = len(OPCODES)
 
-#: Whole numbers per instruction: operation, destination, operands a, b, c.
+#: Integers per instruction: opcode, destination, operands a, b, c.
 INSTRUCTION_WIDTH = 5
 
-#: Whole numbers per stored value: output array, place in it, slot, 1 if added to what is there.
+#: Integers per stored value: output array, index in it, slot, 1 if added to its contents.
 OUTPUT_WIDTH = 4
 
 
 @dataclass(frozen=True)
 class Tape:
-    """One kernel of fixed size, ready for `mstmm_tape_run`.
+    """Bytecode of one kernel of fixed size, for `mstmm_tape_run`.
 
     `instructions` and `outputs` are flat; `slots` is the length of the workspace in numbers.
-    Outputs are stored after the last guard: a tape that fails writes nothing.
+    Outputs are stored after the last guard, so that a tape that fails writes nothing.
     """
 
     name: str
@@ -43,17 +43,19 @@ class Tape:
     guards: tuple[tuple[int, str], ...]
 
     def message(self, code: int) -> str:
-        """What the guard with this code says."""
+        """Message of the guard with this code."""
         return next((text for number, text in self.guards if number == code), "unknown failure")
 
 
 def compile_tape(kernel: KernelIR) -> Tape:
-    """Lay a kernel out as a tape.
+    """Translate a kernel into a tape.
 
-    ValueError for a kernel with a run-time size: loops and `solve` have no instruction.
+    ValueError for a kernel with a run-time size: there are no instructions for loops and `solve`.
     """
     if kernel.size_symbol is not None:
-        raise ValueError(f"{kernel.name}: a tape has fixed sizes, not {kernel.size_symbol!r}")
+        raise ValueError(
+            f"{kernel.name}: a tape needs fixed sizes, found the size {kernel.size_symbol!r}"
+        )
     layout = _Layout(kernel)
     instructions: list[int] = []
     outputs: list[int] = []
@@ -86,7 +88,7 @@ def compile_tape(kernel: KernelIR) -> Tape:
 
 
 class _Layout:
-    """Which slot holds which operand."""
+    """Slots of the workspace, by operand."""
 
     def __init__(self, kernel: KernelIR) -> None:
         self._ports = {port.name: port for port in kernel.inputs}
@@ -105,7 +107,7 @@ class _Layout:
         self._temporaries: dict[int, int] = {}
 
     def temporary(self, number: int) -> int:
-        """A new slot for the temporary."""
+        """Allocate a slot for the temporary."""
         self._temporaries[number] = self.next
         self.next += 1
         return self._temporaries[number]
@@ -120,7 +122,7 @@ class _Layout:
 
 
 def _constants(kernel: KernelIR) -> list[Constant]:
-    """Constants in the order the statements use them."""
+    """Constants in the order of their use by the statements."""
     operands: list[Operand] = []
     for statement in kernel.statements:
         if isinstance(statement, Assign):

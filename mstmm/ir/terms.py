@@ -1,4 +1,4 @@
-"""Terms by value numbering: the nodes of a graph, and the arithmetic that makes and folds them."""
+"""Terms by value numbering: nodes of a graph, and the arithmetic that creates and folds them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Number = int | float | Fraction
 LOOP_BITS = {LOOP_INDEX: 1, INNER_INDEX: 2}
 
 
-#: What folding asks of a constant, answered once: comparing fractions is slow.
+#: Kinds of constants for folding, determined once: comparisons of fractions are slow.
 _ZERO, _ONE, _MINUS_ONE, _POSITIVE, _NEGATIVE = 1, 2, 3, 4, 5
 
 
@@ -26,7 +26,7 @@ def _kind(value: Fraction) -> int:
 
 
 class Node:
-    """One value of a graph.  Made by the graph's methods and by + - * / ** on other nodes."""
+    """Value in a graph, created by methods of the graph and by + - * / ** on other nodes."""
 
     __slots__ = ("args", "graph", "kind", "leaf", "loops", "number", "op", "value")
 
@@ -43,7 +43,7 @@ class Node:
         self.leaf = leaf
         #: Loop variables that the value depends on, as bits.
         self.loops = loops
-        #: The exact number if this node is a rational constant, else None.
+        #: Exact value of a rational constant, else None.
         self.value: Fraction | None = leaf if isinstance(leaf, Fraction) else None
         self.kind = 0 if self.value is None else _kind(self.value)
 
@@ -79,7 +79,7 @@ class Node:
 
 
 class Terms:
-    """Hash-consed terms: equal ones are one node, and constants fold as they arise."""
+    """Hash-consed terms: equal terms are the same node, and constants are folded at once."""
 
     def __init__(self) -> None:
         self._nodes: dict[tuple[object, ...], Node] = {}
@@ -102,7 +102,7 @@ class Terms:
         return found
 
     def constant(self, value: Number) -> Node:
-        """An exact rational (a float becomes the fraction it is)."""
+        """Node of an exact rational number (a float becomes the equal fraction)."""
         if type(value) is Fraction:
             return self._make("constant", leaf=value)
         if type(value) is not int:
@@ -113,7 +113,7 @@ class Terms:
         return found
 
     def number(self, constant: Constant) -> Node:
-        """A constant of a kernel."""
+        """Node of a constant of a kernel."""
         found = self._numbers.get(constant.text)
         if found is None:
             text = constant.text
@@ -126,7 +126,7 @@ class Terms:
         return self._make("pi", leaf="pi")
 
     def node(self, value: Node | Number) -> Node:
-        """The value itself if it is a node, else the constant."""
+        """Return `value` if it is a node, else the node of the constant."""
         return value if isinstance(value, Node) else self.constant(value)
 
     def element(self, port: str, *index: int | str) -> Node:
@@ -184,7 +184,7 @@ class Terms:
         return self._make("sub", (a, b))
 
     def neg_of(self, a: Node) -> Node:
-        """-a as its own node, keeping `a` shared (a difference would be flipped by `neg`)."""
+        """Separate node for -a, so that `a` stays shared (`neg` would reverse a difference)."""
         return self._make("neg", (a,))
 
     def mul(self, a: Node, b: Node) -> Node:
@@ -199,7 +199,7 @@ class Terms:
         return self._ordered("mul", a, b)
 
     def _scaled(self, number: Node, other: Node) -> Node | None:
-        """Product with a constant, folded; None where nothing folds."""
+        """Folded product with a constant; None where nothing can be folded."""
         if number.kind == _ZERO or other.kind == _ZERO:
             return self.constant(0)
         if number.value is not None and other.value is not None:
@@ -251,14 +251,14 @@ class Terms:
         return self._make(op, (a, b) if a.number <= b.number else (b, a))
 
     def call(self, op: str, *args: Node | Number) -> Node:
-        """Any operation of `ir.OPERATIONS` by name."""
+        """Apply an operation of `ir.OPERATIONS` by name.  ValueError for a wrong arity."""
         nodes = tuple([a if type(a) is Node else self.node(a) for a in args])
         arithmetic = _ARITHMETIC.get(op)
         if arithmetic is not None:
             return arithmetic(self, *nodes)
         row = OPERATIONS[op]
         if len(nodes) != row.arity:
-            raise ValueError(f"{op} takes {row.arity} operands, not {len(nodes)}")
+            raise ValueError(f"{op}: expected {row.arity} operands, found {len(nodes)}")
         if row.at_zero is not None and nodes[0].kind == _ZERO:
             return self.constant(row.at_zero)
         if op == "select" and nodes[0].value is not None:
@@ -288,8 +288,8 @@ class Terms:
     def sum_over_modes(self, term: Node, over: str = LOOP_INDEX) -> Node:
         """Sum of `term` over the loop variable `over` < n.
 
-        A sum that depends on no other loop runs over `LOOP_INDEX`, whatever its letter was, so
-        that equal sums are one node.
+        A sum that depends on no other loop is rewritten with `LOOP_INDEX`, whatever its letter
+        was, so that equal sums are the same node.
         """
         if term.kind == _ZERO:
             return term
@@ -298,7 +298,7 @@ class Terms:
         return self._make("sum", (term,), over)
 
     def _swap(self, node: Node) -> Node:
-        """The same value with the two loop variables exchanged."""
+        """Node of the same value with the two loop variables exchanged."""
         if not node.loops:
             return node
         found = self._swapped.get(node.number)
@@ -314,7 +314,7 @@ class Terms:
         return found
 
 
-#: Operations that fold by methods of their own.
+#: Operations whose folding is a method of Terms.
 _ARITHMETIC: dict[str, Callable[..., Node]] = {
     "neg": Terms.neg, "add": Terms.add, "sub": Terms.sub, "mul": Terms.mul, "div": Terms.div,
     "pow": Terms.power,

@@ -1,4 +1,4 @@
-"""Linear systems of a few unknowns, unrolled on the nodes of a graph; every pivot is guarded."""
+"""Unrolled solution of small linear systems on the nodes of a graph; every pivot is guarded."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from itertools import pairwise
 from mstmm.ir.graph import Graph, Node
 
 NodeMatrix = list[list[Node]]
-#: Takes the condition that a pivot must meet, and its number from zero.
+#: Receives the condition that a pivot must satisfy, and its index.
 PivotGuard = Callable[[Node, int], None]
 
-#: Failure code of a vanishing pivot, known to the sweep driver.
+#: Failure code of a vanishing pivot, as the driver of the sweep expects it.
 SINGULAR = 1
-#: A pivot must exceed this share of its own diagonal entry (of its row where rows are exchanged).
+#: Smallest pivot relative to its diagonal entry (to its row where rows are exchanged).
 RELATIVE_PIVOT = Fraction(1, 10**13)
 
 
@@ -24,13 +24,13 @@ def ldl(
     guard: PivotGuard | None = None,
     relative_pivot: Fraction = RELATIVE_PIVOT,
 ) -> tuple[NodeMatrix, list[Node]]:
-    """A = L diag(d) L^T row by row: (rows of L left of its diagonal of ones, 1 / d).
+    """Factor A = L diag(d) L^T row by row: (rows of L left of its unit diagonal, 1 / d).
 
-    The upper half of A is read.  `guard` takes the conditions on pivots; without it they become
+    The upper half of A is read.  `guard` receives the conditions on pivots; without it they become
     guards of the graph.
 
-    A division for each pivot: sharing one between two pivots (by the minor a c - b^2) is no less
-    accurate, but its products cost what the division saves (measured on balls).
+    Each pivot has its division.  One division for two pivots (by the minor a c - b^2) is as
+    accurate, but its products cost what the division saves (measured on ball hinges).
     """
     n = len(matrix)
     products: NodeMatrix = [[] for _ in range(n)]
@@ -56,7 +56,7 @@ def ldl(
 
 
 def forward(lower: NodeMatrix, column: list[Node]) -> list[Node]:
-    """L^-1 b; only what is left of L's diagonal is read."""
+    """Forward substitution L^-1 b, in place; only entries left of the diagonal of L are read."""
     for i in range(len(column)):
         for k in range(i):
             column[i] = column[i] - lower[i][k] * column[k]
@@ -64,7 +64,7 @@ def forward(lower: NodeMatrix, column: list[Node]) -> list[Node]:
 
 
 def backward(lower: NodeMatrix, column: list[Node]) -> list[Node]:
-    """L^-T b; only what is left of L's diagonal is read."""
+    """Back-substitution L^-T b, in place; only entries left of the diagonal of L are read."""
     n = len(column)
     for i in reversed(range(n)):
         for k in range(i + 1, n):
@@ -79,7 +79,7 @@ def solve_symmetric(
     guard: PivotGuard | None = None,
     relative_pivot: Fraction = RELATIVE_PIVOT,
 ) -> NodeMatrix:
-    """A^-1 B by LDL^T; arguments of `ldl`."""
+    """Solve A^-1 B by LDL^T; the other arguments are those of `ldl`."""
     lower, reciprocal = ldl(graph, matrix, guard, relative_pivot)
     columns = []
     for column in zip(*right, strict=True):
@@ -90,7 +90,7 @@ def solve_symmetric(
 
 
 def solve_by_rows(graph: Graph, matrix: NodeMatrix, right: NodeMatrix) -> NodeMatrix:
-    """A^-1 B with row exchange by selection; the row's own size travels with the row."""
+    """Solve A^-1 B with row exchange by selection; the size of a row is exchanged with it."""
     n, width = len(matrix), len(matrix) + len(right[0])
     rows = [[*m, *r, _size(graph, m)] for m, r in zip(matrix, right, strict=True)]
     reciprocal: list[Node] = []
@@ -115,11 +115,11 @@ def solve_by_rows(graph: Graph, matrix: NodeMatrix, right: NodeMatrix) -> NodeMa
 def lu_from_the_last(
     graph: Graph, matrix: NodeMatrix, relative_pivot: Fraction = RELATIVE_PIVOT
 ) -> NodeMatrix:
-    """A = U L from the last unknown to the first, without row exchange: L below and on the
-    diagonal, whose entries are stored as 1 / L_ii, U with a diagonal of ones above.
+    """Factor A = U L from the last unknown to the first, without row exchange.
 
-    From tips to root a tree fills nothing in.  Every pivot is guarded to be positive, as those of
-    matrices near a positive definite one are.
+    L is stored below and on the diagonal, with 1 / L_ii on it, and U with a unit diagonal above.
+    In this order (tips to root) the factorisation of a tree has no fill-in.  Every pivot is guarded
+    to be positive, as the pivots of matrices near a positive definite one are.
     """
     n = len(matrix)
     rows = [list(row) for row in matrix]
@@ -134,7 +134,7 @@ def lu_from_the_last(
 
 
 def solve_from_the_last(factors: NodeMatrix, right: list[Node]) -> list[Node]:
-    """A^-1 b by what `lu_from_the_last` has left of A."""
+    """Solve A^-1 b from the factors of `lu_from_the_last`."""
     n, found = len(right), list(right)
     for i in reversed(range(n)):
         for k in range(i):
@@ -147,12 +147,12 @@ def solve_from_the_last(factors: NodeMatrix, right: list[Node]) -> list[Node]:
 
 
 def triangle(graph: Graph, matrix: NodeMatrix, count: int) -> NodeMatrix:
-    """The first `count` rows of R, A = Q R, by rotations of neighbouring rows (Givens).
+    """First `count` rows of R in A = Q R, by Givens rotations of neighbouring rows.
 
-    Column by column, the lowest row first; entries known to be zero are rotated by nothing.  The
-    diagonal is made nowhere negative.  Of a small row beside a large one the digits stay, whichever
-    is above, which reflections of whole columns do not grant (Bjoerck, Numerical Methods for Least
-    Squares Problems, 1996, ch. 4, on weighted problems).
+    The rotations proceed column by column, the lowest row first, and skip entries known to be
+    zero.  No diagonal entry of R is negative.  A small row keeps its digits next to a large one,
+    whatever their order; reflections of whole columns do not ensure that (Bjoerck, Numerical
+    Methods for Least Squares Problems, 1996, ch. 4, on weighted problems).
     """
     rows = [list(row) for row in matrix]
     zero, one = graph.constant(0), graph.constant(1)
@@ -169,8 +169,10 @@ def triangle(graph: Graph, matrix: NodeMatrix, count: int) -> NodeMatrix:
 
 
 def _rotate(graph: Graph, rows: NodeMatrix, upper: int, lower: int, k: int) -> None:
-    """Entry k of the lower row made zero, that of the upper one positive; no turn where both are
-    zero."""
+    """Rotate two rows so that entry k of the lower is zero and that of the upper positive.
+
+    Where both entries are zero the rows stay unchanged.
+    """
     a, b = rows[upper][k], rows[lower][k]
     zero, one = graph.constant(0), graph.constant(1)
     length = graph.call("sqrt", a * a + b * b)
@@ -191,7 +193,7 @@ def _size(graph: Graph, row: list[Node]) -> Node:
 
 
 def _largest_first(graph: Graph, rows: NodeMatrix, i: int) -> None:
-    """Bring the row whose entry i is largest in magnitude to place i."""
+    """Move the row whose entry i is largest in magnitude to row i."""
     for k in range(i + 1, len(rows)):
         if rows[k][i].value == 0:
             continue
@@ -205,7 +207,7 @@ def _pivot_condition(
     graph: Graph, pivot: Node, diagonal: Node, relative_pivot: Fraction = RELATIVE_PIVOT
 ) -> Node:
     limit = graph.constant(relative_pivot) * diagonal
-    if pivot is diagonal:  # a first pivot is compared with nothing but zero
+    if pivot is diagonal:  # a first pivot is compared with zero only
         limit = graph.constant(0)
     return graph.call("lt", limit, pivot)
 

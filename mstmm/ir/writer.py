@@ -1,4 +1,4 @@
-"""From nodes to statements: what the outputs of a graph need, in dependency order, each once."""
+"""Conversion of nodes to statements, in dependency order, for the outputs of a graph."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .terms import LOOP_BITS, Node, Number, Terms
 
 @dataclass(frozen=True)
 class GuardRequest:
-    """Leave with `code` unless `condition` holds."""
+    """Request to leave the kernel with `code` unless `condition` holds."""
 
     condition: Node
     code: int
@@ -36,21 +36,21 @@ class GuardRequest:
 
 @dataclass(frozen=True)
 class StoreRequest:
-    """Write an output; `value` as `Graph.kernel` takes it."""
+    """Request to write an output; `value` has the form that `Graph.kernel` expects."""
 
     port: Port
     value: object
 
 
 class _Level:
-    """What stands inside the same loops: statements, and operands known there."""
+    """Statements inside the same loops, and the operands known there."""
 
     def __init__(self, loops: int, outer: _Level | None, statements: list[Any]) -> None:
         self.loops, self.outer, self.statements = loops, outer, statements
         self.known: dict[int, Operand] = {}
 
     def home(self, node: Node) -> _Level:
-        """The outermost level that runs through every loop which `node` depends on."""
+        """Outermost level inside all loops that `node` depends on."""
         level = self
         while level.outer is not None and not node.loops & ~level.outer.loops:
             level = level.outer
@@ -58,7 +58,7 @@ class _Level:
 
 
 class Writer:
-    """Emits nodes in dependency order, each once, with temporaries numbered densely."""
+    """Writer of statements: emits each node once, in dependency order, temporaries from 0."""
 
     def __init__(self, graph: Terms) -> None:
         self.graph = graph
@@ -85,7 +85,7 @@ class Writer:
     def as_made(
         self, guards: Iterable[GuardRequest], outputs: Iterable[Port], values: dict[str, object]
     ) -> None:
-        """Everything in the order of the nodes' numbers."""
+        """Emit all statements in the order in which the nodes were created."""
         waiting: dict[int, list[Callable[[], Statement]]] = {}
         roots: list[Node] = []
 
@@ -111,7 +111,7 @@ class Writer:
         return Constant("pi") if node.op == "pi" else None
 
     def _emit(self, root: Node, level: _Level) -> Operand:
-        """What depends on a loop goes inside; what does not is computed before the loop."""
+        """Emit a node; terms that do not depend on a loop are computed before it."""
         stack = [root]
         while stack:
             node = stack[-1]
@@ -140,7 +140,7 @@ class Writer:
         over = str(node.leaf)
         if home.loops & LOOP_BITS[over]:
             raise ValueError(
-                "loops are nested more than two deep; store an inner product as an output first"
+                "loops are nested more than two deep; store the inner product as an output first"
             )
         inner = _Level(home.loops | LOOP_BITS[over], home, [])
         value = self._emit(node.args[0], inner)
@@ -164,7 +164,7 @@ class Writer:
 
 
 def _behind(roots: Iterable[Node]) -> list[Node]:
-    """`roots` and everything that they are made of."""
+    """Nodes that `roots` depend on, including themselves."""
     found: dict[int, Node] = {}
     stack = list(roots)
     while stack:
@@ -178,14 +178,14 @@ def _behind(roots: Iterable[Node]) -> list[Node]:
 def _flatten(
     value: object, shape: tuple[int | str, ...], letters: tuple[str, ...] = LOOPS
 ) -> list[tuple[tuple[int | str, ...], Node | Number | None]]:
-    """Entries with their indices; along a run-time size one value stands for all k (l) < n."""
+    """Entries with their indices; along a run-time size one value holds for all k (l) < n."""
     if not shape:
         return [((), value)]  # type: ignore[list-item]
     if isinstance(shape[0], str):
         inside = _flatten(value, shape[1:], letters[1:])
         return [((letters[0], *rest), v) for rest, v in inside]
     if not isinstance(value, (list, tuple)) or len(value) != shape[0]:
-        raise ValueError(f"{value!r} does not fill the shape {shape}")
+        raise ValueError(f"expected values of shape {shape}, found {value!r}")
     return [
         ((i, *rest), v)
         for i, entry in enumerate(value)

@@ -196,7 +196,7 @@ radius = 0.5
 axis = [0, 1, 0]
 """)
     shown = mstmm("linearize", "coin.toml", "--at-start").out
-    assert "trusted: no check speaks against it" in shown
+    assert "trusted: no check objects to it" in shown
     assert "-7.848 fly.wx_increment, -2.4 fly.wz" in shown
     modes = json.loads(mstmm("modes", "coin.toml", "--at-start", "--json").out)
     assert modes["omega"][-1] == pytest.approx(math.sqrt(12 / 5 * 16 - 4 / 5 * 9.81 / 0.5))

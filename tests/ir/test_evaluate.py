@@ -65,7 +65,7 @@ def test_a_failed_guard_speaks() -> None:
 def test_missing_and_misfit_inputs_are_named() -> None:
     with pytest.raises(ValueError, match="area: no value for the input 'B'"):
         evaluate(KERNEL, {"a": 1})
-    with pytest.raises(ValueError, match=r"area: B holds 4 numbers \[2, 2\], not 3"):
+    with pytest.raises(ValueError, match=r"area: B: expected 4 numbers \[2, 2\], found 3"):
         evaluate(KERNEL, {"a": 1, "B": [1, 2, 3]})
 
 

@@ -126,11 +126,11 @@ def test_free_text_cannot_break_the_c(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["a b", "x;y", "1st", "", "a-b", "größe", "a\n"])
 def test_names_that_are_not_c_names_are_refused(name: str) -> None:
-    with pytest.raises(ValueError, match="is not a name C accepts"):
+    with pytest.raises(ValueError, match="is no valid C name"):
         element_source(dataclasses.replace(SPEC, name=name))
-    with pytest.raises(ValueError, match="is not a name C accepts"):
+    with pytest.raises(ValueError, match="is no valid C name"):
         element_source(element("e", KernelIR(name, (), (), ())))
-    with pytest.raises(ValueError, match="is not a name C accepts"):
+    with pytest.raises(ValueError, match="is no valid C name"):
         element_source(element("e", KernelIR("k", (Port(name),), (), ())))
 
 

@@ -191,7 +191,7 @@ def test_values_must_fill_their_port() -> None:
     graph = Graph()
     x = graph.vector("x", 2)
     for values in (x[:1], x[0], [x]):
-        with pytest.raises(ValueError, match=r"does not fill the shape \(2,\)"):
+        with pytest.raises(ValueError, match=r"expected values of shape \(2,\)"):
             graph.kernel("k", [Port("x", (2,))], [Port("y", (2,))], {"y": values})
 
 

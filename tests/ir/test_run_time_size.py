@@ -153,7 +153,7 @@ def test_stored_form_gives_the_kernel_back() -> None:
 
 
 def test_a_tape_has_no_loops() -> None:
-    with pytest.raises(ValueError, match="fixed sizes, not 'n'"):
+    with pytest.raises(ValueError, match="needs fixed sizes, found the size 'n'"):
         compile_tape(KERNEL)
 
 

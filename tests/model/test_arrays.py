@@ -64,14 +64,14 @@ MISFITS: dict[str, tuple[Call, str]] = {
     "a misfit of width": (lambda m: m.mass_matrix([0.1]), "q has shape (1,), expected (..., 2)"),
     "a misfit of rows": (
         lambda m: m.accelerations(MANY, MANY[:2]),
-        "shapes do not fit: t (), q (3, 2), u (2, 2); expected as many states in each",
+        "shapes do not match: t (), q (3, 2), u (2, 2); expected the same number of states in each",
     ),
-    "rows of derivatives": (lambda m: m.derivatives(MANY, MANY[:2]), "shapes do not fit"),
+    "rows of derivatives": (lambda m: m.derivatives(MANY, MANY[:2]), "shapes do not match"),
     "efforts of other rows": (
         lambda m: m.accelerations(MANY, U, efforts=MANY[:2]), "efforts (2, 2)",
     ),
     "rows of unequal length": (
-        lambda m: m.accelerations([[0.1, 0.2], [0.3]], U), "every row as long",
+        lambda m: m.accelerations([[0.1, 0.2], [0.3]], U), "with rows of equal length",
     ),
     "text": (lambda m: m.accelerations("30 deg", U), "q = '30 deg': expected an array of real"),
     "masked numbers": (
@@ -180,7 +180,7 @@ def test_numbers_of_other_libraries_are_numbers(model: Any) -> None:
 
 @pytest.mark.parametrize("name", ["step", "rtol", "t_end"])
 def test_a_number_beyond_all_floats_is_refused(model: Any, name: str) -> None:
-    with pytest.raises(mstmm.SceneError, match=f"{name} is beyond 1.8e308: expected"):
+    with pytest.raises(mstmm.SceneError, match=f"{name} exceeds 1.8e308: expected"):
         model.simulate(**{"t_end": 0.1, name: 10**5000})
 
 
