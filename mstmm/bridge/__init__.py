@@ -1,1 +1,1 @@
-"""What joins derivation and numbers: compiling a scene, fusing it, and comparing both."""
+"""Pipeline from a scene to a compiled model: connects derivation and numerical code."""

@@ -1,4 +1,4 @@
-"""The smallest sufficient model of a scene: compiles what `runtime.advice` tries."""
+"""Advice on the smallest sufficient model of a scene; compiles the models for `runtime.advice`."""
 
 from __future__ import annotations
 
@@ -28,29 +28,29 @@ def advise(
     progress: Callable[[str], None] | None = None,
     state: Callable[[str], None] | None = None,
 ) -> Advice:
-    """The smallest model of a scene that errs by no more than what is asked.
+    """Find the smallest model of a scene whose error does not exceed the target error.
 
     Args:
         scene: a scene, or a model of one.
         t_end: end of the run that the advice is for, s.
-        error: largest error wanted, above 0; below 1 unless it is that of one quantity.
-        of: quantity or quantities whose error is meant, of one in its unit, of several each in
-            parts of its largest excursion; otherwise the places of all bodies and ends, in parts of
+        error: target error, above 0; below 1 unless it is that of one quantity.
+        of: quantity or quantities that the error refers to: one in its unit, several each relative
+            to its largest excursion.  Default: the positions of all bodies and ends, relative to
             the length of the scene.
-        budget: s of the clock that the runs may take.
-        samples: times from 0 to t_end at which errors are looked at; the largest counts.
-        rounds: how often processor times are taken again.
-        engine: as in `compile`, for all that is compiled here.
+        budget: wall-clock time limit of the runs, s.
+        samples: number of output times from 0 to t_end for the error; the largest error counts.
+        rounds: repetitions of the measurement of CPU times.
+        engine: as in `compile`, for all models that are compiled here.
         progress: called with a sentence before every run.
-        state: called with what is compared, and over what time.
+        state: called with a description of the comparison and its time span.
 
-    A run in which bodies deform one way tells what each of them may be; the models that follow
-    from it are run beside the richest one, whole or over a window where that takes too long, until
-    nothing less suffices.  Errors are against the richest model; `BodyAdvice.split` says where that
-    is too little itself.
+    A run with one-way coupled bodies shows which levels each body may have.  The models that follow
+    are compared with the richest one until no smaller one suffices, over the whole run, or over a
+    window where that takes too long.  Errors are relative to the richest model; `BodyAdvice.split`
+    reports bodies for which the richest model is not sufficient.
 
-    Raises SceneError for arguments that make no sense, NumericalFailure for a scene that does not
-    run, or whose motion cannot be told to within what is asked.
+    Raises SceneError for invalid arguments, NumericalFailure for a scene that cannot be simulated,
+    or whose motion cannot be determined to within the target error.
     """
     from ..runtime.advice.advising import advised
     from ..runtime.advice.request import request
@@ -70,4 +70,4 @@ def advise(
 
 
 def _quiet(_: str) -> None:
-    """Nobody listens."""
+    """Ignore a message: default of `progress` and `state`."""

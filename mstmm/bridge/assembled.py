@@ -1,4 +1,4 @@
-"""A scene that begins where its loops are closed, as a scene of its own."""
+"""Scene whose initial state is the assembled one, with closed loops."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from mstmm.scene.tables.closures import CURVE
 if TYPE_CHECKING:
     from mstmm.runtime.model.model import Model
 
-#: How far members of chains, which share their starts, may be from them (rad, m, and a second).
+#: Largest deviation of members of a chain from their common start (rad, m; rad/s, m/s).
 _SAME = 1e-9
 
 
 def assembled(model: Model) -> Scene:
-    """The scene of a model with the start that was found for it: wishes are what they became.
+    """Scene of a model with its assembled initial state in place of the given start values.
 
-    Raises SceneError for members of chains that do not begin as their chain says.
+    Raises SceneError for members of a chain whose assembled start differs from that of the chain.
     """
     q, u = model.initial_state()
     data = tomllib.loads(model.scene.to_toml())
@@ -57,7 +57,7 @@ def _refuse_chains(model: Model, q: Array, u: Array) -> None:
         found = [*q[slots.q_slice], *u[slots.u_slice]]
         if np.abs(np.subtract(wishes, found)).max(initial=0.0) > _SAME:
             raise SceneError(
-                f'scene: chain "{hinge.name.partition("[")[0]}": "{hinge.name}" begins at '
-                f"{found[0]:.9g} where its loop closes, and members of a chain share their start; "
-                "write them as [[body]] and [[hinge]]"
+                f'scene: chain "{hinge.name.partition("[")[0]}": "{hinge.name}" starts at '
+                f"{found[0]:.9g} once its loop is closed, but members of a chain share their "
+                "start; write them as [[body]] and [[hinge]]"
             )

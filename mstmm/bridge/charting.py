@@ -1,4 +1,4 @@
-"""Cost against accuracy of a scene: compiles its levels of model for `runtime.chart`."""
+"""Work-precision chart of a scene; compiles its model levels for `runtime.chart`."""
 
 from __future__ import annotations
 
@@ -31,38 +31,38 @@ def chart(
     progress: Callable[[str], None] | None = None,
     state: Callable[[str], None] | None = None,
 ) -> Chart:
-    """What accuracy costs: every method over its tolerances or steps, and which one to take.
+    """Measure CPU time against error of every method, and recommend the cheapest setting.
 
     Args:
         scene: a scene, or a model of one.
         t_end: end of every run, s.
-        quantities: names such as "rod.tip.position": errors are of this quantity in its unit, of
-            several each in parts of its largest excursion; otherwise of all coordinates, or with
-            `models` of the places of all bodies and ends, scaled as `reference.scaling` says.
-        methods: names, one or more; otherwise every method that `simulate` knows.
-        models: also every level of model of the flexible bodies: rigid, one-way, linear and
-            stiffened with 1 to n shapes, planar where nothing leaves the plane.  Errors are then
-            against the richest level.
-        error: for which the cheapest setting is recommended.
-        budget: s of the clock that the runs may take; what did not fit in is told.
-        samples: how many even times from 0 to t_end errors are looked at; the largest counts.  By
-            default 101, and up to three times as many beside them where the motion is so fast that
-            a run takes several steps between two.
-        rounds: how often the processor times are taken again, all points in turn.
-        engine: as in `compile`, for what is compiled here; "auto" is "looped" with `models`, so
-            that all levels run alike and no compiler takes the time.
-        title: of the pictures.
+        quantities: names such as "rod.tip.position" that errors refer to: one quantity in its unit,
+            several each relative to its largest excursion.  Default: all coordinates, or with
+            `models` the positions of all bodies and ends, scaled as `reference.scaling` states.
+        methods: names, one or more.  Default: every method of `simulate`.
+        models: whether to include every model level of the flexible bodies: rigid, one-way, linear
+            and stiffened with 1 to n shapes, planar where all motion stays in the plane.  Errors
+            are then relative to the richest level.
+        error: target error for which the cheapest setting is recommended.
+        budget: wall-clock time limit of the runs, s; settings omitted for lack of time are listed.
+        samples: number of equidistant output times from 0 to t_end for the error; the largest error
+            counts.  Default: 101, with up to three times as many additional times where a run takes
+            several steps between two of them.
+        rounds: repetitions of the measurement of CPU times, each over all points.
+        engine: as in `compile`, for models compiled here; "auto" is "looped" with `models`, so
+            that all levels use the same engine and no time is spent on compilers.
+        title: title of the plots.
         progress: called with a sentence before every run.
-        state: called with the plan of the time, and with what the reference is.
+        state: called with the time plan, and with a description of the reference.
 
-    The reference is a run at tight tolerances that agrees with one of another method; its own error
-    is stated, and points below three times that are marked.  A fixed step of which `simulate` says
-    that it is too long is never recommended; what else runs warn of goes with their points.
+    The reference is a run at tight tolerances that agrees with a run of another method; its error
+    is stated, and points below three times that error are marked.  A fixed step that `simulate`
+    reports as too long is never recommended; other warnings of a run are kept with its point.
 
-    Where loops are closed, methods that do not follow them are left out, with the reason.
+    For scenes with closed loops, methods that do not support them are left out, with the reason.
 
-    Raises SceneError for arguments that make no sense, NumericalFailure where no reference is found
-    within its part of the budget.
+    Raises SceneError for invalid arguments, NumericalFailure if no reference is found within its
+    part of the budget.
     """
     from ..runtime.chart.charting import charted, request
 
@@ -83,4 +83,4 @@ def chart(
 
 
 def _quiet(_: str) -> None:
-    """Nobody listens."""
+    """Ignore a message: default of `progress` and `state`."""

@@ -1,8 +1,8 @@
-"""The closed equations M(q) u' + h(q, u, t) = tau of a small scene, by replay on formulas.
+"""Symbolic equations M(q) u' + h(q, u, t) = tau of a small scene, in closed form.
 
-The schedule of inverse dynamics, which gives the efforts that accelerations need, is run on symbols
-for coordinates, speeds, accelerations and time; it is linear in the accelerations, so that M is
-what stands by them.  No second derivation.
+The schedule of inverse dynamics, which gives the efforts that accelerations need, is interpreted on
+symbols for coordinates, speeds, accelerations and time.  It is linear in the accelerations, so that
+their coefficients are M.  There is no second derivation.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from .symbolic import replayed
 if TYPE_CHECKING:
     from ..runtime.model.model import Model
 
-#: More speeds than this are refused, and more products of terms (some seconds).
+#: Largest number of speeds, and of products of terms (some seconds).
 MOST_SPEEDS, MOST_PRODUCTS = 12, 300_000
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A coordinate or a speed: its symbol, its name in the scene, its unit."""
+    """Coordinate or speed: its symbol, its name in the scene, its unit."""
 
     symbol: Any
     name: str
@@ -44,17 +44,17 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class ClosedEquations:
-    """M(q) u' + h(q, u, t) = tau of the speeds that nobody imposes, SI units.
+    """Equations M(q) u' + h(q, u, t) = tau of the n free speeds, in SI units.
 
     Attributes:
-        M: (n, n) `sympy.ImmutableMatrix`.
-        h: (n, 1): what the motion needs at u' = 0, gravity, laws and loads in it.
-        coordinates, speeds: all of the scene, in its order; `free` are the places of the n.
-        accelerations: symbols of those that drives impose, which stand in h.
-        inputs: symbols by name ("push") of inputs and signals that occur, their values at t, and of
+        M: mass matrix, (n, n) `sympy.ImmutableMatrix`.
+        h: bias force (n, 1): efforts at u' = 0, including gravity, hinge laws and loads.
+        coordinates, speeds: all of the scene, in its order; `free` are the indices of the n.
+        accelerations: symbols of the prescribed accelerations, which occur in h.
+        inputs: symbols by name ("push") of the values at t of inputs and signals that occur, and of
             rates of those that drives follow ("push.rates[0]", 1/s; "push.rates[1]", 1/s^2).
         parameters: symbols by name.
-        numbers: what symbols are at the start; `M.subs(numbers)` is the mass matrix there.
+        numbers: values of the symbols at the start; `M.subs(numbers)` is the mass matrix there.
     """
 
     M: Any = field(repr=False)
@@ -69,9 +69,10 @@ class ClosedEquations:
 
 
 def closed(model: Model, keep: Sequence[str] = ()) -> ClosedEquations:
-    """The closed equations of a tree, in numbers of the scene that are kept by name ("rod1.mass").
+    """Derive the equations of motion of a tree in closed form.
 
-    Every branch of what switches stays, as a Piecewise.
+    The numbers of the scene listed in `keep` ("rod1.mass") stay symbols.  Every branch of functions
+    that switch is kept, as a Piecewise.
 
     Raises SceneError for closed loops, laws with a memory, hinges that are released, numbers of
     flexible bodies, names that the scene does not have, and scenes that are too large.
@@ -87,23 +88,23 @@ def _refuse(model: Model) -> None:
     scene = model.packed
     if model.nu > MOST_SPEEDS:
         raise SceneError(
-            f"closed equations of {model.nu} speeds fill pages; the limit is {MOST_SPEEDS}; take "
-            "mass_matrix and inverse_dynamics, which are numbers"
+            f"equations in closed form: expected at most {MOST_SPEEDS} speeds, found {model.nu}; "
+            "use mass_matrix and inverse_dynamics, which give numbers"
         )
     if model.loops.cut:
         raise SceneError(
-            "closed equations are those of trees, and this scene has closed loops; open them, or "
-            "take linearize, which knows them"
+            "equations in closed form: expected a tree, found a scene with closed loops; open "
+            "them, or use linearize, which supports loops"
         )
     if scene.releases:
         raise SceneError(
-            f'hinge "{next(iter(scene.releases))}" is released during the run, so that the '
-            "equations change their form; take the release out"
+            f'hinge "{next(iter(scene.releases))}" is released during the run, which changes the '
+            "form of the equations; remove the release"
         )
 
 
 class _Closing:
-    """Symbols of one scene, and what inverse dynamics makes of them."""
+    """Symbols of one scene, and their equations of motion by inverse dynamics."""
 
     def __init__(self, model: Model, keep: Sequence[str]) -> None:
         self.model, self.book = model, Book(MOST_PRODUCTS)
@@ -129,7 +130,7 @@ class _Closing:
         self.inputs = dict(self._inputs(self.structure, system.inputs_at(0.0).tolist()))
 
     def _inputs(self, structure: Structure, given: list[float]) -> Iterator[tuple[str, Formula]]:
-        """Symbols for values and rates of the inputs at t, as of pieces that begin there."""
+        """Symbols for values and rates of the inputs at t, as of polynomial pieces from t on."""
         places = dict(structure.inputs)
         for entry, place in places.items():
             self.p[place] = given[entry]
@@ -178,12 +179,12 @@ class _Closing:
 
 
 def _short(letter: str, owner: str, name: str, count: int) -> str:
-    """q_pivot of a hinge with one coordinate, q_ball.x of one with several."""
+    """Name of a symbol: q_pivot for a hinge with one coordinate, q_ball.x for several."""
     return f"{letter}_{owner}" if count == 1 else f"{letter}_{owner}.{name}"
 
 
 def _without(x: Formula, symbols: Sequence[Formula]) -> Formula:
-    """The terms without any of these symbols."""
+    """Terms of a formula that contain none of these symbols."""
     atoms = {atom for symbol in symbols for monomial in symbol.terms for atom, _ in monomial}
     kept = {m: c for m, c in x.terms.items() if not any(atom in atoms for atom, _ in m)}
     return formula(0.0) if not kept else Formula(x.value, kept)

@@ -1,4 +1,4 @@
-"""Scene -> Model: chooses the engine and says why.  With `crosscheck`, the bridge between rooms."""
+"""Compilation of a scene into a Model, with the choice of engine and sweep and its reason."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SWEEPS = ("auto", "riccati", "refined", "qr", "product")
 
 @dataclass(frozen=True)
 class Generated:
-    """An element of the kernel store: its kernels, its folder, and how it runs."""
+    """Element of the kernel store: its kernels, its folder, and the way it is executed."""
 
     spec: ElementSpec
     folder: Path
@@ -42,38 +42,38 @@ def compile_scene(
     flexibility: str | None = None,
     simplify: bool | Collection[str] | Mapping[str, bool | float] = True,
 ) -> Model:
-    """Model of a scene, ready to compute.
+    """Compile a scene into a model.
 
     Args:
         scene: validated scene (`load_scene`, or `Scene(...)`), or the path of a scene file.
-        engine: "looped" (element kernels driven by a loop: any size, no compiler), "fused" (code
-            of this scene alone, compiled now or found in the cache; a C compiler is needed, pays
-            up to about 60 bodies, possible up to 400), or "auto": fused code that is in the cache
-            is used, and a run or batch long enough to repay the compiler has it built.
-        sweep: "auto" (the first of the next three by which the start of a tree keeps its digits,
-            if the scene can have it; `model.sweep` tells which), "riccati" (any tree), "refined"
-            (what its answer leaves over is answered again, as often as the start needs: digits
-            stay where heavy bodies hang behind light ones; closed loops do so by themselves), "qr"
-            (the same as least squares: slower, for any ratio of masses; rigid bodies, looped
-            engine, and explicit methods), which both leave the equilibrium and derivatives to the
-            Riccati sweep, or "product" (the plain product of classical transfer matrices along a
-            chain and loops closed on it, guarded).
-        accuracy: with "product", the largest deviation from the Riccati sweep, relative to the
-            largest acceleration, that is not an error.
-        bake: with "fused", make the scene's numbers part of the code instead of reading them at run
-            time: somewhat faster, but other parameters need the compiler again.
-        flexibility: level of model of all flexible bodies: "coupled", "one-way" (they are rigid in
-            the run, then respond elastically to its motion and loads) or "rigid"; None takes each
-            body's own `model`.
-        simplify: what may be packed otherwise than the scene says it: True, False, or a list of
-            "welds" (rigid bodies on fixed hinges as one), "turns" (orientations within 1e-11 rad of
-            quarter turns are these) and "links" (the looped engine's kernels that know how pins,
-            prismatics, rotors on them, and balls move); a table changes one and leaves the others
+        engine: "looped" (element kernels called in a loop: any size, no compiler), "fused" (code
+            for this scene only, compiled now or found in the cache; needs a C compiler, pays off
+            up to about 60 bodies, possible up to 400), or "auto": uses fused code from the cache,
+            and builds it for a run or batch long enough to repay the compilation.
+        sweep: "auto" (the first of the next three that keeps the digits of a tree's accelerations
+            at the start, if the scene supports it; see `model.sweep`), "riccati" (any tree),
+            "refined" (iterative refinement, as often as the start needs: accurate for heavy bodies
+            outboard of light ones; closed loops are always refined), "qr" (least squares: slower,
+            accurate for any mass ratio; rigid bodies, looped engine and explicit methods only), or
+            "product" (the plain product of classical transfer matrices along a chain and loops
+            closed on it, with an error check).  With "refined" and "qr" the equilibrium and
+            derivatives use the Riccati sweep.
+        accuracy: with "product", the largest accepted deviation from the Riccati sweep, relative to
+            the largest acceleration.
+        bake: with "fused", write the numbers of the scene into the code instead of reading them at
+            run time: somewhat faster, but other parameters need another compilation.
+        flexibility: model level of all flexible bodies: "coupled", "one-way" (rigid in the run,
+            then elastic response to its motion and loads) or "rigid"; None uses the `model` of each
+            body.
+        simplify: simplifications before packing: True, False, or a list of "welds" (rigid bodies
+            joined by fixed hinges become one), "turns" (orientations within 1e-11 rad of quarter
+            turns are rounded to these) and "links" (special kernels of the looped engine for pins,
+            prismatics, rotors on them, and balls).  A table changes one and keeps the others
             ({"turns": 1e-5}: another tolerance, rad; {"turns": 0}: none).
-            `model.simplifications` tells what was done.
+            `model.simplifications` lists those applied.
 
-    Raises SceneError for hinges that do not form a tree, types that nobody defines, and masses that
-    leave a motion of the start undetermined, and outputs of what results do not have;
+    Raises SceneError for hinges that do not form a tree, unknown types, masses that leave a motion
+    undetermined at the start, and outputs of quantities that results do not have;
     EnvironmentFailure if engine="fused" and there is no compiler or it fails.
     """
     if isinstance(scene, str | os.PathLike):
@@ -95,8 +95,11 @@ def compile_level(
     flexibility: str | None = None,
     simplify: bool | Collection[str] | Mapping[str, bool | float] = True,
 ) -> Model:
-    """The same of a scene at a lower level of model, which may lack what an output is of: its
-    results do not have that output."""
+    """Compile a scene at a model level that may lack quantities of its outputs.
+
+    Arguments and errors are those of `compile_scene`, but outputs of missing quantities are no
+    error: results do not have them.
+    """
     if word_of("engine", engine, f"one of {', '.join(ENGINES)}") not in ENGINES:
         raise SceneError(f'engine "{engine}" is not known; there are: {", ".join(ENGINES)}')
     if word_of("sweep", sweep, f"one of {', '.join(SWEEPS)}") not in SWEEPS:
@@ -120,7 +123,7 @@ def compile_level(
     if yes_or_no("bake", bake) and engine != "fused":
         raise SceneError(
             "bake = True writes the numbers of the scene into its code; "
-            'it goes with engine = "fused"'
+            'it requires engine = "fused"'
         )
     refused = "asked for" if engine == "looped" else ""
     most = MOST_ASKED if engine == "fused" else MOST_BODIES
@@ -143,7 +146,7 @@ def compile_level(
 
 
 def _with_digits(made: Callable[[str], Model], engine: str) -> Model:
-    """By the cheapest sweep that keeps the digits of the start, and that the scene can have."""
+    """Model with the cheapest sweep that is accurate at the start and that the scene supports."""
     from ..runtime.guard.heavy import sweep_that_keeps_digits
 
     model = made("riccati")
@@ -158,11 +161,11 @@ def _with_digits(made: Callable[[str], Model], engine: str) -> Model:
 
 
 def generate(elements: Iterable[Element], definition: str | None = None) -> list[Generated]:
-    """Check, derive, generate and compile elements into the user's kernel store, which keeps the
-    text of the file that defines them, so that their equations can be shown.
+    """Check, derive and compile elements into the user's kernel store.
 
-    Raises ElementError naming the equation that is wrong, EnvironmentFailure if the store cannot be
-    written.  A name that a built-in element has is refused.
+    The store keeps `definition`, the text of the defining file, so that their equations can be
+    shown.  Raises ElementError that names the wrong equation, or for the name of a built-in
+    element; EnvironmentFailure if the store cannot be written.
     """
     from ..derive.audit.definition import check
     from ..derive.catalogue.registry import kind_of
@@ -186,14 +189,14 @@ def generate(elements: Iterable[Element], definition: str | None = None) -> list
 
 
 def generate_file(path: str | Path) -> list[Generated]:
-    """`generate` for every element that a Python file defines.  The file is executed: trust it."""
+    """Generate every element that a Python file defines; the file is executed.  See `generate`."""
     from ..derive.catalogue.registry import load_file
 
     return generate(load_file(path), Path(path).read_text(encoding="utf-8"))
 
 
 def generate_published() -> list[Generated]:
-    """`generate` for every element that installed packages publish as entry points.
+    """Generate every element that installed packages publish as entry points.  See `generate`.
 
     The group is "mstmm.elements"; an entry names a class or a module of classes.
     """
@@ -203,7 +206,10 @@ def generate_published() -> list[Generated]:
 
 
 def register(element: type[Element]) -> Generated:
-    """Make a hinge, body or force element of your own known to scenes by its name."""
+    """Register a user-defined hinge, body or force element, so that scenes can use its name.
+
+    Errors are those of `generate`.
+    """
     from ..derive.catalogue.registry import instance
 
     return generate([instance(element)])[0]

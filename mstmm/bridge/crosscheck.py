@@ -1,9 +1,10 @@
-"""Every kernel of an element three ways, and what mechanics asks of it.
+"""Cross-check of the kernels of an element in three forms, and of statements of mechanics.
 
-The stated equations at 50 digits (`derive.audit.evaluate_equations`), the IR at 50 digits, the
-compiled C in doubles within the bound that running error analysis gives for its rounding (where
-there is no C, the engine's interpreter); at random points and at those where a formula could break.
-Beside that what `derive.audit.properties` states.
+The three forms are the stated equations at 50 digits (`derive.audit.evaluate_equations`), the IR at
+50 digits, and the compiled C in doubles (where there is no C, the engine's interpreter).  The error
+of C must not exceed the rounding bound of a running error analysis.  They are compared at random
+points, and at points where a formula could fail.  `derive.audit.properties` has the statements of
+mechanics.
 
     report = mstmm.bridge.crosscheck.crosscheck("hinge", "pin")
     print(report); report.passed
@@ -32,20 +33,20 @@ if TYPE_CHECKING:
     from ..derive.catalogue.registry import Element as Definition
     from ..runtime.kernels.prebuilt import Element as Compiled
 
-#: Largest relative difference between specialised and generic kernels in doubles.
+#: Largest accepted relative difference between specialised and generic kernels in doubles.
 SPECIALISED = 1e-13
-#: Largest deviation of a derivative from its difference quotient in sixty digits.
+#: Largest accepted deviation of a derivative from its difference quotient at 60 digits.
 DIFFERENCES = 1e-25
 
 
-# --- what is checked ------------------------------------------------------------------------------
+# --- subjects of a check --------------------------------------------------------------------------
 
 
 def crosscheck(kind: str, name: str, points: int = 2) -> Report:
     """Check a built-in element, or one of the kernel store (its IR and C; its file is not run).
 
-    `points` random points per kernel besides the special ones.  Raises ElementError for a name
-    that nobody knows.
+    `points` is the number of random points per kernel in addition to the special ones.  Raises
+    ElementError for an unknown name.
     """
     from ..derive.catalogue.kernels import maker
     from ..derive.catalogue.registry import builtin_elements, kind_of
@@ -60,20 +61,22 @@ def crosscheck(kind: str, name: str, points: int = 2) -> Report:
         )
         subject = replace(_subject(kind, name, element, kernels, compiled), interpreted=True)
         return subject.report(points, ())
-    if compiled is not None:  # kernels of other elements where some numbers are known
+    if compiled is not None:  # instances of other elements with some known numbers
         text = (files("mstmm") / "generated" / f"{kind}_{name}.json").read_text(encoding="utf-8")
         subject = _Subject.stored(element_from_json(text), compiled)
-        return subject.report(points, ("its equations are those of what it is an instance of",))
+        return subject.report(points, ("its equations are those of the general element",))
     stored = store.spec((kind, name))
     if stored is None:
-        raise ElementError(f"there is no {kind} called {name!r}; mstmm list shows what there is")
+        raise ElementError(f"there is no {kind} named {name!r}; mstmm list shows all elements")
     compiled = store.opened((kind, name), stored.hash())
     subject = _Subject.stored(stored, compiled)
-    return subject.report(points, ("its definition is not kept; name its file to check it too",))
+    return subject.report(
+        points, ("its definition is not stored; give its file to check the equations too",)
+    )
 
 
 def crosscheck_definition(element: Definition, points: int = 2) -> Report:
-    """Check an element of the user's, with its equations; the C if the store has this very one."""
+    """Check a user-defined element with its equations, and its C if the store has it."""
     from ..derive.catalogue.kernels import kernels_of
     from ..derive.catalogue.registry import kind_of
     from ..derive.catalogue.specs import spec_from
@@ -89,7 +92,7 @@ def crosscheck_definition(element: Definition, points: int = 2) -> Report:
 def mechanics(
     kind: str, name: str, kernels: Sequence[Kernel], element: Definition | None = None
 ) -> tuple[Statement, ...]:
-    """The statements of mechanics alone, for kernels whose derivations are given."""
+    """Statements of mechanics only, for kernels whose derivations are given."""
     subject = _subject(kind, name, element, kernels, None)
     return tuple(Statement(*found) for found in subject.statements())
 
@@ -102,7 +105,7 @@ def crosscheck_kernels(
     compiled: Compiled | None,
     points: int,
 ) -> Report:
-    """Check kernels whose derivations are given, with the compiled element if there is one."""
+    """Check kernels whose derivations are given, and the compiled element if there is one."""
     remarks = () if compiled is not None else ("not generated yet, so there is no C to compare",)
     return _subject(kind, name, element, kernels, compiled).report(points, remarks)
 
@@ -133,7 +136,7 @@ def _subject(
 
 @dataclass(frozen=True)
 class _Subject:
-    """An element's kernels in their three forms; `stated` is empty for a stored element."""
+    """Kernels of an element in their three forms; `stated` is empty for a stored element."""
 
     kind: str
     name: str
@@ -183,7 +186,7 @@ class _Subject:
     def _compare(
         self, kernel: KernelIR, inputs: dict[str, list[float]], n: int
     ) -> tuple[float, float] | str | None:
-        """(equations, compiled) errors; None where all are stopped alike; text where not."""
+        """Errors (equations, compiled); None if guards stop all forms; text if they disagree."""
         from mstmm.ir.replay import GuardFailure
 
         from ..derive.audit.evaluate import evaluate
@@ -211,7 +214,7 @@ class _Subject:
             return None
         first = 0.0 if stated is None else _difference(exact, stated.outputs, inputs)
         if stated is not None and stated.asymmetry > 1e-30 * _size(inputs):
-            return "a quantity called symmetric is not"
+            return "a quantity declared as symmetric is not symmetric"
         second = 0.0 if found is None else self._share(kernel, rounded, found[1], n)
         return first, second
 
@@ -222,7 +225,7 @@ class _Subject:
         got: Mapping[str, Sequence[float]],
         n: int,
     ) -> float:
-        """Largest error of C as a share of its bound."""
+        """Largest error of C relative to its rounding bound."""
         from ..derive.audit.rounding import rounding_bounds
 
         worst = 0.0
@@ -254,7 +257,7 @@ class _Subject:
     # --- statements of mechanics ------------------------------------------------------------------
 
     def _precisely(self, name: str, inputs: dict[str, Any]) -> dict[str, list[Any]]:
-        """One kernel at high precision: by its equations if they are at hand, else by its IR."""
+        """Evaluate a kernel at high precision, by its equations if available, else its IR."""
         from ..derive.audit.evaluate import evaluate
         from ..derive.audit.evaluate_equations import evaluate_equations
         from ..derive.audit.properties import DIGITS
@@ -264,8 +267,10 @@ class _Subject:
         return evaluate(self.irs[name], inputs, DIGITS)
 
     def _judged(self) -> list[tuple[str, float, float]]:
-        """All statements; ElementError where the equations have no value at numbers within the
-        bounds that the definition gives."""
+        """Evaluate all statements of mechanics.
+
+        ElementError if the equations have no value for numbers within the bounds of the definition.
+        """
         from ..derive.audit.evaluate_equations import Undefined
 
         try:
@@ -275,8 +280,8 @@ class _Subject:
             for k, parameter in enumerate(self.source.parameters):
                 what = what.replace(f"p[{k}, 0]", f"p.{parameter.name}")
             raise ElementError(
-                f"{self.kind} {self.name}: {what} at some numbers that its definition allows; give "
-                'parameters and coordinates their bounds, such as Param("width", "m", minimum=0)'
+                f"{self.kind} {self.name}: {what} for some numbers that its definition allows; "
+                'give bounds of parameters and coordinates, such as Param("width", "m", minimum=0)'
             ) from None
 
     def statements(self) -> Iterator[tuple[str, float, float]]:
@@ -307,7 +312,7 @@ class _Subject:
             yield f"{kernel} = difference quotient", error, DIFFERENCES
 
     def _in_doubles(self) -> Iterator[tuple[str, float, float]]:
-        """The compiled specialised kernels against the compiled generic ones."""
+        """Compare the compiled specialised kernels with the compiled generic ones."""
         from ..derive.catalogue.kernels import generic_kernels
         from ..runtime.kernels import prebuilt
 
@@ -342,7 +347,7 @@ def _generic(nu: int, name: str, inputs: dict[str, Any]) -> dict[str, list[Any]]
 def _call(
     compiled: Compiled, kernel: KernelIR, inputs: Mapping[str, Sequence[float]], n: int = 0
 ) -> tuple[int, dict[str, list[float]]]:
-    """A compiled kernel through its descriptor: (code, outputs)."""
+    """Call a compiled kernel through its descriptor: (code, outputs)."""
     from ..border.elements import c_outputs
     from ..runtime.kernels import prebuilt
 
@@ -360,7 +365,7 @@ def _call(
 
 
 def _named(kernel: KernelIR, arrays: Sequence[Any], n: int = 0) -> dict[str, list[float]]:
-    """Outputs by name; a work array behind them is left out."""
+    """Outputs by name, without a work array that may follow them."""
     return {
         port.name: list(array)[: port.length(n)]
         for port, array in zip(kernel.outputs, arrays, strict=False)
@@ -375,7 +380,7 @@ def _tape(kernel: KernelIR) -> Tape:
 def _interpret(
     tape: Any, kernel: KernelIR, inputs: Mapping[str, Sequence[float]], n: int = 0
 ) -> tuple[int, dict[str, list[float]]]:
-    """A kernel without a C function, as the engine interprets it."""
+    """Interpret a kernel without a C function as the engine does: (code, outputs)."""
     from ..runtime.kernels import prebuilt
     from ..runtime.kernels.tape import c_tape
 
@@ -402,7 +407,7 @@ def _deviation(
     two: Mapping[str, Sequence[float]],
     inputs: Mapping[str, Sequence[float]],
 ) -> float:
-    """Largest difference of the outputs of `two`, relative to their largest entries."""
+    """Largest difference of outputs, relative to the largest entries of `two`."""
     worst = 0.0
     for name, row in two.items():
         scale = max([abs(v) for v in row] + _entering(name, inputs))
@@ -412,7 +417,7 @@ def _deviation(
 
 
 def _entering(name: str, inputs: Mapping[str, Sequence[float]]) -> list[float]:
-    """What an output is a remainder of: S_I of S, e_I of e and tau."""
+    """Magnitudes of the inputs that an output is a remainder of: S_I of S, e_I of e and tau."""
     names = {"S_I": ("S",), "e_I": ("e", "tau")}.get(name, ())
     return [1e-300, *(abs(v) for each in names for v in inputs[each])]
 
@@ -428,7 +433,7 @@ def _difference(
     stated: Mapping[str, Sequence[Any]],
     inputs: Mapping[str, Sequence[float]],
 ) -> float:
-    """Largest difference relative to the largest entry of its array (and to the inputs)."""
+    """Largest difference, relative to the largest entry of its array and to the inputs."""
     floor, worst = 1e-8 * _size(inputs), 0.0
     for name, row in exact.items():
         scale = max([abs(v) for v in row] + [floor])

@@ -1,4 +1,4 @@
-"""A scene told in lines: its tree, what its hinges are, and the way that the sweep takes."""
+"""Description of a scene as lines of text: its tree, its hinges and the passes of the sweep."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from ..derive.schedule.riccati import CONDENSE, RECOVER
 from ..derive.schedule.steps import Pass
 from ..runtime.model.model import Model
 
-#: Lines of a tree and of a path; longer ones are cut, and say so.
+#: Largest number of lines of a tree or pass; longer ones end with the number omitted.
 MOST_LINES = 60
 _GROUND = "ground"
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A hinge between two bodies."""
+    """Hinge between two bodies, an edge of the drawn tree."""
 
     name: str
     type: str
@@ -26,7 +26,7 @@ class Joint:
 
 
 def joints(model: Model) -> list[Joint]:
-    """Every hinge of a scene, of its chains too, but for those of constraints."""
+    """Hinges of a scene, including those of chains, excluding those of constraints."""
     return [
         Joint(h.name, h.type, h.inboard.partition(".")[0], h.outboard.partition(".")[0])
         for h in model.scene.hinges
@@ -34,7 +34,7 @@ def joints(model: Model) -> list[Joint]:
 
 
 def tree(model: Model) -> list[str]:
-    """The tree from the ground on, a line for each hinge with what it carries."""
+    """Lines of the tree from the ground outwards: each hinge with the body that it carries."""
     hinges, cut = joints(model), set(model.loops.cut)
     held: dict[str, list[Joint]] = {}
     for joint in hinges:
@@ -55,13 +55,13 @@ def tree(model: Model) -> list[str]:
 def _branches(
     held: dict[str, list[Joint]], body: str, before: str
 ) -> list[tuple[Joint, str, bool]]:
-    """Hinges on a body, the last one first as a stack takes them."""
+    """Hinges on a body in reverse order, as needed by a stack."""
     there = held.get(body, [])
     return [(joint, before, joint is there[-1]) for joint in reversed(there)]
 
 
 def path(model: Model) -> list[tuple[Pass, list[str]]]:
-    """The passes of a tree, each with the bodies in its order."""
+    """Passes of the sweep over a tree, each with the bodies in its order."""
     carried = [joint for joint in _from_root(model) if joint.name not in set(model.loops.cut)]
     out = _cut_short([f"{j.inboard} → {j.outboard} across {j.name}" for j in carried])
     back = _cut_short([f"{j.outboard} → {j.inboard} across {j.name}" for j in reversed(carried)])

@@ -1,4 +1,4 @@
-"""`mstmm.equations`: elements and whole scenes as formulas, which a notebook shows."""
+"""`mstmm.equations`: equations of elements and scenes as text, LaTeX and HTML."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Equations(Displayed):
-    """A page of equations: `text`, `latex` (needs amsmath) and `html`; notebooks show it.
+    """Page of equations: `text`, `latex` (needs amsmath) and `html`; notebooks display it.
 
     Attributes:
-        closed: M(q) u' + h = tau of a scene, in SymPy; None for an element, and for a scene that
-            has none, whose page says why.
+        closed: M(q) u' + h = tau of a scene, in SymPy; None for an element, and for a scene without
+            a closed form, whose page states the reason.
     """
 
     title: str
@@ -60,17 +60,17 @@ class Equations(Displayed):
 
     @property
     def text(self) -> str:
-        """Lines of 100 columns."""
+        """Page as text, 100 columns wide."""
         return printed(self.title, self.items, "text")
 
     @property
     def latex(self) -> str:
-        """A fragment for a document."""
+        """Page as a fragment of a LaTeX document (needs amsmath)."""
         return printed(self.title, self.items, "latex")
 
     @property
     def html(self) -> str:
-        """One page that needs nothing else."""
+        """Page as one self-contained HTML document."""
         return printed(self.title, self.items, "html")
 
     def _plain(self) -> str:
@@ -87,16 +87,17 @@ class Equations(Displayed):
 def equations(
     of: str | os.PathLike[str] | Scene | Model | Element, keep: Sequence[str] = ()
 ) -> Equations:
-    """The equations of an element, or of a scene: its tree, the way of the sweep, and, where it is
-    a small tree, M(q) u' + h(q, u, t) = tau in closed form.
+    """Equations of an element, or of a scene: tree, passes of the sweep, closed form.
+
+    The closed form M(q) u' + h(q, u, t) = tau is given for small trees.
 
     Args:
-        of: name of an element ("pin", "force_spring"; `mstmm list`), an element of your own, a
+        of: name of an element ("pin", "force_spring"; `mstmm list`), a user-defined element, a
             scene, the path of its file, or its model.
         keep: numbers of the scene that stay symbols, such as "rod1.mass" or "gravity[1]".
 
-    Raises ElementError for a name that is none, SceneError for what is wrong with a scene, and for
-    names in `keep` that it does not have.
+    Raises ElementError for an unknown element, SceneError for an invalid scene, and for names in
+    `keep` that it does not have.
     """
     keep = texts_of("keep", keep, "rod1.mass")
     if isinstance(of, str) and not is_scene_file(of):
@@ -121,13 +122,13 @@ def equations(
 
 def _of_element(of: str | Element, keep: Sequence[str]) -> Equations:
     if keep:
-        raise ElementError("keep names numbers of a scene; those of elements are symbols already")
+        raise ElementError("keep applies to scenes; parameters of an element are always symbols")
     shown = view(of) if isinstance(of, str) else of_element(of)
     return Equations(shown.title, lambda measure: document(shown, "equations", measure))
 
 
 def _of_model(model: Model, keep: Sequence[str] = ()) -> Equations:
-    """See `equations`."""
+    """Equations of a scene; see `equations`."""
     found: ClosedEquations | None = None
     refused = ""
     try:
@@ -149,19 +150,22 @@ def _items(
         Heading("Tree", 2),
         Code("\n".join(tree(model))),
         Paragraph(f"Equations of its elements: {elements}."),
-        Heading("Way of the sweep", 2),
+        Heading("Passes of the sweep", 2),
     ]
     if model.loops.cut:
         items.append(
-            Paragraph("What closes loops is found on top: mstmm show sweep_loops, mstmm show sweep")
+            Paragraph(
+                "Loads of closed loops are computed in addition: mstmm show sweep_loops, "
+                "mstmm show sweep"
+            )
         )
     for whole, lines in path(model):
         items += [
             Paragraph(f"{whole.name}, {whole.order}: {whole.purpose}"),
             Code("\n".join(lines)),
         ]
-    items.append(Heading("Closed equations", 2))
-    told = Paragraph(f"They are not written out: {refused}.")
+    items.append(Heading("Equations in closed form", 2))
+    told = Paragraph(f"They are not available: {refused}.")
     return items + (_closed(found, measure) if found else [told])
 
 
@@ -183,8 +187,8 @@ def _closed(found: ClosedEquations, measure: Columns) -> list[Item]:
         Formula("mass matrix", tuple(stated(m, found.M, measure=measure))),
         Formula("inertia, gravity, laws and loads", tuple(stated(h, found.h, names, measure))),
         Paragraph(
-            "tau are efforts on the speeds beyond those of the laws. Numbers of the scene that are "
-            "not kept as symbols stand as they are."
+            "tau are efforts on the speeds in addition to those of the laws. Numbers of the scene "
+            "that are not kept as symbols have their values."
         ),
     ]
 

@@ -1,4 +1,4 @@
-"""Formulas as SymPy expressions, without the terms that are rounding alone."""
+"""Conversion of formulas to SymPy expressions, without terms that are only rounding."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from sympy.simplify.fu import TR10i
 from ..ir.operations import OPERATIONS
 from ..numbers.formula import Atom, Formula, Monomial, exact
 
-#: Terms beside the largest of their row and column that are rounding.
+#: Largest term that is rounding, relative to the largest entries of its row and column.
 _ROUNDING = 1e-14
-#: Operations in an entry up to which sines and cosines of sums are looked for.
+#: Largest number of operations of an entry in which sines and cosines of sums are combined.
 _SHORT = 100
-#: Functions of SymPy whose names are not those of the IR.
+#: Functions of SymPy whose names differ from those of the IR.
 _PLAIN = {
     "inverse": lambda x: 1 / x, "sqrt": sp.sqrt, "pow": sp.Pow, "min": sp.Min, "max": sp.Max,
     "lt": sp.Lt, "le": sp.Le, "eq": sp.Eq,
@@ -26,17 +26,17 @@ _TRUTHS = {"lt", "le", "eq", *_LOGIC}
 
 
 class Writer:
-    """Writes formulas of one book; every atom once."""
+    """Converter of the formulas of one book; every atom is converted once."""
 
     def __init__(self) -> None:
         self._written: dict[Atom, sp.Expr] = {}
 
     def symbol(self, formula: Formula) -> Any:
-        """The symbol that a formula is."""
+        """Convert a formula that is a single symbol."""
         return self._expression(formula)
 
     def matrix(self, rows: Sequence[Sequence[Formula]]) -> sp.ImmutableMatrix:
-        """A matrix, simplified as far as that is cheap."""
+        """Convert a matrix, simplified as far as that is cheap."""
         sizes = [[_size(entry) for entry in row] for row in rows]
         along = [max(row, default=0.0) for row in sizes]
         across = [max(column, default=0.0) for column in zip(*sizes, strict=True)]
@@ -83,7 +83,7 @@ class Writer:
         return function(*args)
 
     def _condition(self, formula: Formula) -> sp.Basic:
-        """A formula of which matters whether it is zero."""
+        """Convert a formula that is used as a condition (true if not zero)."""
         if formula.fixed:
             return sp.true if formula.value else sp.false
         ((monomial, c), *more) = formula.terms.items()
@@ -93,7 +93,7 @@ class Writer:
 
 
 def _weight(monomial: Monomial) -> float:
-    """The size of a product at the scene's numbers, zeros aside."""
+    """Magnitude of a product at the numbers of the scene; factors that are zero count as 1."""
     size = 1.0
     for atom, power in monomial:
         size *= abs(atom.value or 1.0) ** power

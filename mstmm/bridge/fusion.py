@@ -1,7 +1,7 @@
-"""The fused code of one scene: looked for in the cache, built when that pays, or out of reach.
+"""Fused code of one scene: found in the cache, built when that pays off, or impossible.
 
-Together with `compilation` this joins the rooms: the structure and the numbers come from runtime,
-the text from derive, the library from the cache.
+The structure and the numbers come from runtime, the source text from derive, the library from the
+cache.
 """
 
 from __future__ import annotations
@@ -39,32 +39,33 @@ if TYPE_CHECKING:
     from ..runtime.pack.packed import Packed
     from ..runtime.pack.system import System
 
-#: More bodies (ends and sections of flexible bodies count) than this are not fused unless the user
-#: asks for it: compilers take seconds (of CPU, on two busy cores: 7 for 64 pins, 9 for 100), and
-#: evaluations gain less (a half of the time is left at 100 pins, four fifths at 100 balls).
+#: Largest number of bodies (including ends and sections of flexible bodies) that are fused unless
+#: the user requires it.  Beyond it compilers take seconds (of CPU, on two busy cores: 7 for 64
+#: pins, 9 for 100), and the gain is smaller (half of the evaluation time remains at 100 pins, four
+#: fifths at 100 balls).
 MOST_BODIES = 100
-#: More than this are not fused at all: 400 pins take half a minute of CPU.
+#: Largest number of bodies that can be fused at all: 400 pins take half a minute of CPU.
 MOST_ASKED = 400
 #: Seconds that a compiler takes for the scalar code, by bodies, and seconds that one evaluation
 #: saves per body; measured, see benchmarks/startup.  Only their ratio matters, and
 #: only for the choice of engine "auto"; fixed numbers, so that the choice is the same on every run.
 _SECONDS, _SECONDS_PER_BODY = 0.1, 0.04
 _SAVED_PER_BODY = 6e-8
-#: Calls about points of a body from which it is no look at them alone, where fused code was asked
-#: for: every body asked of has a library of its own.
+#: Calls for points of a body that justify a library where fused code is required: every body needs
+#: a separate library.
 _OFTEN = 128
-#: More unknowns than this are eliminated body by body, by the looped engine: the tangent as a whole
-#: costs the square of them.
+#: Largest number of unknowns with a fused tangent matrix, whose cost grows with their square; more
+#: are eliminated body by body, by the looped engine.
 _MOST_UNKNOWNS = 20
-#: The same for matrices of a linear model, by pairs of speeds of which one moves the other's hinge:
-#: 28 pins in a row have so many, or a humanoid of 38 speeds.  They compile 10 to 20 s.
+#: The same limit for matrices of a linear model, in pairs of speeds of which one moves the hinge of
+#: the other: that of 28 pins in a row, or a humanoid of 38 speeds.  They compile in 10 to 20 s.
 _MOST_PAIRS = 406
 #: A frame or section of a flexible body with n shapes compiles like 1 + n^2 / this many bodies.
 _MODES_PER_BODY = 24
-#: A hinge that n rows of closed loops pass compiles like n^2 / this many bodies.
+#: A hinge passed by n constraint rows of loops compiles like n^2 / this many bodies.
 _ROWS_PER_BODY = 32
 
-#: What decides the text besides structure and kernels: the folders that print it.
+#: Folders of the code that prints fused code; with structure and kernels they determine its text.
 PRINTERS = {
     "mstmm": ("border", "ir"),
     "mstmm.derive": ("fuse", "print", "schedule"),
@@ -72,8 +73,10 @@ PRINTERS = {
 
 
 class Fusion:
-    """Fused libraries of one packed scene; `numbers` is the vector p that they read, `inputs` where
-    inputs stand in it."""
+    """Fused libraries of one packed scene.
+
+    `numbers` is the vector p that they read, `inputs` the indices of inputs in it.
+    """
 
     def __init__(
         self,
@@ -100,7 +103,7 @@ class Fusion:
 
     @property
     def library(self) -> FusedLibrary | None:
-        """The scalar library where it has been found or built; the others likewise."""
+        """Scalar library if it has been found or built, else None; the others likewise."""
         return self.made.get("scalar")
 
     @property
@@ -116,13 +119,13 @@ class Fusion:
         return self.made.get("inverse")
 
     def find(self) -> FusedLibrary | None:
-        """The scalar library if it is in the cache; no compiler is started."""
+        """Find the scalar library in the cache; no compiler is started."""
         return self._get("scalar", build=False)
 
     def build(self) -> FusedLibrary:
-        """The scalar library, compiled if it is not in the cache.
+        """Build the scalar library, unless it is in the cache.
 
-        Raises SceneError if such a scene has no fused code, EnvironmentFailure if there is no
+        Raises SceneError if such a scene cannot have fused code, EnvironmentFailure if there is no
         compiler or it fails.
         """
         self._insisted = True
@@ -136,10 +139,10 @@ class Fusion:
         return found
 
     def follow(self, other: Fusion) -> None:
-        """Take over the libraries of the same scene with other numbers.
+        """Use the libraries of the same scene with other numbers.
 
-        Where a structural zero was touched another library is needed: it is compiled if the other
-        had one, and without a compiler the scene falls back to the looped engine and says so.
+        If a structural zero has changed, another library is needed: it is compiled if `other` has
+        one.  Without a compiler the scene falls back to the looped engine, with a note.
         """
         if self.obstacle or other.obstacle:
             return
@@ -152,7 +155,7 @@ class Fusion:
                 self.obstacle = str(error)
 
     def under(self, system: System) -> Self:
-        """The same of a system that differs from this one in its inputs alone."""
+        """Fusion of a system that differs from this one only in its inputs."""
         found = copy(self)
         if not self.obstacle:
             start = system.inputs_at(0.0)
@@ -162,42 +165,43 @@ class Fusion:
         return found
 
     def ready(self, evaluations: float) -> FusedLibrary | None:
-        """The scalar library if it is there, or if so many evaluations are worth a compiler run."""
+        """Scalar library if available, or if so many evaluations justify a compilation."""
         return self._ready("scalar", evaluations)
 
     def ready_lanes(self, evaluations: float) -> FusedLibrary | None:
-        """The same for the library that computes several states side by side.
+        """Library that evaluates several states at once in lanes, under the same condition.
 
-        After `build` it is made whatever the number of evaluations; raises EnvironmentFailure if
-        it cannot be.
+        After `build` it is compiled whatever the number of evaluations; raises EnvironmentFailure
+        if that fails.
         """
         if self._insisted:
             return self._get("lanes", build=True)
         return self._ready("lanes", evaluations)
 
     def ready_implicit(self, evaluations: float) -> FusedLibrary | None:
-        """The same for what implicit methods ask of small scenes, where nobody knows how many
-        evaluations there will be (inf) only after `build`.  None where the looped engine serves:
-        for other scenes, with closed loops too, and where it cannot be made.
+        """Library of residual and tangent matrix for implicit methods, if the evaluations pay off.
+
+        An unknown number of evaluations (inf) pays off only after `build`.  None where the looped
+        engine is used instead: for large scenes, closed loops, and if it cannot be compiled.
         """
         pays = self._break_even() < evaluations < math.inf
         return self._of_small("implicit", pays)
 
     def ready_linear(self, pays: bool) -> FusedLibrary | None:
-        """The same for the slopes about a state, where the caller knows whether they pay."""
+        """Library of derivatives about a state for linear models; the caller decides if it pays."""
         if not self.obstacle and self.structure.nu > _MOST_UNKNOWNS:
             few = _pairs(self.structure) <= _MOST_PAIRS
             return self._of_trees("linear", pays) if few else None
         return self._of_small("linear", pays)
 
     def ready_inverse(self, calls: float) -> FusedLibrary | None:
-        """The same for inverse dynamics and mass matrix of trees that nothing drives."""
+        """Library of inverse dynamics and mass matrix, for trees without prescribed motion."""
         if self.obstacle or not self.structure.nu or self.structure.drives is not None:
             return None
         return self._of_trees("inverse", calls > self._break_even())
 
     def ready_points(self, body: int, calls: float) -> FusedLibrary | None:
-        """The same for kinematics of points of a body, which closed loops have no say in."""
+        """Library of the kinematics of points of a body; closed loops do not matter."""
         if self.obstacle or body < 0 or not self.structure.nu:
             return None
         enough = _OFTEN if self._insisted else self._break_even()
@@ -278,9 +282,10 @@ class Fusion:
         what: str,
         build: bool,
     ) -> ColumnsLibrary | None:
-        """The library of tangent kernels (`what` names them) of a structure; None if there is none.
+        """Library of derivative kernels (named by `what`) of a structure; None if there is none.
 
-        Without `build` it is only looked for.  Raises EnvironmentFailure if it cannot be built.
+        Without `build` it is only searched in the cache.  Raises EnvironmentFailure if it cannot be
+        built.
         """
         if self.obstacle:
             return None
@@ -301,8 +306,7 @@ class Fusion:
         return opened(recipe, open_columns, known=known)[0]
 
     def solution(self, build: bool) -> ColumnsLibrary | None:
-        """The library that solves with the scene's mass matrix, which is that of a tree; errors as
-        for `columns`."""
+        """Library that solves with the mass matrix of a tree; errors as for `columns`."""
         if self.obstacle or self.structure.closes or self.structure.refines:
             return None
 
@@ -314,37 +318,37 @@ class Fusion:
         return self.columns(self.structure, kernels, "solution", build)
 
     def fused(self, structure: Structure) -> Fused:
-        """The IR of a structure whose elements this scene has; no compiler, no cache."""
+        """IR of a structure with the elements of this scene; no compiler, no cache."""
         from ..derive.fuse.scene import fuse
 
         return fuse(structure, kernels_of(self._definitions))
 
     def fused_implicit(self, structure: Structure) -> Fused:
-        """The same of what implicit methods ask."""
+        """IR of residual and tangent matrix for implicit methods."""
         from ..derive.fuse.implicit import fuse_implicit
 
         return fuse_implicit(structure, kernels_of(self._definitions))
 
     def fused_linear(self, structure: Structure) -> Fused:
-        """The same of slopes about a state."""
+        """IR of derivatives about a state."""
         from ..derive.fuse.linear import fuse_slopes
 
         return fuse_slopes(structure, kernels_of(self._definitions))
 
     def fused_inverse(self, structure: Structure) -> Fused:
-        """The same of inverse dynamics and the mass matrix."""
+        """IR of inverse dynamics and the mass matrix."""
         from ..derive.fuse.inverse import fuse_inverse
 
         return fuse_inverse(structure, kernels_of(self._definitions))
 
     def fused_points(self, structure: Structure, body: int) -> Fused:
-        """The same of points of one body."""
+        """IR of the kinematics of points of one body."""
         from ..derive.fuse.points import fuse_points
 
         return fuse_points(structure, kernels_of(self._definitions), body)
 
     def symbolic(self, linear: Equations, keep: Sequence[str]) -> Symbolic:
-        """See `Equations.symbolic`; no compiler."""
+        """Linear model in SymPy, without a compiler; see `Equations.symbolic`."""
         from .symbolic import symbolic
 
         return symbolic(linear, keep, kernels_of(self._definitions))
@@ -352,7 +356,7 @@ class Fusion:
 
 @dataclass(frozen=True)
 class Fuser:
-    """How scenes are fused, kept with a model that may be pickled: see `Fusion`."""
+    """Factory of `Fusion`: picklable settings of fused code, stored with a model."""
 
     definitions: Mapping[Key, ElementSpec]
     obstacle: str
@@ -364,7 +368,7 @@ class Fuser:
 
 
 def modes_at(structure: Structure) -> list[int]:
-    """Body by body, how many modes of a flexible body its own equations or connection carry."""
+    """Number of modes in the equations or the connection of each body."""
 
     def count(body: BodyStructure) -> int:
         frame = body if body.section is None else structure.bodies[body.section.frame]
@@ -377,12 +381,14 @@ def _note(built: Built) -> str:
     more = f"; {built.note}" if built.note else ""
     if built.how == "cached":
         return f"its code was in the cache{more}"
-    return f"its code was compiled in {built.seconds:.2f} s and kept{more}"
+    return f"its code was compiled in {built.seconds:.2f} s and stored in the cache{more}"
 
 
 def _pairs(structure: Structure) -> int:
-    """Pairs of speeds of which one is on the way from the other's hinge to the root; of all speeds
-    where bodies are flexible."""
+    """Number of pairs of speeds of which one moves the hinge of the other.
+
+    All pairs count where bodies are flexible.
+    """
     if any(body.modal for body in structure.bodies):
         return structure.nu**2
     inboard: list[int] = []
@@ -392,20 +398,23 @@ def _pairs(structure: Structure) -> int:
 
 
 def _obstacle(packed: Packed, most: int) -> str:
-    """Why a scene is not fused; empty if it can be."""
+    """Reason why a scene cannot be fused, or ""."""
     count = packed.system.count
     if packed.releases:
         names = ", ".join(f'"{name}"' for name in packed.releases)
         return f"hinge {names} is released during the run, which changes the structure"
     if count > most:
         asked = f' ({MOST_ASKED} with engine = "fused")' if most < MOST_ASKED else ""
-        return f"it has {count} bodies; fused code is for {most} at most{asked}"
+        return f"it has {count} bodies; the limit of fused code is {most}{asked}"
     if packed.product is not None:
-        return "the product of classical matrices is looped"
+        return "the product of classical matrices exists only in the looped engine"
     if packed.qr:
-        return "the sweep as least squares is looped"
+        return "the least-squares sweep exists only in the looped engine"
     if packed.model.refines and packed.system.closes:
-        return "heavy bodies behind light ones cost digits, which refinement mends: it is looped"
+        return (
+            "heavy bodies outboard of light ones need refinement, which exists for closed loops "
+            "only in the looped engine"
+        )
     hinges = (packed.elements[body.hinge] for body in packed.system.distinct)
     if any(hinge.tape is not None and hinge.spec is None for hinge in hinges):
         return "a hinge is interpreted because it was generated without a compiler"
@@ -413,16 +422,16 @@ def _obstacle(packed: Packed, most: int) -> str:
 
 
 def _too_wide(structure: Structure, most: int) -> str:
-    """Why code of closed loops would be too long; empty if it would not."""
+    """Reason why code of closed loops would be too long, or ""."""
     rows = sum(len(body.pending) ** 2 + len(body.bent) ** 2 for body in structure.bodies)
     size = len(structure.bodies) + rows // _ROWS_PER_BODY
     if size <= most:
         return ""
-    return f"with its closed loops it is like {size} bodies; fused code is for {most} at most"
+    return f"its closed loops make it like {size} bodies; the limit of fused code is {most}"
 
 
 def printers() -> list[Path]:
-    """The files in the folders named by PRINTERS, in the order of their names."""
+    """Python files in the folders of PRINTERS, sorted by name."""
     folders = [
         Path(str(files(room).joinpath(name))) for room in PRINTERS for name in PRINTERS[room]
     ]
@@ -447,9 +456,10 @@ def _manifest_hash() -> str:
 
 
 def kernels_of(definitions: Mapping[Key, ElementSpec]) -> Callable[[Key, str], KernelIR]:
-    """Kernels by element and name: of users' definitions, else of the prebuilt elements.
+    """Function that returns a kernel by element and name.
 
-    The function raises ElementError if there is no such kernel.
+    It searches user-defined elements, then the prebuilt ones, and raises ElementError if there is
+    no such kernel.
     """
 
     def kernel(key: Key, name: str) -> KernelIR:

@@ -1,4 +1,4 @@
-"""The names that a symbolic linear model keeps: numbers of the scene, coordinates and speeds."""
+"""Names that stay symbols in a symbolic linear model: parameters, coordinates and speeds."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Kept:
-    """What the user calls numbers of the scene, by their full names, and coordinates and speeds, by
-    their places."""
+    """Names given by the user: of parameters by full name, of q and u by index."""
 
     parameters: dict[str, str] = field(default_factory=dict)
     coordinates: dict[int, str] = field(default_factory=dict)
@@ -27,7 +26,7 @@ class Kept:
 
 @dataclass(frozen=True)
 class _Motion:
-    """A coordinate or speed: where its name goes, its place, and whether it is free."""
+    """Coordinate or speed: the table for its name, its index, and whether it is free."""
 
     among: dict[int, str]
     place: int
@@ -35,10 +34,10 @@ class _Motion:
 
 
 def kept(linear: Equations, keep: Sequence[str]) -> Kept:
-    """What the names stand for.
+    """Resolve the names of `keep` to parameters, coordinates and speeds.
 
-    Raises SceneError for a name that stands for nothing or comes twice, and for coordinates that a
-    drive imposes or whose rates are not their speeds, as those of quaternions.
+    Raises SceneError for a name that is unknown or listed twice, and for coordinates with a
+    prescribed motion or whose rates are not their speeds, as those of quaternions.
     """
     if isinstance(keep, str) or not all(isinstance(name, str) for name in keep):
         raise SceneError(f'keep = {keep!r}: expected a list of names such as ["rod1.mass"]')
@@ -50,8 +49,9 @@ def kept(linear: Equations, keep: Sequence[str]) -> Kept:
             motion = motions[name]
             if not motion.free:
                 raise SceneError(
-                    f'keep "{name}": a drive imposes it, or it is no integral of a speed; keep '
-                    "coordinates and speeds whose rates they are, or leave it a number"
+                    f'keep "{name}": expected a free coordinate whose rate is a speed, or its '
+                    "speed, found one that a drive imposes or that is no integral of a speed; "
+                    "leave it a number"
                 )
             twice = motion.among.setdefault(motion.place, name) != name
         elif name in numbers or f"{name}[0]" in numbers:
@@ -66,12 +66,12 @@ def kept(linear: Equations, keep: Sequence[str]) -> Kept:
                 f"{near(name, known)}"
             )
         if twice:
-            raise SceneError(f'keep "{name}": this number has been named already; name it once')
+            raise SceneError(f'keep "{name}": this number is listed twice; name it once')
     return found
 
 
 def _motions(linear: Equations, found: Kept) -> Iterator[tuple[str, _Motion]]:
-    """Every coordinate and speed by its name."""
+    """Iterate over all coordinates and speeds with their full names."""
     for slots in linear.model.layout.owners:
         for k, name in enumerate(slots.q_names):
             free = slots.straight and slots.u + k in linear.free

@@ -1,4 +1,4 @@
-"""The nearest pose of a loop that does not close, to look at."""
+"""Nearest pose of a loop that cannot be closed, for display."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from .compilation import compile_scene
 if TYPE_CHECKING:
     from mstmm.runtime.result.result import Result
 
-#: What holds or moves nothing that is drawn of bodies at rest: of scenes, and of their hinges.
+#: Tables of a scene, and keys of its hinges, that have no effect on the picture of bodies at rest.
 _ACTING = ("coupling", "constraint", "event", "load", "spring", "bushing")
 _MOVING = ("law", "drive", "initial", "hold", "cut", "release")
 
 
 def nearest(scene: Scene, error: OpenLoop) -> Result:
-    """The bodies of a scene where `error` says, at rest, without the hinges that close loops."""
+    """Result with the bodies of a scene at rest in the pose of `error`, without cut hinges."""
     model = compile_scene(_opened(scene), engine="looped")
     q, _ = model.initial_state()
     q = np.array(q)
@@ -33,7 +33,7 @@ def nearest(scene: Scene, error: OpenLoop) -> Result:
 
 
 def _opened(scene: Scene) -> Scene:
-    """The bodies and the tree that holds them."""
+    """Scene with the bodies and the hinges of its spanning tree only."""
     hinges = scene.skeleton.hinges
     cut = {hinges.name(number) for number in build(scene.skeleton).cut}
     data = {k: v for k, v in tomllib.loads(scene.to_toml()).items() if k not in _ACTING}

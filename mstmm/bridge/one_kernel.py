@@ -1,6 +1,6 @@
-"""One KernelIR -> a compiled function in float, double or quadruple precision.
+"""Compilation of one KernelIR into a function in float, double or quadruple precision.
 
-Joins the rooms like `compilation`: the text comes from derive, the library from the cache.
+The source text comes from derive, the library from the cache.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from ..runtime.libraries.cache import Recipe, opened
 
 
 def compile_kernel(kernel: KernelIR, scalar: str = "double") -> ScalarKernel:
-    """A straight-line kernel in "float", "double" or "quadruple" (IEEE binary128) precision.
+    """Compile a kernel without loops in "float", "double" or "quadruple" precision.
 
-    Raises ValueError for another scalar type or a kernel of run-time size, EnvironmentFailure if
-    there is no compiler or it does not have the type.
+    Quadruple is IEEE binary128.  Raises ValueError for another scalar type or a kernel of run-time
+    size, EnvironmentFailure if there is no compiler or it does not support the type.
     """
     if scalar not in SCALARS:
-        raise ValueError(f"scalar type {scalar!r}: there are {', '.join(SCALARS)}")
+        raise ValueError(f"scalar type {scalar!r}: expected one of {', '.join(SCALARS)}")
     text = library_source(kernel, scalar)
     identity = {"text": sha256(text.encode()).hexdigest(), "scalar": scalar}
     flags = (*FLAGS, *NEEDS.get(scalar, ()))

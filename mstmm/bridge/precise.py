@@ -1,4 +1,4 @@
-"""Accelerations of a small scene at any number of digits, to tell what doubles lose."""
+"""Accelerations of a small scene in extended precision, to measure rounding errors of doubles."""
 
 from __future__ import annotations
 
@@ -18,13 +18,16 @@ from ..runtime.kernels import store
 from ..runtime.pack.structure import structure_of
 from .fusion import kernels_of
 
-#: Digits: a Riccati sweep loses as many as ratios of masses have.
+#: Digits of the evaluation; a Riccati sweep loses as many digits as the mass ratio has.
 DIGITS = 60
 
 
 def precise(model: Compiled, t: float = 0.0) -> Callable[[Array, Array], list[Any]]:
-    """(q (nq,), u (nu,)) -> udot (nu,) with DIGITS digits at the time t (s): the Riccati sweep as
-    one kernel, replayed.  The scene's numbers are the doubles that the engines have."""
+    """Function (q (nq,), u (nu,)) -> udot (nu,) with DIGITS digits, at the time t (s).
+
+    It interprets the Riccati sweep as one kernel.  The numbers of the scene are the doubles that
+    the engines use.
+    """
     elements, definitions = store.known(store.needed(model.scene))
     structure, numbers = structure_of(model.packed.system, elements, False)
     kernel = _fused(structure, definitions)
@@ -38,7 +41,7 @@ def precise(model: Compiled, t: float = 0.0) -> Callable[[Array, Array], list[An
     return accelerations
 
 
-#: The kernel of the last structure: who asks again mostly asks for other numbers of the same scene.
+#: Kernel of the last structure: subsequent calls mostly have other numbers of the same scene.
 _last: dict[str, KernelIR] = {}
 
 
@@ -51,7 +54,7 @@ def _fused(structure: Structure, definitions: Mapping[Key, ElementSpec]) -> Kern
 
 
 def relative_error(found: Array, exact: Sequence[Any]) -> float:
-    """Largest difference over the largest entry, which is not zero."""
+    """Largest difference divided by the largest entry of `exact`, which must not be zero."""
     with mpmath.workdps(DIGITS):
         gaps = [abs(mpmath.mpf(float(a)) - b) for a, b in zip(found, exact, strict=True)]
         return float(max(gaps) / max(map(abs, exact)))

@@ -1,4 +1,4 @@
-"""What a cross-check found: errors of kernels, statements of mechanics; a table or plain data."""
+"""Report of a cross-check: errors of kernels and statements of mechanics, as table or data."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ EQUATIONS = 1e-30
 
 @dataclass(frozen=True)
 class KernelCheck:
-    """One kernel: largest errors over its points.
+    """Result for one kernel: largest errors over its points.
 
-    `equations`: relative, IR against the stated equations at 50 digits; None if the definition is
-    not at hand.  `compiled`: error of the C as a share of its rounding bound, or of the engine's
-    interpreter for a kernel that has no C (`interpreted`); None if not compiled.
-    `stopped` counts points at which a guard stopped all ways alike.
+    `equations`: relative error of the IR against the stated equations at 50 digits; None if the
+    definition is not available.  `compiled`: error of the C relative to its rounding bound, or of
+    the engine's interpreter for a kernel without C (`interpreted`); None if not compiled.
+    `stopped` counts points at which a guard stopped every form of the kernel.
     """
 
     kernel: str
@@ -37,7 +37,7 @@ class KernelCheck:
 
 @dataclass(frozen=True)
 class Statement:
-    """A statement of mechanics about an element, its largest error, and the largest allowed."""
+    """Statement of mechanics about an element, with its largest error and the limit."""
 
     name: str
     error: float
@@ -50,7 +50,7 @@ class Statement:
 
 @dataclass(frozen=True)
 class Report:
-    """What was found for one element.  `str(report)` is a table."""
+    """Cross-check of one element.  `str(report)` is a table."""
 
     kind: str
     name: str
@@ -64,7 +64,7 @@ class Report:
 
     @property
     def problems(self) -> list[str]:
-        """One line for everything that failed; empty if all is well."""
+        """List of failures, one line each; empty if all checks passed."""
         found = [f"{s.name}: error {s.error:.1e} above {s.limit:.0e}" for s in self.statements
                  if not s.passed]  # fmt: skip
         for kernel in self.kernels:
@@ -74,7 +74,7 @@ class Report:
         return found
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Convert the report to plain data."""
         return {
             "kind": self.kind, "name": self.name, "passed": self.passed,
             "kernels": [{**vars(k), "problems": list(k.problems), "passed": k.passed}

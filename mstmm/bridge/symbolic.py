@@ -1,7 +1,8 @@
-"""A linear model as SymPy expressions: the schedule that makes its numbers, run on formulas.
+"""Linear model as SymPy expressions: its schedule is evaluated on formulas instead of numbers.
 
-The numbers that are kept go through packing as formulas; the residual of the scene is replayed and
-differentiated as for fused code, and its kernel evaluated on formulas.  No second derivation.
+Parameters that stay symbols pass through packing as formulas.  The residual of the scene is inlined
+and differentiated as for fused code, and its kernel evaluated on formulas.  There is no second
+derivation.
 """
 
 from __future__ import annotations
@@ -38,17 +39,18 @@ if TYPE_CHECKING:
 Kernels = Callable[[Key, str], KernelIR]
 Rows = list[list[Formula]]
 
-#: More coordinates than this are refused, and more products of terms (some seconds), for which a
-#: term that is written as an expression counts too, this often.
+#: Largest number of coordinates, and of products of terms (some seconds); each term converted to an
+#: expression counts as the third number of products.
 MOST_COORDINATES, MOST_PRODUCTS, _WRITTEN = 24, 300_000, 10
-#: By how much an equilibrium may miss a quarter turn, or a 1 of a quaternion.
+#: Largest deviation of an equilibrium from a quarter turn, or from a 1 of a quaternion.
 _ROUNDING = 1e-13
-#: Accelerations beside those that stiffness and damping give to motions of order one that are none.
+#: Largest acceleration that counts as zero, relative to those of stiffness and damping in motions
+#: of order one.
 _NO_ACCELERATION = 1e-12
 
 
 def symbolic(linear: Equations, keep: Sequence[str], kernels: Kernels) -> Symbolic:
-    """See `Equations.symbolic`."""
+    """Derive the linear model in SymPy; see `Equations.symbolic`."""
     _refuse(linear)
     names = kept(linear, keep)
     lacking = "formula; linearize models of other values"
@@ -68,31 +70,31 @@ def symbolic(linear: Equations, keep: Sequence[str], kernels: Kernels) -> Symbol
 def _refuse(linear: Equations) -> None:
     if linear.drives:
         raise SceneError(
-            f"symbolic: the motion of the drive of {linear.driven[0]} is an input, which formulas "
-            "have no column of; take it out of the inputs"
+            f"symbolic: the motion of the drive of {linear.driven[0]} is an input, for which there "
+            "is no symbolic column; remove it from the inputs"
         )
     if len(linear) > MOST_COORDINATES:
         raise SceneError(
             f"symbolic: the scene has {len(linear)} coordinates; the limit is {MOST_COORDINATES}; "
-            "take M, C and K of linearize, after with_parameters for other values"
+            "use M, C and K of linearize, after with_parameters for other values"
         )
     if linear.model.packed.releases:
         names = ", ".join(f'"{name}"' for name in linear.model.packed.releases)
         raise SceneError(
-            f"symbolic: hinge {names} is released during the run, so that the equations change "
-            "their form; take the release out"
+            f"symbolic: hinge {names} is released during the run, which changes the form of the "
+            "equations; remove the release"
         )
 
 
 class _Equations:
-    """The equations of one linear model on formulas; `symbols` are those of the names kept."""
+    """Linear model on formulas; `symbols` has the symbols of the names that are kept."""
 
     def __init__(self, linear: Equations, names: Kept, kernels: Kernels) -> None:
         self._linear, self._kernels, self._book = linear, kernels, Book(MOST_PRODUCTS)
         self.symbols: dict[str, Formula] = {}
         model, state = linear.model, linear.state
         self._known = model.known or {}
-        #: What a unit of each input that pushes adds to R, once that is found.
+        #: Contribution of a unit of each disturbance input to R, filled in by `second_order`.
         self._inputs: dict[int, list[Formula]] = {
             one.input: [] for one in (*linear.controls, *linear.others) if one.input >= 0
         }
@@ -114,13 +116,13 @@ class _Equations:
         return found
 
     def counted(self, matrices: Sequence[Rows]) -> Sequence[Rows]:
-        """The same, whose terms are about to be written."""
+        """Count the terms of matrices that will be converted, and return the matrices."""
         terms = sum(len(x.terms) for rows in matrices for row in rows for x in row)
         self._book.count(_WRITTEN * terms)
         return matrices
 
     def second_order(self) -> tuple[Rows, Rows, Rows]:
-        """M, C and K."""
+        """Matrices M, C and K."""
         linear = self._linear
         structure, p = structure_and_numbers(self._system, self._known)
         given = self._system.inputs_at(linear.state.t).tolist()
@@ -136,14 +138,14 @@ class _Equations:
             return m, c, k
         if not all(x.fixed for x in found["N"]):
             raise SceneError(
-                "symbolic: kept numbers decide how coordinates of a hinge follow its speeds; "
+                "symbolic: kept numbers affect the relation of coordinates and speeds of a hinge; "
                 "linearize at rest, or leave them numbers"
             )
         g = [[formula(x) for x in row] for row in linear.turning.tolist()]
         return m, _less(c, m, g), _less(k, c, g)
 
     def _entry(self, push: Channel, symbol: Formula, required: list[Formula], row: int) -> Formula:
-        """Effort in a free speed of a unit of a push."""
+        """Effort on a free speed per unit of a disturbance or input."""
         speed = self._linear.free[row]
         if push.input >= 0:
             column = self._inputs[push.input]
@@ -160,8 +162,10 @@ class _Equations:
         return [formula(x) for x in np.where(still, 0.0, linear.state.a).tolist()]
 
     def pushed(self, pushes: Sequence[Channel]) -> Rows:
-        """V or W: the tree at rest under a symbol for each push alone, to which its efforts are in
-        proportion."""
+        """Input matrix V or W, from the efforts of the tree at rest under a symbol per input.
+
+        The efforts are proportional to the symbols.
+        """
         n = len(self._linear.free)
         if not pushes:
             return [[] for _ in range(n)]
@@ -179,7 +183,7 @@ class _Equations:
         ]
 
     def _under(self, pushes: Sequence[Channel], symbols: Sequence[Formula]) -> System:
-        """The tree under gravity and loads that are the symbols of their pushes."""
+        """Tree whose only gravity and loads are the symbols of `pushes`."""
         gravity: list[Any] = [0.0, 0.0, 0.0]
         loads = []
         for place, (push, symbol) in enumerate(zip(pushes, symbols, strict=True)):
@@ -201,7 +205,7 @@ class _Equations:
         return LoadNumbers(body, -1, INERTIAL, offset, force, moment)
 
     def _values(self, count: int) -> KernelIR:
-        """The symbols themselves, as values of expressions."""
+        """Kernel that returns the symbols as values of expressions."""
         graph = Graph()
         ports = [*state_ports(self._frames.layout), Port(MOVING, (count,))]
         values: dict[str, object] = {"values": graph.vector(MOVING, count)}
@@ -217,13 +221,13 @@ class _Equations:
 def replayed(
     kernel: KernelIR, given: dict[str, list[Any]], arithmetic: FormulaArithmetic
 ) -> dict[str, list[Formula]]:
-    """What a kernel of a scene gives on formulas, where no law remembers anything."""
+    """Evaluate a kernel of a scene on formulas, with zero memory of its laws."""
     memory = next(port for port in kernel.inputs if port.name == "memory").length()
     return run(kernel, given | {"memory": [0.0] * memory}, arithmetic, None)
 
 
 def _rounded(x: float) -> Formula:
-    """A coordinate, or the quarter turn or 1 that it misses by rounding."""
+    """Formula of a coordinate, replaced by a quarter turn or 1 if it differs by rounding."""
     for exact in (round(x / (math.pi / 2)) * (math.pi / 2), math.copysign(1.0, x)):
         if abs(x - exact) <= _ROUNDING:
             return formula(exact)
@@ -235,7 +239,7 @@ def _rows(entries: list[Formula], n: int) -> Rows:
 
 
 def _less(a: Rows, b: Rows, c: Rows) -> Rows:
-    """a - b c."""
+    """Difference a - b c of matrices."""
     return [
         [
             sum((-x * row[j] for x, row in zip(left, c, strict=True)), entry)

@@ -205,6 +205,6 @@ def test_rows_that_nothing_moves_cost_nothing(scene: str) -> None:
 def test_wide_loops_stay_looped() -> None:
     """Five rows pass every link of Bricard's ring."""
     model = compiled(bricard())
-    for most, wanted in ((9, ""), (8, "it is like 9 bodies")):
+    for most, wanted in ((9, ""), (8, "like 9 bodies")):
         assert wanted in Fusion(model.packed, {}, {}, most=most).obstacle
         assert bool(wanted) == bool(Fusion(model.packed, {}, {}, most=most).obstacle)

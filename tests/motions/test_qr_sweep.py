@@ -220,7 +220,10 @@ def test_no_fused_code_and_no_flexible_bodies() -> None:
     scene = chain(["pin"] * 2)
     with pytest.raises(SceneError, match='sweep = "qr" has no fused code'):
         compiled(scene, engine="fused")
-    assert compiled(scene).engine_choice == "looped: the sweep as least squares is looped"
+    assert (
+        compiled(scene).engine_choice
+        == "looped: the least-squares sweep exists only in the looped engine"
+    )
     beam = {"name": "blade", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0}
     bent = {
         "gravity": [0, 0, 0], "beam": [beam | {"modes": 2}],

@@ -84,7 +84,7 @@ def test_it_tells_how_many_digits_hold_until_when() -> None:
     error = run.certificate.error
     assert error is not None
     share = error.largest("q")["rad"] / np.ptp(run.q[:, 0])
-    said = r"Up to t = 2 s a second.* by at most (\S+) rad, so that (\d+) digits of"
+    said = r"Up to t = 2 s a second.* by at most (\S+) rad, which is (\d+) digits of"
     found = re.search(said, words.verdict(run))
     assert found is not None
     assert float(found[1]) == pytest.approx(error.largest("q")["rad"], rel=0.05)

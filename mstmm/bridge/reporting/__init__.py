@@ -1,1 +1,1 @@
-"""A run as one page: what it is, what vouches for it, how it moves, the equations behind it."""
+"""Self-contained HTML report of a run: quality report, motion, curves and equations."""

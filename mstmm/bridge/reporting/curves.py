@@ -1,4 +1,4 @@
-"""Curves that answer to the pointer, in the panels that a picture has (extra: plot)."""
+"""Interactive curves of a report, in the panels of `Result.plot` (extra: plot)."""
 
 from __future__ import annotations
 
@@ -16,24 +16,27 @@ if TYPE_CHECKING:
     from ...runtime.result.plotting.panels import Panel, Trace
     from ...runtime.result.result import Result
 
-#: Curves in one panel, points of a curve.
+#: Largest number of curves in one panel, and of points of a curve.
 _MOST, _POINTS = 12, 1500
-#: Pixels: height of a panel, of a line of its title and of its legend; above these, between panels.
+#: Pixels: height of a panel, of a line of its title and of its legend; spaces above the legend and
+#: between panels.
 _TALL, _TITLE, _LINE, _AIR, _GAP = 210, 19, 18, 8, 28
-#: Characters of a line of a title.
+#: Largest number of characters of a line of a title.
 _LONG = 42
-#: Pixels that a legend may be wide in narrow windows; of an entry its line and of each character.
+#: Pixels: width of a legend in narrow windows, of the line of an entry, and of each character.
 _WIDE, _ENTRY, _CHARACTER = 285, 50, 6.0
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#555555", "#8a7a00")
-#: Between title and panel, so that it covers no curve and narrow windows have room for these.
+#: Position of a legend: between title and panel, so that it covers no curve in narrow windows.
 _LEGEND = {
     "x": 0, "xanchor": "left", "yanchor": "bottom", "orientation": "h", "font": {"size": 11},
 }  # fmt: skip
 
 
 def curves(result: Result, names: Sequence[str]) -> str:
-    """The quantities over time; without names those that a picture would show, and the energy.
-    SceneError for a name that there is not."""
+    """HTML of quantities over time; without names those of `Result.plot`, and the energy.
+
+    SceneError for an unknown name.
+    """
     if len(result.t) < 2:
         return ""
     try:
@@ -75,7 +78,7 @@ def curves(result: Result, names: Sequence[str]) -> str:
 
 
 def _placed(figure: Any, legends: Sequence[int], lines: Sequence[int]) -> int:
-    """Panels below each other, each under its title and its legend; pixels of all of it."""
+    """Place the panels below each other, under title and legend; returns the height in pixels."""
     heads = [_TITLE * many + legend for many, legend in zip(lines, legends, strict=True)]
     tall = sum(heads) + _TALL * len(heads) + _GAP * (len(heads) - 1)
     above = 0
@@ -90,7 +93,7 @@ def _placed(figure: Any, legends: Sequence[int], lines: Sequence[int]) -> int:
 
 
 def _legend_height(panel: Panel) -> int:
-    """Pixels of the lines that a legend takes in a narrow window; 0 where there is none."""
+    """Height of a legend in a narrow window, in pixels; 0 without a legend."""
     labels = [trace.label for trace in panel.traces[:_MOST]]
     if len(labels) < 2:
         return 0
@@ -108,6 +111,6 @@ def _panels(result: Result, names: Sequence[str]) -> list[Panel]:
 
 
 def _thinned(trace: Trace) -> tuple[Any, Any]:
-    """At no more points than can be seen."""
+    """Points (x, y) of a curve, reduced to as many as can be seen."""
     some = np.unique(np.linspace(0, len(trace.x) - 1, _POINTS).round().astype(int))
     return trace.x[some], trace.y[some]

@@ -1,4 +1,4 @@
-"""The page around a report: one file, whose rules let nothing in from outside."""
+"""HTML page of a report: one file, whose security policy allows no external content."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from ...markup import text
 
-#: Nothing is fetched from anywhere; scripts and pictures are those of the page itself, and what
-#: moves makes functions of its own (viser's decoder, compiled to WebAssembly).
+#: Nothing is loaded from elsewhere: scripts and pictures are part of the page.  The animation needs
+#: 'unsafe-eval' for the decoder of viser, which is compiled to WebAssembly.
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob: data:; "
     "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; worker-src blob:; "
@@ -39,12 +39,12 @@ a { color: var(--accent); }
 
 
 def section(name: str, title: str, body: str) -> str:
-    """A part of the page with its heading; `name` is where links lead."""
+    """Section of the page with its heading; `name` is the target of links."""
     return f'<section id="{name}"><h2>{text(title)}</h2>\n{body}</section>'
 
 
 def document(title: str, style: str, sections: Sequence[tuple[str, str, str]], head: str) -> str:
-    """The whole page of (name, title, body); empty bodies are left out."""
+    """Build the whole page from sections (name, title, body); empty bodies are left out."""
     there = [one for one in sections if one[2]]
     links = "".join(f'<a href="#{name}">{text(heading)}</a>' for name, heading, _ in there)
     body = "\n".join(section(*one) for one in there)

@@ -1,4 +1,4 @@
-"""Equations of the elements that a scene is made of, as their definitions state them."""
+"""Equations of the elements of a scene, as stated by their definitions."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from ...scene.checks.types import types
 
 
 def equations(scene: Scene) -> tuple[str, str]:
-    """(style, body): the equations of every type of element that is built in, folded, and where
-    those of others stand."""
+    """(style, body) with the equations of every built-in element type, collapsed.
+
+    For other elements the body names the file of their definition.
+    """
     from ...derive.show.html import STYLE
     from ...derive.show.page import show_view
     from ...derive.show.subjects import view
@@ -22,7 +24,7 @@ def equations(scene: Scene) -> tuple[str, str]:
         try:
             shown = view(f"{kind}_{name}")
         except ElementError:
-            missing = f"{kind} {name}: its equations stand in the file of its definition"
+            missing = f"{kind} {name}: its equations are in the file of its definition"
             parts.append(f"<p>{text(missing)}</p>")
             continue
         page = show_view(shown, "equations", "html")

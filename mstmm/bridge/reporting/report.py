@@ -1,4 +1,4 @@
-"""`mstmm.report`: one page that tells a run to somebody who was not there."""
+"""`mstmm.report`: self-contained HTML report of a run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ...runtime.result.result import Result
     from ...runtime.result.view.view import View
 
-#: Moments of the strip.
+#: Number of times in the strip of pictures.
 _MOMENTS = 6
 
 
@@ -31,12 +31,14 @@ def report(
     quantities: Sequence[str] = (),
     trails: Sequence[str] = (),
 ) -> Path:
-    """Write one page that needs no network: what the run is and whether it can be trusted, how it
-    moves, curves, certificate, equations of its elements, provenance; returns the path.
+    """Write a self-contained HTML report of a run, and return its path.
 
-    Extras: plot, and view for what moves.  `quantities` are those of the curves, by default what
-    `Result.plot` chooses, and the energy; `trails` as in `Result.view`.  SceneError for a path that
-    does not end in .html and for names that there are not; EnvironmentFailure without the extras.
+    It has the verdict, an animation, curves, the certificate, the equations of the elements and the
+    provenance.  It needs no network.
+
+    Extras: plot, and view for the animation.  `quantities` are those of the curves; default: those
+    of `Result.plot`, and the energy.  `trails` as in `Result.view`.  SceneError for a path that
+    does not end in .html and for unknown names; EnvironmentFailure without the extras.
     """
     if not hasattr(result, "certificate"):
         raise SceneError(f"report: expected a result, found {short(result)}")
@@ -55,7 +57,7 @@ def report(
         ("curves", "Curves", curves(result, quantities)),
         ("certificate", "The certificate", words.certificate(result)),
         ("equations", "The equations", formulas),
-        ("provenance", "Where it comes from", words.provenance(result)),
+        ("provenance", "Provenance", words.provenance(result)),
     )
     page = document(title, style, sections, words.verdict(result))
     write_text(path, page)
@@ -63,13 +65,13 @@ def report(
 
 
 def _seen(view: View | None) -> str:
-    """A strip of moments, and the page that moves inside this one."""
+    """HTML of a strip of pictures, and of the animation embedded in the page."""
     if view is None:
         return ""
     drawn = b64encode(view.picture(_MOMENTS)).decode("ascii")
-    strip = f'<img alt="the mechanism at {_MOMENTS} moments" src="data:image/png;base64,{drawn}"/>'
+    strip = f'<img alt="the mechanism at {_MOMENTS} times" src="data:image/png;base64,{drawn}"/>'
     moving = (
-        '<iframe title="the run as it moves" data-theme="light" '
+        '<iframe title="animation of the run" data-theme="light" '
         f'srcdoc="{escape(view.html)}"></iframe>'
     )
     return f'<div class="strip">{strip}</div>{moving}'

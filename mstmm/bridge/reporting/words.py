@@ -1,4 +1,4 @@
-"""What a run says of itself, in plain words and tables."""
+"""Sentences and tables of a report that summarise a run."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ if TYPE_CHECKING:
     from ...runtime.result.result import Result
     from ...runtime.run.error_estimate import ErrorEstimate
 
-#: Bodies and hinges that are listed one by one.
+#: Largest number of bodies and hinges in a list.
 _LISTED = 200
-#: Share of the motion from which on no digits are told, and digits beyond which none are counted.
+#: Relative error from which on no digits are reported, and largest number of digits reported.
 _ONE_DIGIT, _MOST_DIGITS = 0.01, 12
-#: Rows of loops that are listed.
+#: Largest number of constraint rows in a list.
 _REPEATED = 12
 
 
 def verdict(result: Result) -> str:
-    """May the numbers be used, to how many digits, and until when?"""
+    """HTML of the verdict: whether, to how many digits and until when the numbers are reliable."""
     found = result.certificate.verdict()
     kind = "bad" if found.against else "good" if found.trusted else "open"
     words, _, reason = str(found).partition(": ")
@@ -32,10 +32,10 @@ def verdict(result: Result) -> str:
 
 
 def _how_far(result: Result) -> Iterator[str]:
-    """To what error, and until when."""
+    """Sentences on the size of the error, and until when it applies."""
     certificate, reached = result.certificate, result.error_estimate
     if reached is not None:
-        yield f"Asked for an error: {reached}"
+        yield f"Target error: {reached}"
     error, until = certificate.error, certificate.predictable_until
     if error is not None:
         end = float(result.t[-1]) if until is None else until
@@ -46,15 +46,15 @@ def _how_far(result: Result) -> Iterator[str]:
         )
     if until is not None:
         yield (
-            f"From t = {until:.3g} s on accurate runs part: what comes "
-            "later can be trusted as one possible motion, not as the one."
+            f"From t = {until:.3g} s on accurate runs diverge: later values are one possible "
+            "motion, but no prediction."
         )
     if error is not None or reached is not None:
-        yield f"Looked at was {certificate.covers}."
+        yield f"The error refers to {certificate.covers}."
 
 
 def _digits(error: ErrorEstimate) -> str:
-    """How many digits of coordinates that makes, beside how far they go."""
+    """Clause with the number of reliable digits of coordinates, relative to their excursion."""
     shares = [value / error.moved.get(unit, 0.0) for unit, value in error.largest("q").items()
               if error.moved.get(unit, 0.0) > 0]  # fmt: skip
     worst = max(shares, default=0.0)
@@ -62,11 +62,11 @@ def _digits(error: ErrorEstimate) -> str:
         return ""
     digits = _MOST_DIGITS if worst <= 10.0**-_MOST_DIGITS else int(-log10(worst))
     more = " or more" if digits == _MOST_DIGITS else ""
-    return f", so that {digits} digits{more} of how far coordinates go can be used"
+    return f", which is {digits} digits{more} of the largest excursion of coordinates"
 
 
 def made(result: Result) -> str:
-    """How the run was made and what was chosen for it."""
+    """HTML of the settings of a run, and of the choices made for it."""
     settings, counted, model = result.settings, result.statistics, result.model
     by = f"step {settings.step:g} s" if settings.step is not None else (
         f"rtol {settings.rtol:g}, atol {settings.atol:g}"
@@ -80,25 +80,25 @@ def made(result: Result) -> str:
         rows.append(("steps", f"{counted.steps}, {counted.rejected} rejected"))
         rows.append(("evaluations", f"{counted.evaluations}"))
     stretches = [str(stretch) for stretch in result.methods]
-    chosen = folded("What was chosen, when and why", bullets(stretches)) if stretches else ""
+    chosen = folded("Methods chosen, with time and reason", bullets(stretches)) if stretches else ""
     return table(rows) + chosen + _models(result)
 
 
 def _models(result: Result) -> str:
-    """Levels of model of flexible bodies and what they leave out; what is packed otherwise."""
+    """HTML of model levels of flexible bodies with their limits, and of simplifications."""
     rows = [
         (name, body.n, body.frame, "; ".join(body.notes) or "nothing")
         for name, body in result.model.flexible.items()
     ]
-    head = ("flexible body", "shapes", "floating frame", "worth knowing")
+    head = ("flexible body", "shapes", "floating frame", "notes")
     found = f'<div class="long">{table(rows, head)}</div>' if rows else ""
     if packed := [str(one) for one in result.model.simplifications]:
-        found += folded("What is packed otherwise than the scene says it", bullets(packed))
-    return f"<h3>What is simplified</h3>{found}" if found else ""
+        found += folded("Simplifications of the scene before compilation", bullets(packed))
+    return f"<h3>Simplifications</h3>{found}" if found else ""
 
 
 def mechanism(result: Result) -> str:
-    """Bodies and hinges as lists."""
+    """HTML lists of bodies and hinges, and of closed loops."""
     scene = result.model.scene
     joined = [
         (hinge.name, hinge.type, hinge.inboard, hinge.outboard)
@@ -116,33 +116,33 @@ def mechanism(result: Result) -> str:
 
 
 def _loops(result: Result) -> str:
-    """Where loops are cut, what they leave free, and which loads they leave open."""
+    """HTML of closed loops: cut hinges, rank, mobility and indeterminate loads."""
     if result.model.closed is None:
         return ""
     loops = result.model.closed.loops
     rows = [
         ("loops closed by", ", ".join(loops.cut[:_REPEATED]) or "constraints and couplings"),
-        ("rows that count", f"{loops.rank} of {len(loops.rows)}"),
-        ("speeds left free", loops.mobility),
-        ("rows that repeat others", loops.repeated(_REPEATED) or "none"),
-        ("loads that are not determined", loops.open_loads or "none"),
+        ("independent rows", f"{loops.rank} of {len(loops.rows)}"),
+        ("mobility", loops.mobility),
+        ("redundant rows", loops.repeated(_REPEATED) or "none"),
+        ("indeterminate loads", loops.open_loads or "none"),
     ]
     if loops.singular:
-        rows.append(("the start", f"a singular pose: {loops.nearby} rows count nearby"))
+        rows.append(("start", f"singular configuration: {loops.nearby} independent rows nearby"))
     return "<h3>Closed loops</h3>" + table(rows)
 
 
 def certificate(result: Result) -> str:
-    """Every line of the certificate, and the risks with their remedies."""
+    """HTML of all lines of the certificate, and of the risks with their remedies."""
     body = table(result.certificate.rows(verdict=False, warnings=False))
     risks = [(risk.element, risk.means, risk.remedy) for risk in result.risks]
     if risks:
-        body += "<h3>What asks for attention</h3>" + table(risks, ("of", "what", "remedy"))
+        body += "<h3>Risks</h3>" + table(risks, ("element", "finding", "remedy"))
     return body
 
 
 def provenance(result: Result) -> str:
-    """Versions, hashes, and the scene with every default filled in."""
+    """HTML of versions, hashes, and the scene with every default filled in."""
     from ...runtime.kernels.identity import kernels_hash
     from ...runtime.result.output.provenance import scene_hash, versions
 
