@@ -1,1 +1,1 @@
-"""The atlas of failures: where methods fail, found anew in every run, and what holds there."""
+"""Atlas of failures: where methods fail, measured in every run, and which remedies hold there."""

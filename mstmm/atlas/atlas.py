@@ -1,4 +1,4 @@
-"""The atlas: its cases measured, as data, as pictures and as a page."""
+"""Atlas of measured cases, as data, plots and a page."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from ..runtime.host.files import write_text
 from . import cases as known
 from .case import Case, measure
 
-#: Values of a coarse grid, and how close a bracket is brought, as a part of the parameter.
+#: Values of the coarse grid, and relative width of the last bracket.
 POINTS, TOLERANCE = 13, 0.01
 
 
 @dataclass(frozen=True)
 class Atlas:
-    """Cases in the order in which they were asked for."""
+    """Measured cases of the atlas, in the requested order."""
 
     cases: tuple[Case, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """{"cases": [...]}, plain data."""
+        """Convert to plain data, {"cases": [...]}."""
         return {"cases": [case.to_dict() for case in self.cases]}
 
     def plot(self, folder: str | Path) -> list[Path]:
-        """A picture NAME.png of each case in a folder that is there; their paths.
+        """Write a plot NAME.png of each case to an existing folder; returns the paths.
 
         Raises EnvironmentFailure without the extra `plot`.
         """
@@ -39,9 +39,10 @@ class Atlas:
         return paths
 
     def save(self, folder: str | Path, pictures: bool = True) -> list[Path]:
-        """`atlas.json`, the page `atlas.md` and, if wanted, a picture of each case; their paths.
+        """Write `atlas.json`, the page `atlas.md` and optionally a plot of each case.
 
-        The folder is made, with its parents.  Raises EnvironmentFailure where that cannot be.
+        Returns the paths.  The folder is created with its parents; raises EnvironmentFailure if
+        that fails.
         """
         from .page import page
 
@@ -49,7 +50,9 @@ class Atlas:
         try:
             place.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise EnvironmentFailure(f'folder "{place}" cannot be made: {error.strerror}') from None
+            raise EnvironmentFailure(
+                f'folder "{place}" cannot be created: {error.strerror}'
+            ) from None
         data, text = place / "atlas.json", place / "atlas.md"
         write_text(data, json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
         write_text(text, page(self.cases, pictures))
@@ -63,16 +66,16 @@ def stability(
     tolerance: float = TOLERANCE,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Atlas:
-    """Find where methods fail, and how far their remedies hold.
+    """Find the parameter values at which methods fail, and the range of each remedy.
 
     Args:
-        cases: names (`mstmm stability --list`); if not given all whose packages are installed.
+        cases: names (`mstmm stability --list`); default: all whose packages are installed.
         points: values of the coarse grid along each parameter, 3 or more.
-        tolerance: how close the two ends of a frontier are brought, as a part of the parameter.
-        progress: called with a case's name, its number from 0 and how many there are.
+        tolerance: width of the last bracket of a frontier, relative to the parameter.
+        progress: called with the name of a case, its index and the number of cases.
 
-    Raises SceneError for a name that there is not and for settings that make no sense,
-    EnvironmentFailure for a named case without its packages.
+    Raises SceneError for an unknown name and for invalid settings, EnvironmentFailure for a named
+    case without its packages.
     """
     if isinstance(cases, str) or (cases is not None and not isinstance(cases, Iterable)):
         raise SceneError(f"cases = {short(cases)}: expected a list of names")

@@ -1,4 +1,4 @@
-"""A case of the atlas: measured, and drawn."""
+"""Measurement and plot of a case of the atlas."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from .frontier import Tried, bracketed, outwards
 
 
 class Case(Found):
-    """What came out of a case, and its picture."""
+    """Result of a case, with its plot."""
 
     def plot(self, path: str | Path | None = None) -> Any:
-        """`matplotlib.figure.Figure` of both methods along the parameter, kept as a file if asked.
+        """Plot both methods along the parameter; returns a `matplotlib.figure.Figure`.
 
-        Raises SceneError for a path that is no .png, .svg or .pdf, EnvironmentFailure without the
-        extra `plot`.
+        With `path` the figure is also written to that file.  Raises SceneError for a path that is
+        no .png, .svg or .pdf, EnvironmentFailure without the extra `plot`.
         """
         from .picture import draw
 
@@ -26,9 +26,9 @@ class Case(Found):
 
 
 def measure(case: Definition, points: int, tolerance: float) -> Case:
-    """Find the frontiers of a case: a grid of `points` values, then halvings to `tolerance`.
+    """Find the frontiers of a case: a grid of `points` values, then bisection to `tolerance`.
 
-    Raises NumericalFailure naming the case where it does not come out as it is defined.
+    Raises NumericalFailure, with the name of the case, if the results contradict its definition.
     """
     method = Tried(case.method.measure, case.limit)
     remedy = Tried(case.remedy.measure, case.limit)
@@ -40,7 +40,7 @@ def measure(case: Definition, points: int, tolerance: float) -> Case:
         found = bracketed(method, values, case.scale, tolerance)
         assert found.fails_at is not None
         for value in values:
-            remedy.holds(value)  # for the picture
+            remedy.holds(value)  # for the plot
         further = case.scale.grid(found.fails_at, case.reach, points)
         held = outwards(remedy, further, case.scale, tolerance)
     except NumericalFailure as error:

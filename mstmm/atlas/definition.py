@@ -1,4 +1,4 @@
-"""What a case of the atlas is before anything is computed."""
+"""Definition of a case of the atlas, before anything is computed."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from .scale import Scale
 
 @dataclass(frozen=True)
 class Method:
-    """A method as a function of the case's parameter.
+    """Method as a function of the case's parameter.
 
-    `measure` gives what is judged; it raises NumericalFailure, or returns a number that is not
-    finite, where there is no answer at all.
+    `measure` returns the error measure; it raises NumericalFailure, or returns a number that is not
+    finite, where there is no answer.
     """
 
     name: str
@@ -23,11 +23,11 @@ class Method:
 
 @dataclass(frozen=True)
 class Definition:
-    """A parameter that breaks a method, when that counts as broken, and what holds there.
+    """Case: a parameter for which a method fails, the criterion, and the remedy.
 
-    `low` and `high` are the ends between which the method is tried: at one of them it must hold,
-    at the other fail.  `reach` is how far the remedy is tried beyond the failing end.  It failed
-    where `measured` is above `limit`.  It needs the packages of `extra`.
+    The method is measured between `low` and `high`: at one end it must hold, at the other fail.
+    The remedy is measured from the failing end to `reach`.  A method fails where `measured` exceeds
+    `limit`.  The case needs the packages of `extra`.
     """
 
     name: str
@@ -48,5 +48,5 @@ class Definition:
 
     @property
     def lacks(self) -> list[str]:
-        """Packages that the case needs and that are not installed."""
+        """Packages needed by the case that are not installed."""
         return absent(self.extra) if self.extra else []

@@ -1,4 +1,4 @@
-"""What came out of a case, as data."""
+"""Result of a case of the atlas, as data."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from .frontier import Points
 
 @dataclass(frozen=True)
 class Found:
-    """Where a method fails, and how far its remedy holds.
+    """Result of a case: where a method fails, and how far its remedy holds.
 
-    `fails_at` and `holds_at` are the two ends of the last bracket, in `unit`; `fails` says on which
-    side of it ("above" or "below").  `remedy_holds_to` is the end of what was tried, or, where
-    `remedy_fails_at` is a number, of what the remedy can.  `points` and `remedy_points` are what
-    was tried: pairs of the parameter and what is measured, infinite where there was no answer.
+    `fails_at` and `holds_at` are the two ends of the last bracket, in `unit`; `fails` is the side
+    on which the method fails ("above" or "below").  `remedy_holds_to` is the end of the range that
+    was measured, or, where `remedy_fails_at` is a number, the end of the range of the remedy.
+    `points` and `remedy_points` are the measured points: pairs of the parameter and the error
+    measure, infinite where there was no answer.
     """
 
     name: str
@@ -40,7 +41,7 @@ class Found:
     source: str
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data; pairs as lists, infinite values as None."""
+        """Convert to plain data; pairs become lists, infinite values None."""
         return {key: _plain(value) for key, value in vars(self).items()}
 
 

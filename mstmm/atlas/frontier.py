@@ -1,4 +1,4 @@
-"""The frontier between where a method holds and where it fails, by bisection."""
+"""Frontier between the parameter values at which a method holds and fails, by bisection."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Points = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class Frontier:
-    """The two ends of the last bracket, and every (parameter, measured) on the way, in order.
+    """Last bracket of a frontier, and all measured points (parameter, measured) in order.
 
-    `fails_at` is None where nothing failed.  `monotone` is False where a coarse grid changes sides
-    more than once: then the frontier is the first one that is met from the side that holds.
+    `fails_at` is None if nothing failed.  `monotone` is False if the coarse grid changes sides more
+    than once: then the frontier is the first one from the side that holds.
     """
 
     holds_at: float
@@ -28,14 +28,14 @@ class Frontier:
 
 
 class Tried:
-    """A method's measured values by parameter, each computed once."""
+    """Measured values of a method by parameter, each computed once."""
 
     def __init__(self, measure: Callable[[float], float], limit: float) -> None:
         self._measure, self._limit = measure, limit
         self._found: dict[float, float] = {}
 
     def holds(self, value: float) -> bool:
-        """Whether what is measured there is within the limit; no answer, or no number, is not."""
+        """Whether the measured value is within the limit; no answer counts as a failure."""
         if value not in self._found:
             try:
                 found = float(self._measure(value))
@@ -45,28 +45,28 @@ class Tried:
         return self._found[value] <= self._limit
 
     def points(self) -> Points:
-        """What was tried so far, in the order of the parameter."""
+        """Points measured so far, in the order of the parameter."""
         return tuple(sorted(self._found.items()))
 
 
 def bracketed(tried: Tried, values: Sequence[float], scale: Scale, tolerance: float) -> Frontier:
-    """The frontier along `values`, of which the first must hold and the last must fail.
+    """Find the frontier along `values`, where the first must hold and the last must fail.
 
-    Raises NumericalFailure where they do not.
+    Raises NumericalFailure otherwise.
     """
     sides = [tried.holds(value) for value in values]
     if not sides[0] or sides[-1]:
         said = "holds" if sides[0] else "fails"
         raise NumericalFailure(
-            f"no frontier between {values[0]:g} and {values[-1]:g}: the method {said} at both"
+            f"no frontier between {values[0]:g} and {values[-1]:g}: the method {said} at both ends"
         )
     return _first(tried, values, sides, scale, tolerance)
 
 
 def outwards(tried: Tried, values: Sequence[float], scale: Scale, tolerance: float) -> Frontier:
-    """How far along `values` a method holds, of which the first must.
+    """Find how far along `values` a method holds; it must hold at the first.
 
-    Raises NumericalFailure where that fails.
+    Raises NumericalFailure otherwise.
     """
     sides = [tried.holds(value) for value in values]
     if not sides[0]:
@@ -79,7 +79,7 @@ def outwards(tried: Tried, values: Sequence[float], scale: Scale, tolerance: flo
 def _first(
     tried: Tried, values: Sequence[float], sides: Sequence[bool], scale: Scale, tolerance: float
 ) -> Frontier:
-    """Halve the first step of `values` that changes sides until it is as short as `tolerance`."""
+    """Bisect the first interval of `values` that changes sides, down to `tolerance`."""
     changes = sum(a != b for a, b in pairwise(sides))
     place = sides.index(False)
     good, bad = values[place - 1], values[place]

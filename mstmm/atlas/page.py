@@ -1,4 +1,4 @@
-"""The atlas as a page in Markdown: a table, and a part for each case."""
+"""Atlas as a page in Markdown: a table, and a section for each case."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from .found import Found
 HEAD = """\
 # Where methods fail
 
-The atlas of failures, written by `mstmm stability --out DIR`. Every frontier is found in the run,
-by a coarse grid and bisection, and nothing of it is typed in. A method *fails* where what is
-measured is above its limit, or where there is no answer at all; arrows at the upper edge of a
-picture stand for no answer, or one far beyond the axis, and "tried to" is written where the marks
-of a method end because nobody looked farther. "(end)" says that the remedy holds as far as it was
-tried.
+Atlas of failures, written by `mstmm stability --out DIR`. Every frontier is measured in that run,
+by a coarse grid and bisection. A method *fails* where its error measure exceeds the limit, or where
+there is no answer. Arrows at the upper edge of a plot mean no answer, or one far beyond the axis.
+"tried to" marks the end of the range that was measured for a method. "(end)" means that the remedy
+holds over the whole range that was measured.
 """
 
 _HEADINGS = ("case", "parameter", "measured", "limit", "fails", "remedy", "holds to")
@@ -24,7 +23,7 @@ _ROW = (
 
 
 def page(cases: Sequence[Found], pictures: bool) -> str:
-    """The whole page; with `pictures`, NAME.png lies beside it for each case."""
+    """Whole page; with `pictures` it refers to NAME.png for each case, in the same folder."""
     rows = "\n".join(_ROW.format(**_row(case)) for case in cases)
     head = f"| {' | '.join(_HEADINGS)} |\n|{'---|' * len(_HEADINGS)}"
     parts = "\n".join(_part(case, pictures) for case in cases)
@@ -44,7 +43,7 @@ def _row(case: Found) -> dict[str, str]:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number as one writes it: 2.67e6, 100 000 as 1e5, and short ones in full."""
+    """Format a number in common notation: 2.67e6, 1e5, and short ones in full."""
     if value == round(value) and abs(value) < 1000:
         return f"{value:.0f}"
     mantissa, _, power = f"{value:.{digits}g}".partition("e")
@@ -52,29 +51,29 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def in_unit(case: Found) -> str:
-    """The parameter with its unit."""
+    """Parameter of a case with its unit."""
     return f"{case.parameter} in {case.unit}" if case.unit else case.parameter
 
 
 def frontier(case: Found) -> str:
-    """What fails, and from where on."""
+    """Name of the method, and where it starts to fail."""
     step = "up" if case.fails == "above" else "down"
     return f"{case.method}, from {number(case.fails_at)} {step}"
 
 
 def limit(case: Found) -> str:
-    """Above what it counts as a failure."""
+    """Limit of the error measure, above which a method fails."""
     return number(case.limit)
 
 
 def tried_to(case: Found) -> float:
-    """How far the method was tried on the side on which it fails."""
+    """End of the range measured for the method, on the side on which it fails."""
     ends = [at for at, _ in case.points]
     return max(ends) if case.fails == "above" else min(ends)
 
 
 def held_to(case: Found) -> str:
-    """How far the remedy holds; with a plus where that is only as far as it was tried."""
+    """How far the remedy holds, with "(end)" if that is the end of the measured range."""
     return number(case.remedy_holds_to) + (" (end)" if case.remedy_fails_at is None else "")
 
 
@@ -87,9 +86,9 @@ def _part(case: Found, pictures: bool) -> str:
 
 
 def _judged(case: Found) -> str:
-    chance = "" if case.monotone else "; beyond it holds here and there by chance"
+    chance = "" if case.monotone else "; beyond it holds in places, by chance"
     end = case.remedy_fails_at
-    beyond = "the end of what is tried" if end is None else f"fails at {number(end, 4)}"
+    beyond = "the end of the range" if end is None else f"fails at {number(end, 4)}"
     return (
         f"- measured: {case.measured}; a failure above {limit(case)}\n"
         f"- {case.method}: holds at {number(case.holds_at, 4)}, fails at "

@@ -1,4 +1,4 @@
-"""A picture of a case: both methods along the parameter, the limit, and the side that fails."""
+"""Plot of a case: both methods along the parameter, the limit, and the failing side."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .found import Found
     from .frontier import Points
 
-#: Colours that stay apart in grey and for colour-blind readers (Okabe and Ito, 2008).
+#: Colours that differ in grey and for colour-blind readers (Okabe and Ito, 2008).
 _FAILING, _REMEDY, _SIDE = "#D55E00", "#0072B2", "#fbe6da"
 
 _STYLE: dict[str, Any] = {
@@ -31,21 +31,22 @@ _STYLE: dict[str, Any] = {
     "savefig.dpi": 110,
 }
 
-#: What is measured is drawn between these powers of ten.
+#: Range of measured values that is drawn.
 _LEAST, _MOST = 1e-17, 1e6
 
-#: Beyond such a ratio the axis of what is measured is logarithmic.
+#: Ratio of measured values beyond which their axis is logarithmic.
 _DECADE = 10.0
 
-#: Parts of the axis below and of what is measured, where arrows stand, and a word above them.
+#: Fractions of the axis: space below the data, height of the data, position of arrows and of the
+#: text above them.
 _FOOT, _FILLED, _ARROWS, _WORD = 0.05, 0.73, 0.84, 0.865
 
-#: Letters that a line of the legend has room for.
+#: Number of letters that fit on a line of the legend.
 _LETTERS = 80
 
 
 def draw(case: Found, path: Path | None) -> Any:
-    """See `Case.plot`."""
+    """Plot a case; see `Case.plot`."""
     Figure = figures()
     import matplotlib as mpl
 
@@ -89,7 +90,7 @@ def _fill(axis: Any, case: Found) -> None:
 
 
 def _whole_ticks(axis: Any, left: float, right: float) -> None:
-    """Whole numbers along a short axis, powers of ten along a long one."""
+    """Set ticks at integers on a short axis, at powers of ten on a long one."""
     steps = (1, 2, 5) if right < 300 * left else (1,)
     powers = range(int(math.log10(left)), int(math.log10(right)) + 1)
     ticks = [step * 10**power for power in powers for step in steps]
@@ -99,7 +100,7 @@ def _whole_ticks(axis: Any, left: float, right: float) -> None:
 
 
 def _heights(axis: Any, points: Points, limit: float) -> None:
-    """Scale and ends of the axis of what is measured: all that is finite, and room above it."""
+    """Set scale and limits of the axis of measured values: all finite ones, with space above."""
     found = [min(max(m, _LEAST), _MOST) for _, m in points if math.isfinite(m)]
     low, high = min(*found, limit), max(*found, limit)
     if high > _DECADE * low:
@@ -112,8 +113,8 @@ def _heights(axis: Any, points: Points, limit: float) -> None:
 
 
 def _name_frontier(axis: Any, at: float) -> None:
-    """Its parameter at the head of the line, on the side that has more room."""
-    axis.autoscale_view()  # or the transformation is still that of an empty axis
+    """Label the frontier with its parameter, at the top, on the side with more space."""
+    axis.autoscale_view()  # otherwise the transformation is that of an empty axis
     left, _ = axis.transAxes.inverted().transform(axis.transData.transform((at, 1.0)))
     axis.annotate(
         f"fails at {number(at)}", (at, 0.985), xycoords=("data", "axes fraction"),
@@ -123,8 +124,7 @@ def _name_frontier(axis: Any, at: float) -> None:
 
 
 def _name_end(axis: Any, case: Found) -> None:
-    """That nothing was tried beyond the last mark, above it, or below the end of a curve that
-    falls."""
+    """Label the end of the measured range, above the last mark, or below a falling curve."""
     before, last = sorted(case.points, reverse=case.fails == "below")[-2:]
     at, measured = last
     lost = _lost(measured)
@@ -138,12 +138,12 @@ def _name_end(axis: Any, case: Found) -> None:
 
 
 def _lost(measured: float) -> bool:
-    """Whether there was no answer, or one far beyond the axis."""
+    """Whether there is no answer, or one far beyond the axis."""
     return not measured <= _MOST
 
 
 def _curve(axis: Any, points: Points, **look: Any) -> None:
-    """A line through what was measured; arrows above where there was no answer."""
+    """Draw a line through the measured values, and arrows where there is no answer."""
     shown = [(at, max(m, _LEAST)) for at, m in points if not _lost(m)]
     axis.plot(*zip(*shown, strict=True), linewidth=1.6, markersize=3.5, **look)
     lost = [at for at, m in points if _lost(m)]
@@ -156,6 +156,6 @@ def _curve(axis: Any, points: Points, **look: Any) -> None:
 def _write(figure: Any, path: Path) -> None:
     kind = path.suffix.lower().lstrip(".")
     if kind not in ("png", "svg", "pdf"):
-        raise SceneError(f'picture "{path}": expected a name that ends in .png, .svg or .pdf')
+        raise SceneError(f'plot "{path}": expected a name that ends in .png, .svg or .pdf')
     with replacing(path) as temporary:
         figure.savefig(temporary, format=kind)

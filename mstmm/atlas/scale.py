@@ -1,4 +1,4 @@
-"""Scales of a parameter: a grid between two ends, and the middle of a bracket."""
+"""Scales of a parameter: a grid between two ends, and the midpoint of a bracket."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Scale:
-    """How a parameter is laid out: values and positions along an axis, one to one."""
+    """Scale of a parameter: a one-to-one map between values and positions on an axis."""
 
     name: str
     position: Callable[[float], float]
     value: Callable[[float], float]
 
     def grid(self, low: float, high: float, points: int) -> tuple[float, ...]:
-        """`points` values from `low` to `high`, both included; whole ones once each."""
+        """Grid of `points` values from `low` to `high`, both included, without duplicates."""
         first, last = self.position(low), self.position(high)
         inner = (
             self.value(first + (last - first) * i / (points - 1)) for i in range(1, points - 1)
@@ -24,8 +24,7 @@ class Scale:
         return tuple(dict.fromkeys((low, *inner, high)))
 
     def middle(self, one: float, other: float, tolerance: float) -> float | None:
-        """The value halfway, or None where the two are as close as `tolerance` or nothing lies
-        between."""
+        """Midpoint of a bracket, or None if it is within `tolerance` or has no value inside."""
         a, b = self.position(one), self.position(other)
         width = abs(b - a) if self.name == "log" else abs(b - a) / max(abs(a), abs(b))
         half = self.value((a + b) / 2)
@@ -37,5 +36,5 @@ class Scale:
 
 LINEAR = Scale("linear", float, float)
 LOG = Scale("log", math.log, math.exp)
-#: Whole numbers, evenly in their logarithms.
+#: Integers, equidistant in their logarithms.
 COUNT = Scale("count", math.log, lambda position: float(round(math.exp(position))))

@@ -1,4 +1,4 @@
-"""Scenes that several cases share."""
+"""Scenes that several cases use."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from ..scene import Scene
 #: Moments of inertia of a uniform rod of 1 m and 1 kg, along it and across, kg*m2.
 THIN, ROD = 0.001, 1 / 12
 
-#: What two rods exchange that fall from the horizontal, J: 1 kg by 0.5 m, 1 kg by 1.5 m.
+#: Energy exchanged by two rods that fall from the horizontal, J: 1 kg by 0.5 m, 1 kg by 1.5 m.
 FALL = 9.81 * 2.0
 
-#: Angle at which a sprung rod is let go, rad.
+#: Angle at which a sprung rod is released, rad.
 LET_GO = 1e-3
 
 
 def model(scene: dict[str, Any], **options: Any) -> Model:
-    """A scene by the looped engine and the Riccati sweep: no compiler, no guard that chooses."""
+    """Compile a scene for the looped engine and the Riccati sweep, without automatic choices."""
     options.setdefault("sweep", "riccati")
     return compile_scene(Scene(**scene), engine="looped", **options)
 
 
 def rod(name: str, mass: float = 1.0, inertia: Sequence[float] | None = None) -> dict[str, Any]:
-    """A uniform rod of 1 m along x from its input end to its end `tip`."""
+    """Uniform rod of 1 m along x from its input end to its end `tip`, as a table of a scene."""
     moments = inertia or (THIN, ROD, ROD)
     return {
         "name": name, "mass": mass, "center_of_mass": [0.5, 0, 0],
@@ -38,8 +38,10 @@ def rod(name: str, mass: float = 1.0, inertia: Sequence[float] | None = None) ->
 
 
 def chain(count: int, kind: str = "pin", skew: float = 0.0, **of_rods: Any) -> dict[str, Any]:
-    """Equal rods on hinges of one kind in a row, `skew` rad about their own axes between
-    neighbours' hinges; gravity along -y."""
+    """Chain of equal rods on hinges of one kind; gravity along -y.
+
+    Neighbouring hinges are rotated by `skew` rad about the axis of the rod between them.
+    """
     return {
         "gravity": [0, -9.81, 0],
         "chain": [{
@@ -52,7 +54,7 @@ def chain(count: int, kind: str = "pin", skew: float = 0.0, **of_rods: Any) -> d
 
 
 def row_of(masses: Sequence[float]) -> dict[str, Any]:
-    """Rods of 1 m of these masses on parallel pins in a row; gravity along -y."""
+    """Chain of rods of 1 m with these masses on parallel pins; gravity along -y."""
     hinges = [
         {"name": f"pin{i}", "type": "pin", "outboard": f"rod{i}",
          "inboard": f"rod{i - 1}.tip" if i else "ground"}
@@ -63,13 +65,13 @@ def row_of(masses: Sequence[float]) -> dict[str, Any]:
 
 
 def drawn_pins(count: int) -> list[tuple[Array, Array]]:
-    """Three states of pins, angles and rates within +-1, the same in every run."""
+    """Three random states of pins, angles and rates within +-1, the same in every run."""
     rng = np.random.default_rng(1)
     return [(rng.uniform(-1, 1, count), rng.uniform(-1, 1, count)) for _ in range(3)]
 
 
 def sprung_rod(stiffness: float, damping: float = 0.0) -> Model:
-    """A rod on a pin with spring and damper (N*m/rad, N*m*s/rad), let go at 1e-3 rad; no weight."""
+    """Rod on a pin with spring and damper (N*m/rad, N*m*s/rad), from 1e-3 rad; no weight."""
     hinge = {
         "name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod",
         "law": {"stiffness": stiffness, "damping": damping}, "initial": {"q": [LET_GO]},
@@ -78,8 +80,10 @@ def sprung_rod(stiffness: float, damping: float = 0.0) -> Model:
 
 
 def hanging_rod(rate: float) -> Model:
-    """A rod that hangs from a pin, let go at 1e-3 rad: its weight gives it this angular frequency
-    (1/s)."""
+    """Rod that hangs from a pin, released at 1e-3 rad, with the angular frequency `rate` (1/s).
+
+    Its weight is chosen accordingly.
+    """
 
     def weighing(weight: float) -> Model:
         pin = {
@@ -93,13 +97,15 @@ def hanging_rod(rate: float) -> Model:
 
 
 def stiffness_of_rate(rate: float) -> float:
-    """The stiffness, N*m/rad, of which a rod has this angular frequency."""
+    """Stiffness, N*m/rad, with which a sprung rod has the angular frequency `rate` (1/s)."""
     return rate**2 * float(sprung_rod(1.0).mass_matrix([0.0])[0, 0])
 
 
 def double_pendulum(stiffness: float | None = None, stretch: float = 0.0) -> Model:
-    """Two rods that fall from the horizontal, on pins, or on undamped bushings of this stiffness
-    (N/m), which turn freely in space, and of which the first begins stretched (m)."""
+    """Two rods that fall from the horizontal, on pins or undamped bushings.
+
+    The bushings have this stiffness (N/m) and rotate freely; the first starts with `stretch` (m).
+    """
     names = ("upper", "lower")
     kind: dict[str, Any] = {"type": "pin"}
     if stiffness is not None:
@@ -114,8 +120,10 @@ def double_pendulum(stiffness: float | None = None, stretch: float = 0.0) -> Mod
 
 
 def sprung_elbow(stiffness: float, damping: float = 0.0) -> Model:
-    """Two rods that fall from the horizontal, held straight by a spring and a damper in their elbow
-    (N*m/rad, N*m*s/rad) that have nothing to hold at the start."""
+    """Two rods that fall from the horizontal, with a spring and a damper in their elbow.
+
+    Units are N*m/rad and N*m*s/rad; the spring is unloaded at the start, with straight rods.
+    """
     law = {"stiffness": stiffness, "damping": damping}
     hinges = [
         {"name": "shoulder", "type": "pin", "inboard": "ground", "outboard": "upper"},
@@ -125,8 +133,10 @@ def sprung_elbow(stiffness: float, damping: float = 0.0) -> Model:
 
 
 def spinning_top(kind: str, spin: Sequence[float] = (0.0, 0.0, 0.0)) -> Model:
-    """A body with three different moments of inertia that turns about its mass centre on a hinge of
-    this kind, without weight; `spin` is its angular velocity at the start (rad/s)."""
+    """Body with three different moments of inertia, rotating about its mass centre.
+
+    It has a hinge of this kind and no weight; `spin` is its angular velocity at the start (rad/s).
+    """
     top = {"name": "top", "mass": 1.0, "center_of_mass": [0, 0, 0], "inertia": [0.3, 0.4, 0.5]}
     foot = {"name": "foot", "type": kind, "inboard": "ground", "outboard": "top"}
     initial = {} if not any(spin) else {"initial": {"u": list(spin)}}
@@ -137,10 +147,13 @@ def four_bar(
     speed: float = 0.0, askew: float = 0.0, closed: bool = True, ratio: float = 1.0,
     spread: float = 1.0, feet: float = 1.2,
 ) -> dict[str, Any]:  # fmt: skip
-    """A crank of 0.5 m that turns at a speed (rad/s), a coupler of 1.1 m, a rocker of 0.8 m, of
-    1 kg/m, the coupler of `ratio` times that, on feet `feet` m apart; or these rods without the pin
-    that closes the loop.  The frames of their tips stand `askew`, rad; their moments of inertia are
-    `spread` times those of uniform rods."""
+    """Four-bar linkage, or without `closed` its rods without the pin that closes the loop.
+
+    It has a crank of 0.5 m that starts at `speed` (rad/s), a coupler of 1.1 m and a rocker of
+    0.8 m, on feet `feet` m apart.  Rods have 1 kg/m, the coupler `ratio` times that.  The frames of
+    their tips are misaligned by `askew`, rad; their moments of inertia are `spread` times those of
+    uniform rods.
+    """
 
     def link(name: str, length: float, density: float = 1.0) -> dict[str, Any]:
         mass, across = density * length, spread * density * length**3 / 12
@@ -169,8 +182,11 @@ def four_bar(
 
 
 def parallelogram(angle: float, closed: bool = True) -> dict[str, Any]:
-    """Two cranks and a coupler of 1 m on feet 1 m apart, `angle` rad from where all lie in one line
-    and a spring drives the first crank on; or these rods without the pin that closes the loop."""
+    """Parallelogram of two cranks and a coupler of 1 m, on feet 1 m apart.
+
+    It starts `angle` rad from the pose with all rods in line, and a spring acts on the first crank.
+    Without `closed` these rods have no pin that closes the loop.
+    """
     spring = {"stiffness": 10.0, "rest": -1.0}
     pins: tuple[tuple[str, str, str, float, dict[str, Any]], ...] = (
         ("foot", "ground", "crank", angle, {"hold": closed, "law": spring}),
@@ -182,7 +198,7 @@ def parallelogram(angle: float, closed: bool = True) -> dict[str, Any]:
 
 
 def _of_three_rods(pins: Sequence[tuple[str, str, str, float, dict[str, Any]]]) -> dict[str, Any]:
-    """Crank, coupler and rocker on pins: name, inboard, outboard, angle and what else they have."""
+    """Crank, coupler and rocker on pins, given as name, inboard, outboard, angle, other keys."""
     hinges = [
         {"name": name, "type": "pin", "inboard": inboard, "outboard": outboard,
          "initial": {"q": [q]}} | more
@@ -192,13 +208,15 @@ def _of_three_rods(pins: Sequence[tuple[str, str, str, float, dict[str, Any]]]) 
     return {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges}
 
 
-#: Angle by which the cranks of a hung linkage lean outwards, rad: its feet are 2 m apart.
+#: Outward inclination of the cranks of a hung linkage, rad: its feet are 2 m apart.
 LEAN = np.pi / 6
 
 
 def hung_linkage(stiffness: float) -> dict[str, Any]:
-    """A coupler that hangs level from two cranks, all of 1 m and 1 kg; the first crank is held
-    where it is by a spring (N*m/rad)."""
+    """Linkage with a coupler that hangs level from two cranks, all of 1 m and 1 kg.
+
+    A spring (N*m/rad) keeps the first crank in place.
+    """
     down = -np.pi / 2
     pins: tuple[tuple[str, str, str, float, dict[str, Any]], ...] = (
         ("foot", "ground", "crank", down + LEAN, {"law": {"stiffness": stiffness,
@@ -211,7 +229,7 @@ def hung_linkage(stiffness: float) -> dict[str, Any]:
 
 
 def held_row(masses: Sequence[float]) -> dict[str, Any]:
-    """Rods of 1 m in a row by pins, on an arch between two points of the ground."""
+    """Arch of rods of 1 m on pins between two points of the ground."""
     names, bend = [f"rod{i}" for i in range(len(masses))], 0.4
     angles = [bend * (len(masses) / 2 - i - 0.4) for i in range(len(masses))]
     hinges: list[dict[str, Any]] = [
@@ -231,8 +249,10 @@ def held_row(masses: Sequence[float]) -> dict[str, Any]:
 
 
 def solid_bar(slenderness: float, divisions: Sequence[int], order: int, poisson: float) -> Model:
-    """A clamped bar of square section meshed with so many hexahedra along and across, of this
-    degree; its length, Young's modulus and density are 1."""
+    """Clamped bar of square section, meshed with `divisions` hexahedra of degree `order`.
+
+    Its length, Young's modulus and density are 1.
+    """
     across = 1 / slenderness
     bar = {
         "name": "bar", "young": 1.0, "poisson": poisson, "density": 1.0, "order": order,

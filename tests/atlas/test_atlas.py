@@ -89,7 +89,7 @@ def test_no_word_where_both_were_tried_as_far(atlas: mstmm.Atlas) -> None:
 def test_a_folder_is_made_with_its_parents(atlas: mstmm.Atlas, tmp_path: Path) -> None:
     assert atlas.save(tmp_path / "new" / "folder", pictures=False)[0].exists()
     (tmp_path / "file").write_text("")
-    with pytest.raises(EnvironmentFailure, match="cannot be made"):
+    with pytest.raises(EnvironmentFailure, match="cannot be created"):
         atlas.save(tmp_path / "file")
 
 

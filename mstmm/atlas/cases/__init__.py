@@ -1,4 +1,4 @@
-"""One file a case, each with its `CASE`; the folders are the list."""
+"""Cases of the atlas: one file per case with its `CASE`, found by folder."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from ...errors import SceneError
 from ...scene.rules.messages import near
 from ..definition import Definition
 
-#: The folders, in the order of the page.
+#: Folders of the cases, in the order of the page.
 GROUPS = ("products", "sweeps", "steps", "classical", "rotations", "loops", "flexible")
 
 
 def _files() -> dict[str, str]:
-    """Name of every case -> its module."""
+    """Module of each case, by name."""
     found = {}
     for group in GROUPS:
         folder = import_module(f".{group}", __name__)
@@ -25,20 +25,20 @@ def _files() -> dict[str, str]:
 
 
 def names() -> tuple[str, ...]:
-    """The names of all cases."""
+    """Names of all cases."""
     return tuple(_files())
 
 
 def chosen(wanted: Sequence[str] | None) -> tuple[Definition, ...]:
-    """The cases of these names, of all where none is given, each once.
+    """Definitions of the cases of these names, without duplicates; default: all cases.
 
-    Raises SceneError with the nearest name for one that there is not.
+    Raises SceneError, with the nearest name, for an unknown name.
     """
     files = _files()
     for name in wanted or ():
         if name not in files:
             raise SceneError(
-                f'case "{name:.60}": the atlas has no such case{near(name, files)} '
+                f'case "{name:.60}": there is no such case{near(name, files)} '
                 "(mstmm stability --list shows all)"
             )
     each = dict.fromkeys(wanted or files)

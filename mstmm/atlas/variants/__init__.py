@@ -1,4 +1,4 @@
-"""Methods that are known to be bad, made of the same kernels as the good ones.
+"""Methods that are known to fail, built from the kernels of the good ones.
 
-Only cases of the atlas reach them; a run never does.
+Only cases of the atlas use them, never a run.
 """

@@ -1,10 +1,10 @@
-"""Closed loops with all their rows, those that repeat others too.
+"""Closed loops with all their constraint rows, including redundant ones.
 
 M a + G' l = M a0 and G a = 0 at rest, of which the multipliers l solve S l = G a0, S = G M^-1 G'.
-Where rows repeat others S is singular, and somebody has to say which multipliers are meant: those
-of least size, where of S counts for zero what is below a share of its largest singular value
-(G. H. Golub, C. F. Van Loan, Matrix Computations, 2013, 5.5), or those of S made regular by a
-little of the unit matrix.
+With redundant rows S is singular, and the multipliers are not unique.  They are either those of
+least norm, with singular values of S below a share of the largest one taken as zero (G. H. Golub,
+C. F. Van Loan, Matrix Computations, 2013, 5.5), or those of S regularised by a multiple of the unit
+matrix.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from ...runtime.pack.pack import pack
 
 
 def of_least_size(mobility: Array, asked: Array, share: float | None = None) -> Array:
-    """Multipliers of least size; `share` is of the largest singular value, if not rounding."""
+    """Multipliers of least norm; `share` of the largest singular value is the limit of the rank."""
     return np.asarray(np.linalg.lstsq(mobility, asked, rcond=share)[0], dtype=np.float64)
 
 
 def regularised(mobility: Array, asked: Array, share: float) -> Array:
-    """Multipliers with a share of the mean diagonal entry added to all."""
+    """Multipliers with a share of the mean diagonal entry added to all diagonal entries."""
     rows = len(mobility)
     return np.linalg.solve(mobility + share * np.trace(mobility) / rows * np.eye(rows), asked)
 
@@ -34,8 +34,10 @@ def regularised(mobility: Array, asked: Array, share: float) -> Array:
 def accelerations_at_rest(
     closed: Model, tree: Model, q: Array, solved: Callable[[Array, Array], Array] = of_least_size
 ) -> Array:
-    """Of the speeds (nu,) of the tree, of which the closing hinges of the other come behind, at its
-    coordinates q; `solved` says what multipliers are meant."""
+    """Accelerations (nu,) of the tree at its coordinates q, with all rows of the loops.
+
+    In `closed` the cut hinges follow the hinges of `tree`; `solved` computes the multipliers.
+    """
     engine, still = Engine(pack(closed.scene)), np.zeros(tree.nu)
     calls = LoopCalls(engine, q)
     slips = [calls.correction(calls.slip, q, one)[1] for one in np.eye(tree.nu, engine.nu)]

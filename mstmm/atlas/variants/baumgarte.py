@@ -1,8 +1,8 @@
-"""Closed loops that are held by springs and dampers in place of a projection.
+"""Closed loops stabilised by springs and dampers (Baumgarte) instead of a projection.
 
-Gaps g of the loops obey g'' + 2 alpha g' + alpha^2 g = 0 in place of g'' = 0: the accelerations are
-changed by what closes the gap and the slip, alpha^2 and 2 alpha times (J. Baumgarte, Computer
-Methods in Applied Mechanics and Engineering 1 (1972) 1-16).
+Gaps g of the loops satisfy g'' + 2 alpha g' + alpha^2 g = 0 instead of g'' = 0.  The accelerations
+get the corrections of position gap and velocity error, times alpha^2 and 2 alpha (J. Baumgarte,
+Computer Methods in Applied Mechanics and Engineering 1 (1972) 1-16).
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from .runge_kutta import rk4_step
 
 
 def gap_of(model: Model, step: float, steps: int, rate: float) -> float:
-    """Largest gap (m, rad) in so many steps (s) of rk4 with alpha = `rate` (1/s).
+    """Largest gap (m, rad) in `steps` steps (s) of rk4 with alpha = `rate` (1/s).
 
-    For hinges whose coordinates are integrals of their speeds.  NaN where a state is not finite.
+    For hinges whose coordinates are integrals of their speeds.  NaN if a state is not finite.
     """
     engine, (q, u) = model.looped, model.initial_state()
     calls, memory, split = LoopCalls(engine, q), np.atleast_2d(engine.start_memory()), model.nq

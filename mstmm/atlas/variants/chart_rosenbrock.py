@@ -1,9 +1,9 @@
-"""Rosenbrock steps on rotation vectors that may leave one slope out of their tangent.
+"""Rosenbrock steps on rotation vectors, optionally with an incomplete tangent matrix.
 
 Within a step an attitude is q exp(theta), and theta' = w + theta x w / 2 + theta x (theta x w) / 12
-(H. Munthe-Kaas, BIT 38 (1998) 92-111).  At theta = 0 the slope of theta' by theta is that of
-theta x w / 2, though theta is nothing there (E. Hairer, G. Wanner, Solving Ordinary Differential
-Equations II, 1996, IV.7: the order of a table takes the whole Jacobian).
+(H. Munthe-Kaas, BIT 38 (1998) 92-111).  At theta = 0 the derivative of theta' by theta is that of
+theta x w / 2, though theta vanishes there (E. Hairer, G. Wanner, Solving Ordinary Differential
+Equations II, 1996, IV.7: the order of a table requires the whole Jacobian).
 """
 
 from __future__ import annotations
@@ -16,13 +16,15 @@ from ...runtime.integrate.steppers.implicit import Rosenbrock
 from ...runtime.model.model import Model
 from .plain_charts import rate_of, turned
 
-#: Of differences, rad and rad/s.
+#: Step of the finite differences, rad and rad/s.
 _DIFFERENCE = 1e-5
 
 
 def end_of(model: Model, step: float, steps: int, method: str, slope: bool) -> Array:
-    """q (4,) of a body on a ball after so many steps (s) by a table from the start, with or without
-    the slope of the rotation vector's rate by itself."""
+    """q (4,) of a body on a ball hinge after `steps` steps (s) of a Rosenbrock table.
+
+    `slope`: whether the tangent has the derivative of the rotation vector's rate by that vector.
+    """
     table = get(method)
     assert isinstance(table, Rosenbrock)
     attitude, speeds = model.initial_state()

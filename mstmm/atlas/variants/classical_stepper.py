@@ -1,5 +1,4 @@
-"""Steps of the classical method in the hands of a variant, which changes them as they go, or looks
-at what a run does not tell."""
+"""Steps of the classical method for variants that modify them or read internal results."""
 
 from __future__ import annotations
 
@@ -16,7 +15,7 @@ from ...runtime.model.model import Model
 
 
 class ClassicalSteps:
-    """Steps from a model's start by Riccati on the classical matrices; `stepper` may be changed."""
+    """Classical steps from a model's start, by Riccati; `stepper` may be modified."""
 
     def __init__(self, model: Model, scheme: Scheme, iterations: int = 1) -> None:
         engine, (self.q, u) = model.looped, model.initial_state()
@@ -30,14 +29,14 @@ class ClassicalSteps:
         self._states = States(engine.packed, parts, form, self.q)
 
     def advance(self, step: float, steps: int = 1) -> Array:
-        """q (nq,) after so many more steps (s).  Raises NumericalFailure where one fails."""
+        """Advance by `steps` steps (s) and return q (nq,).  NumericalFailure if one fails."""
         made = self.stepper.advance(steps, step)
         if len(made) < steps:
-            raise NumericalFailure(f"a step fails by code {self.stepper.run.failure}")
+            raise NumericalFailure(f"a step fails with code {self.stepper.run.failure}")
         self.q = self._states.of(made)[0][-1]
         return self.q
 
     def moving(self) -> list[Moving]:
-        """What the parts do now, in absolute coordinates, each as one of n = 1 times."""
+        """Current motion of each part in absolute coordinates, as arrays over one time."""
         states, motions = self._states, self.stepper.motions
         return [states.form.moving(p, k, motions[k][None]) for k, p in enumerate(states.parts)]

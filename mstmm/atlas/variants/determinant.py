@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from ...derive.classical.harmonic_beam import BETA, LENGTH, field_matrix
 
-#: Values of the determinant in the window of one mode.
+#: Number of values of the determinant in the window of one mode.
 _POINTS = 41
 
 
@@ -21,14 +21,16 @@ def _field() -> Any:
 
 
 def determinant(beta: float, parts: int) -> float:
-    """Of the free end's conditions, for a beam of length 1 in `parts`: rows of moment and shear,
-    columns of the clamped end's."""
+    """Determinant of the conditions at the free end, for a beam of length 1 in `parts` elements.
+
+    Rows are moment and shear force there, columns those of the clamped end.
+    """
     chain = np.linalg.matrix_power(np.asarray(_field()(beta, 1 / parts)), parts)
     return float(chain[2, 2] * chain[3, 3] - chain[2, 3] * chain[3, 2])
 
 
 def clamped_free(number: int, parts: int) -> float:
-    """beta L of a mode; nan where the determinant does not change its sign once in its window."""
+    """beta L of a mode; NaN unless the determinant changes its sign once in the window."""
     window = np.linspace((number - 1) * np.pi, number * np.pi, _POINTS) + 0.1
     values = np.array([determinant(float(beta), parts) for beta in window])
     changes = np.flatnonzero(values[:-1] * values[1:] < 0)

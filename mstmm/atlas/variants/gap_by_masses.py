@@ -1,6 +1,6 @@
-"""Assembly that measures gaps by how far loads along their rows move the bodies.
+"""Assembly with gaps weighted by the mobility of the bodies along each row.
 
-Each row has its own weight, so that a row along which bodies are light counts for less.
+Each row has a separate weight, so that a row along which bodies are light counts less.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ...runtime.model.model import Model
 
 
 class ByMasses(Assembly):
-    """Assembly whose least gap is that of rows in their own mobilities."""
+    """Assembly that minimises gaps weighted by the mobility of each row."""
 
     def _weighted(self) -> Array:
         super()._weighted()
@@ -25,8 +25,10 @@ class ByMasses(Assembly):
 
 
 def nearest(model: Model, q: Array, held: str, by_masses: bool) -> dict[str, float]:
-    """Coordinates of the hinges where assembly of loops that nothing closes ends, near q (nq,) and
-    with one hinge held; for hinges of one coordinate."""
+    """Final hinge coordinates of the assembly of loops that cannot close, near q (nq,).
+
+    The hinge `held` is fixed; for hinges of one coordinate.  ValueError if the loops close.
+    """
     kind = ByMasses if by_masses else Assembly
     try:
         kind(model.looped, q, [held]).positions(q)

@@ -1,4 +1,4 @@
-"""Steps of the classical method that are linearised where they begin: the predictor y* = y_n."""
+"""Steps of the classical method linearised at their start: the predictor y* = y_n."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from ...runtime.classical.schemes import newmark
 from ...runtime.model.model import Model
 from .classical_stepper import ClassicalSteps
 
-#: The trapezoidal rule, which asks for no acceleration of the step's start but the auxiliary one.
+#: Trapezoidal rule, which needs no acceleration at the start of a step except the auxiliary one.
 _SCHEME = newmark(0.5)
 
 
 def end_of(model: Model, step: float, steps: int, iterations: int = 1) -> Array:
-    """q (nq,) after so many steps (s) of the trapezoidal rule from the start.
+    """q (nq,) after `steps` steps (s) of the trapezoidal rule from the start.
 
-    The stepper predicts with the accelerations of its motions, and forgets them.  Those handed over
-    here leave every body where it is.  Raises NumericalFailure where a step fails.
+    The stepper predicts with the accelerations of its motions, and then discards them.  Those set
+    here predict that no body moves.  Raises NumericalFailure if a step fails.
     """
     run = ClassicalSteps(model, _SCHEME, iterations)
     for _ in range(steps):
@@ -26,6 +26,6 @@ def end_of(model: Model, step: float, steps: int, iterations: int = 1) -> Array:
 
 
 def _hold(motions: Array, step: float) -> None:
-    """Accelerations with which the rule ends a step where it began."""
+    """Set accelerations with which the rule predicts the start of the step as its end."""
     speed, auxiliary = motions[:, SPEED:RATE], motions[:, AUXILIARY:AXES]
     motions[:, RATE:AUXILIARY] = -(speed / step + (0.5 - _SCHEME.beta) * auxiliary) / _SCHEME.beta

@@ -1,4 +1,4 @@
-"""The Riccati sweep over a chain of pins with all vectors and matrices in inertial axes."""
+"""Riccati sweep over a chain of pins with all vectors and matrices in inertial axes."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from ...arrays import Array
 from ...errors import NumericalFailure
 from ...runtime.kernels import prebuilt
 
-#: Numbers of a bias motion, of S, and of e, gains and deviations.
+#: Lengths of a bias motion, of S, and of e, gains and deviations.
 _MOTION, _S, _VECTOR = 9, 21, 6
 
-#: Axes that are alike everywhere, and hinges that neither shift nor drift.
+#: Rotation of a hinge between parallel axes, and zero shift and drift.
 _ALIKE, _NONE = np.eye(3).ravel(), np.zeros(6)
 
 
 def accelerations(
     axes: Array, points: Array, pin: Array, body: Array, rates: Array, gravity: Array
 ) -> Array:
-    """Accelerations (n,) of n parallel pins in a row with a body behind each, without efforts.
+    """Accelerations (n,) of a chain of n bodies on parallel pins, without efforts.
 
     Args:
-        axes: (n, 3, 3) those of the bodies, in inertial ones.
-        points: (n, 3) of the pins, m.
+        axes: (n, 3, 3) axes of the bodies in inertial axes.
+        points: (n, 3) positions of the pins, m.
         pin: (3,) axis of all pins.
-        body: (10,) mass, first moments and moments of inertia about its pin of every body in its
-            own axes, as the kernels of the rigid body take them.
-        rates: (n,) of the pins, rad/s.
+        body: (10,) mass, first moments and moments of inertia about its pin of every body, in body
+            axes, as inputs of the kernels of the rigid body.
+        rates: (n,) speeds of the pins, rad/s.
         gravity: (3,), m/s^2.
     """
     sweep, rigid = _Kernels("sweep", "generic1"), _Kernels("body", "rigid")
@@ -37,7 +37,7 @@ def accelerations(
     motion, udot = np.zeros((n + 1, _MOTION)), np.zeros((n, 1))
     S, e, deviation = (np.zeros((n + 1, size)) for size in (_S, _VECTOR, _VECTOR))
     gains, terms, spare = np.zeros((n, _VECTOR)), np.zeros((n, 1)), np.zeros(9)
-    motion[-1, 6:] = -gravity  # the ground is what stands before the first body
+    motion[-1, 6:] = -gravity  # index -1 is the ground, inboard of the first body
     for i in range(n):
         sweep("forward", (_ALIKE, steps[i], _ALIKE, none, subspace, none, rates[i] * pin, _NONE,
                           _NONE[:1], motion[i - 1]), (spare, spare[:3], motion[i]))  # fmt: skip
@@ -54,7 +54,7 @@ def accelerations(
 
 
 def _turned(body: Array, axes: Array) -> Array:
-    """Numbers of a body in inertial axes."""
+    """Inertia numbers of a body (10,) in inertial axes."""
     upper, tensor = np.triu_indices(3), np.zeros((3, 3))
     tensor[upper] = body[4:]
     tensor += np.triu(tensor, 1).T
@@ -62,7 +62,7 @@ def _turned(body: Array, axes: Array) -> Array:
 
 
 class _Kernels:
-    """The compiled kernels of an element, called with arrays."""
+    """Compiled kernels of an element, called with arrays."""
 
     def __init__(self, kind: str, name: str) -> None:
         self._ffi, _ = prebuilt.module()
@@ -71,7 +71,7 @@ class _Kernels:
         self._calls = {prebuilt.text(self._ffi, record.name): record.call for record in records}
 
     def __call__(self, kernel: str, given: tuple[Array, ...], taken: tuple[Array, ...]) -> None:
-        """Raises NumericalFailure where a pivot is lost."""
+        """Call a kernel.  Raises NumericalFailure if a guard is violated."""
         code = self._calls[kernel](0, self._pointers(given), self._pointers(taken))
         if code:
             raise NumericalFailure(f"{kernel} in inertial axes: guard {code}")

@@ -1,6 +1,6 @@
-"""Steps of the trapezoidal rule iterated by inertia and the slopes of laws alone, whatever comes.
+"""Steps of the trapezoidal rule, always iterated with inertia and hinge-law derivatives only.
 
-Runs notice how slowly such an iteration contracts, and take the exact tangent in its place.
+Runs observe the convergence of such an iteration, and use the exact tangent where it is slow.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from ...errors import NumericalFailure
 from ...runtime.engine.tangent import Tangent
 from ...runtime.model.model import Model
 
-#: Change of speeds in an iteration at which it has come to its end, as a part of the step's.
+#: Change of speeds at which an iteration has converged, relative to that of the step.
 _END = 1e-8
 
 
 def iterations(model: Model, step: float, steps: int, most: int) -> float:
-    """Iterations that a step takes, of so many steps (s) from the start; for scenes whose speeds
-    are the rates of their coordinates.
+    """Mean number of iterations per step, for `steps` steps (s) from the start.
 
-    Raises NumericalFailure where one takes more than `most`.
+    For scenes whose speeds are the rates of their coordinates.  Raises NumericalFailure if a step
+    needs more than `most`.
     """
     tangent, taken, rate = Tangent(model.looped), 0, 2.0 / step
     q, u = model.initial_state()
@@ -35,5 +35,5 @@ def iterations(model: Model, step: float, steps: int, most: int) -> float:
             if np.abs(change).max() <= _END * rate * np.abs(u - speed).max():
                 break
         else:
-            raise NumericalFailure(f"step {number}: no end after {most} iterations")
+            raise NumericalFailure(f"step {number}: not converged after {most} iterations")
     return taken / steps

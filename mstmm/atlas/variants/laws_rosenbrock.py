@@ -1,8 +1,8 @@
-"""Rosenbrock steps whose tangent is inertia and the slopes of laws alone, by any table.
+"""Rosenbrock steps of any table with a tangent of inertia and hinge-law derivatives only.
 
-Runs refuse that of tables which it takes the order from.  Of tables whose order stands whatever the
-tangent (W-methods: Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.7; Rang,
-Angermann, BIT 45, 2005) these are the steps of a run: stages evaluate their accelerations.
+Runs reject this for tables that lose their order by it.  For tables whose order does not depend on
+the tangent (W-methods: Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.7;
+Rang, Angermann, BIT 45, 2005) these are the steps of a run: stages evaluate their accelerations.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .plain_rosenbrock import Steps
 
 
 class LawsSteps(Steps):
-    """Steps of scenes whose speeds are the rates of their coordinates, and which go not by time."""
+    """Steps for autonomous scenes whose speeds are the rates of their coordinates."""
 
     def __init__(self, model: Model, method: str) -> None:
         super().__init__(model, method)

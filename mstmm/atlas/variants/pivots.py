@@ -1,4 +1,4 @@
-"""The fastest motion of a row of bodies by the pivots of the sweep."""
+"""Estimate of the fastest motion of a row of bodies from the pivots of the sweep."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from ...runtime.model.model import Model
 
 
 def fastest(model: Model) -> float:
-    """|lambda| (1/s) at the start of a scene whose hinges follow each other outwards: the largest
-    k/D of a hinge, k its stiffness and D the inertia that the sweep divides by there, which is of
-    what lies outboard, as if the inboard side stood still."""
+    """|lambda| (1/s) at the start of a chain: root of the largest k/D of a hinge.
+
+    k is the stiffness of the hinge and D the inertia by which the sweep divides, that of the
+    outboard bodies, as if the inboard side did not move.
+    """
     q, u = model.initial_state()
     inertia = model.mass_matrix(q)
     stiffness = -inertia @ model.derivatives(q, u).q

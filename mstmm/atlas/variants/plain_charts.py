@@ -1,4 +1,4 @@
-"""Rotation vectors whose rate is taken for the angular velocity, or for little more.
+"""Rotation vectors with a truncated rate, in the extreme the angular velocity.
 
 Within a step an attitude is q exp(theta), and theta' = w + theta x w / 2 + theta x (theta x w) / 12
 up to the third power of theta (H. Munthe-Kaas, BIT 38 (1998) 92-111).  Here products are left out.
@@ -13,7 +13,7 @@ from ...runtime.model.model import Model
 
 
 def turned(attitude: Array, theta: Array) -> Array:
-    """The quaternion (4,) of an attitude turned by a rotation vector (3,) in its own axes."""
+    """Quaternion (4,) of an attitude rotated by a rotation vector (3,) in body axes."""
     angle = float(np.linalg.norm(theta))
     w, v = np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * theta
     w0, v0 = attitude[0], attitude[1:]
@@ -21,7 +21,7 @@ def turned(attitude: Array, theta: Array) -> Array:
 
 
 def rate_of(theta: Array, u: Array, products: int = 2) -> Array:
-    """Rate (3,) of a rotation vector at an angular velocity, with so many of its products."""
+    """Rate (3,) of a rotation vector at an angular velocity, with 0 to 2 of its products."""
     once = np.cross(theta, u)
     rate = np.asarray(u, float)
     if products > 0:
@@ -30,7 +30,7 @@ def rate_of(theta: Array, u: Array, products: int = 2) -> Array:
 
 
 def end_of(model: Model, step: float, steps: int, products: int = 0) -> Array:
-    """q (4,) of a body on a ball after so many steps of rk4 on such charts from the start."""
+    """q (4,) of a body on a ball hinge after `steps` steps of rk4 on rotation vectors."""
     attitude, speeds = model.initial_state()
     for _ in range(steps):
         slopes: list[tuple[Array, Array]] = []

@@ -1,10 +1,10 @@
-"""Rosenbrock steps without what the steps of a run take care of besides.
+"""Rosenbrock steps without the safeguards of a run.
 
-Their stages are those of a run: its residual and tangent, accelerations as unknowns.  The table
-may be one that no run offers.  What may be left out is the slope of the equations in time (Hairer,
-Wanner, Solving Ordinary Differential Equations II, 1996, IV.7), and the accelerations that belong
-to the start; and errors are judged by the usual norm (IV.8), in which those of speeds weigh by
-themselves and not by what they move within the step.
+Their stages are those of a run: its residual and tangent, accelerations as unknowns.  The table may
+be one that runs do not offer.  The time derivative of the equations (Hairer, Wanner, Solving
+Ordinary Differential Equations II, 1996, IV.7), and the accelerations of the start, may be left
+out.  Errors are measured by the usual norm (IV.8), which weights errors of speeds separately, not
+by the displacement within the step.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from ...runtime.integrate.steppers import get
 from ...runtime.integrate.steppers.implicit import Rosenbrock
 from ...runtime.model.model import Model
 
-#: How far a step goes towards the one that the error allows, and how much it changes at once.
+#: Safety factor of the step size, and limits of its change.
 _SAFETY, _LEAST, _MOST = 0.9, 0.2, 6.0
 
 
 class Steps:
-    """Steps on states (3, n) of coordinates, of speeds that are their rates, and accelerations."""
+    """Rosenbrock steps on states (3, n): coordinates, speeds (their rates), accelerations."""
 
     def __init__(
         self,
@@ -42,16 +42,16 @@ class Steps:
         self._start = np.array([q, u, known])
 
     def fixed(self, step: float, steps: int) -> Array:
-        """States (steps + 1, 3, n) of steps of one length (s)."""
+        """States (steps + 1, 3, n) with a fixed step (s)."""
         found = [self._start]
         for number in range(steps):
             found.append(self._step(number * step, step, found[-1])[0])
         return np.array(found)
 
     def needed(self, t_end: float, rtol: float, atol: float, most: int) -> int:
-        """How many steps it takes to t_end (s), rejected ones with them.
+        """Number of adaptive steps to t_end (s), including rejected ones.
 
-        Raises NumericalFailure where it takes more than `most`.
+        Raises NumericalFailure if it exceeds `most`.
         """
         t, y, h, power = 0.0, self._start, rtol * t_end, 1.0 / (self._table.error_order + 1)
         for number in range(1, most + 1):
@@ -66,11 +66,11 @@ class Steps:
         raise NumericalFailure(f"more than {most} steps")
 
     def size(self, h: float, error: Array) -> float:
-        """Of errors (3, n) of a step of h (s) in units of their tolerances; it passes below 1."""
+        """Norm of errors (3, n) of a step of h (s), relative to their tolerances; limit 1."""
         return float(np.sqrt(np.mean(error[:2] ** 2)))
 
     def _step(self, t: float, h: float, y: Array) -> tuple[Array, Array]:
-        """The state at t + h and the estimate of its error."""
+        """State at t + h and its error estimate."""
         table, base, still = self._table, self._base, np.zeros_like(y[0])
         s = 1.0 / (table.gamma * h)
         base.residual(t, *y)

@@ -1,7 +1,7 @@
-"""Steps of the classical method that take a change of a rotation vector for a turn in space.
+"""Steps of the classical method that add finite rotations like vectors.
 
-A body turns by T(psi) times the change of psi, T the tangent operator of the exponential; here T
-is left out of the matrices, 1 in its place.
+A body rotates by T(psi) times the change of psi, with the tangent operator T of the exponential;
+here the matrices have 1 instead of T.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from .classical_stepper import ClassicalSteps
 
 
 def end_of(model: Model, step: float, steps: int, radius: float) -> Array:
-    """q (nq,) after so many steps (s) of generalised-alpha with this radius, one solution a step.
+    """q (nq,) after `steps` steps (s) of generalised-alpha, with one solution per step.
 
-    Raises NumericalFailure where a step fails.
+    `radius` is the spectral radius at infinity.  Raises NumericalFailure if a step fails.
     """
     run = ClassicalSteps(model, generalised_alpha(radius))
     run.stepper.run.turning = 0

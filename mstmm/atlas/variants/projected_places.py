@@ -1,6 +1,6 @@
-"""Closed loops of which places are projected after each step, and speeds are not.
+"""Closed loops with a projection of positions after each step, but not of speeds.
 
-The error of the speeds across the loops stays, and opens gaps anew in the next step (E. Hairer, C.
+The velocity error of the constraints remains, and opens gaps again in the next step (E. Hairer, C.
 Lubich, G. Wanner, Geometric Numerical Integration, 2006, IV.4).
 """
 
@@ -13,14 +13,14 @@ from ...runtime.engine.loops.calls import LoopCalls
 from ...runtime.model.model import Model
 from .runge_kutta import rk4_step
 
-#: Corrections of the gaps after a step, the first of which leaves its square.
+#: Number of corrections of the gaps after a step, which converge quadratically.
 _CORRECTIONS = 3
 
 
 def slip_of(model: Model, step: float, steps: int) -> float:
-    """Largest slip (m/s, rad/s) of the loops after so many steps (s) of rk4.
+    """Largest velocity error (m/s, rad/s) of the loops in `steps` steps (s) of rk4.
 
-    For hinges whose coordinates are integrals of their speeds.  NaN where a state is not finite.
+    For hinges whose coordinates are integrals of their speeds.  NaN if a state is not finite.
     """
     engine, (q, u) = model.looped, model.initial_state()
     calls, memory, largest = LoopCalls(engine, q), np.atleast_2d(engine.start_memory()), 0.0

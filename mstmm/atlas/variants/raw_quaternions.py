@@ -1,4 +1,4 @@
-"""Runge and Kutta's steps on the components of quaternions, whose length nobody restores."""
+"""Runge-Kutta steps on the components of quaternions without normalisation."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ...runtime.model.model import Model
 
 
 def end_of(model: Model, step: float, steps: int) -> Array:
-    """q (nq,) after so many steps of rk4 from the start; rates by the engine's own kernels."""
+    """q (nq,) after `steps` steps (s) of rk4 from the start, with the rates of the engine."""
     engine = model.looped
     memory = np.atleast_2d(engine.start_memory())
     split = model.nq

@@ -1,8 +1,8 @@
-"""A Rosenbrock method that is stable for every stiffness, and forgets none of its vibration.
+"""Rosenbrock method that is A-stable but not L-stable.
 
 J. Lang, J. Verwer, ROS3P, an accurate third-order Rosenbrock solver designed for parabolic
-problems, BIT 41 (2001) 731-738: gamma = 1/2 + sqrt(3)/6.  A step leaves sqrt(3) - 1 of a vibration
-that is infinitely fast.
+problems, BIT 41 (2001) 731-738: gamma = 1/2 + sqrt(3)/6.  Its spectral radius at infinity is
+sqrt(3) - 1.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _GAMMA = 0.5 + _ROOT / 6
 
 
 def tableau() -> Rosenbrock:
-    """The method, of order 3 with an estimate of order 2."""
+    """Tableau of the method, of order 3 with an error estimate of order 2."""
     steep = 1 / _GAMMA
     A = [[0.0, 0, 0], [steep, 0, 0], [steep, 0, 0]]
     C = [[0.0, 0, 0], [-(steep**2), 0, 0], [-2 * _ROOT, -_ROOT, 0]]

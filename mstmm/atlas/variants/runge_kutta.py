@@ -1,4 +1,4 @@
-"""The step of the classical Runge-Kutta method, for variants that change what it integrates."""
+"""Step of the classical Runge-Kutta method, for variants with modified equations."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ...arrays import Array
 
 
 def rk4_step(slope: Callable[[Array], Array], y: Array, step: float) -> Array:
-    """y after one step of y' = slope(y)."""
+    """State y after one step (s) of y' = slope(y)."""
     first = slope(y)
     second = slope(y + step / 2 * first)
     third = slope(y + step / 2 * second)

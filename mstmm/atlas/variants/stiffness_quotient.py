@@ -1,4 +1,4 @@
-"""Inertia of a vibrating beam by the quotients of its dynamic stiffness, near rest and far off."""
+"""Inertia of a vibrating beam from the quotients of its dynamic stiffness."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ import sympy as sp
 
 from ...derive.classical.harmonic_stiffness import beam_stiffness
 
-#: Digits of what is exact, and a wave number at which they show the static stiffness alone.
+#: Digits of exact values, and a wave number at which they give only the static stiffness.
 _DIGITS, _STILL = 120, mpmath.mpf(10) ** -12
 
 
 @cache
 def _at_root(numbers: str) -> Callable[[Any], Any]:
-    """Load on the root by its displacement, of length and stiffness 1, over z."""
+    """Load on the root per unit of its displacement as a function of z, for unit beams.
+
+    Length and stiffness of the beam are 1.
+    """
     numerator, divisor = beam_stiffness()
     (z,) = divisor.free_symbols
     found: Callable[[Any], Any] = sp.lambdify(z, numerator[0, 0] / divisor, numbers)
@@ -26,7 +29,7 @@ def _at_root(numbers: str) -> Callable[[Any], Any]:
 
 
 def inertia(z: float) -> float:
-    """(static - dynamic stiffness) / z^4 in numbers of 16 digits; nan where these end."""
+    """Inertia, (static - dynamic stiffness) / z^4, in doubles; NaN after an overflow."""
     with mpmath.workdps(_DIGITS):
         static = float(_at_root("mpmath")(_STILL))
     with np.errstate(over="ignore", invalid="ignore"):
@@ -34,7 +37,7 @@ def inertia(z: float) -> float:
 
 
 def exact(z: float) -> float:
-    """The same in numbers of so many digits that nothing cancels."""
+    """Inertia as in `inertia`, with enough digits to avoid cancellation."""
     with mpmath.workdps(_DIGITS):
         stiffness = _at_root("mpmath")
         return float((stiffness(_STILL) - stiffness(mpmath.mpf(z))) / mpmath.mpf(z) ** 4)

@@ -1,8 +1,8 @@
-"""Linear models of closed loops whose loads stand still: K = N' R_q N without d(J' lambda)/dq.
+"""Linear models of closed loops with frozen loads: K = N' R_q N without d(J' lambda)/dq.
 
-Loads at a cut turn and move with their bodies, and what acts along a rod pulls it straight.  A tree
-differentiated along the motions that its loops leave has nothing of that (F. Gonzalez, P. Masarati,
-J. Cuadrado, M. A. Naya, Journal of Computational and Nonlinear Dynamics 12, 2017).
+Loads at a cut rotate and move with their bodies, and tension along a rod straightens it.  A tree
+differentiated along the motions that its loops allow lacks that stiffness (F. Gonzalez, P.
+Masarati, J. Cuadrado, M. A. Naya, Journal of Computational and Nonlinear Dynamics 12, 2017).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ...runtime.model.model import Model
 
 
 def squared_frequencies(model: Model) -> Array:
-    """Of the mechanism at its start at rest, ascending, 1/s2."""
+    """Squared angular frequencies of the mechanism at its start at rest, ascending, 1/s^2."""
     q, u = model.initial_state()
     state = State(0.0, q, u, np.zeros(model.nu))
     whole = mechanism_at(model, state)

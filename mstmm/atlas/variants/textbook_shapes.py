@@ -1,4 +1,4 @@
-"""Bending shapes of a clamped-free beam as hyperbolic functions, as they are usually printed."""
+"""Bending shapes of a clamped-free beam by hyperbolic functions, in the usual printed form."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from ...runtime.flexible.beam.shapes import root
 
 
 def clamped_free(number: int, xi: Array) -> Array:
-    """Shape number `number` at parts `xi` of the length, scaled to int phi^2 dxi = 1.
+    """Shape `number` at positions `xi`, relative to the length, with int phi^2 dxi = 1.
 
-    Rao, Vibration of Continuous Systems, ch. 11; beta by the root that all shapes share.
+    Rao, Vibration of Continuous Systems, ch. 11; beta from the common root of all shapes.
     """
     b = root("clamped-free", number)
     with np.errstate(over="ignore", invalid="ignore"):

@@ -1,1 +1,1 @@
-"""Steps in absolute coordinates, by the classical matrices."""
+"""Cases of steps in absolute coordinates, by the classical matrices."""

@@ -1,4 +1,4 @@
-"""One linear solution a step of the classical method beside a spring that begins stretched."""
+"""One linear solution per step of the classical method, with a stretched stiff spring."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def _gained(stiffness: float, **options: Any) -> float:
 
 CASE = Definition(
     name="classical-iteration",
-    title="Classical method, one solution a step: an unresolved stiff motion",
-    why="The trapezoidal rule in absolute coordinates with one linear solution a step throws the "
-    "bodies about by what the first solution errs. A scheme that forgets fast motion, iterated, "
-    "holds to about a hundred times that stiffness.",
+    title="Classical method, one solution per step: unresolved stiff motion",
+    why="The trapezoidal rule in absolute coordinates with one linear solution per step moves "
+    "the bodies by the error of the first solution. A scheme that damps fast motion, iterated, "
+    "holds up to about a hundred times that stiffness.",
     parameter="stiffness of bushings (stretched by 1 mm)", unit="N/m", low=1e3, high=1e9, scale=LOG,
-    measured="largest energy in 2 s, of that exchanged", limit=1.05,
+    measured="largest energy in 2 s over that exchanged", limit=1.05,
     method=Method(
         "dttmm-classical, newmark, one solution", lambda k: _gained(k, scheme="newmark")
     ),

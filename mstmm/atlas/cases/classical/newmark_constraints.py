@@ -1,4 +1,4 @@
-"""Undamped Newmark on absolute coordinates, in ever longer runs."""
+"""Undamped Newmark on absolute coordinates, in longer and longer runs."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ def _kept(t_end: float, scheme: str) -> float:
 CASE = Definition(
     name="newmark-constraints",
     title="Undamped Newmark in absolute coordinates: length of a run",
-    why="Where hinges are constraints at position level, the loads in them follow the second "
-    "difference of positions, and the trapezoidal rule leaves every other one of their errors as "
-    "it is: they oscillate, grow slowly and then explode, however far the steps are iterated. "
-    "Schemes that forget infinitely fast motion do not; hinge coordinates have no such loads.",
+    why="Where hinges are constraints at position level, their loads follow the second "
+    "difference of positions. The trapezoidal rule keeps every other error of these loads: they "
+    "oscillate, grow slowly and then explode, however far the steps are iterated. Schemes that "
+    "damp infinitely fast motion avoid this, and hinge coordinates have no such loads.",
     parameter="length of the run", unit="s", low=0.5, high=30.0, scale=LOG,
-    measured="change of the energy, of that exchanged", limit=0.1,
+    measured="change of the energy over that exchanged", limit=0.1,
     method=Method("dttmm-classical, newmark, h = 10 ms", lambda t: _kept(t, "newmark")),
     remedy=Method(
         "dttmm-classical, generalised-alpha:0.8", lambda t: _kept(t, "generalised-alpha:0.8")

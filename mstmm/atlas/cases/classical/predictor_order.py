@@ -1,4 +1,4 @@
-"""One solution a step of the classical method, expanded about the start of the step."""
+"""One solution per step of the classical method, expanded about the start of the step."""
 
 from __future__ import annotations
 
@@ -41,17 +41,18 @@ def _error(end_of: Callable[[int], Array], steps: int) -> float:
 
 
 def _excess(steps: float, end_of: Callable[[int], Array]) -> float:
-    """1 as long as the error falls with the square of the step."""
+    """Error relative to second order: 1 as long as it falls with the square of the step."""
     return _error(end_of, int(steps)) / _error(end_of, FEW) * (steps / FEW) ** 2
 
 
 CASE = Definition(
     name="predictor-order",
-    title="One solution a step: a predictor that stays where it is",
-    why="Expanded about the start of a step, the conditions of the hinges miss how their points "
-    "turn within it, by the square of the step. Loads go by the second difference of that, and "
-    "centripetal accelerations are wrong however short the steps are. A predictor that keeps the "
-    "accelerations errs by the third power. Second order is reckoned from four steps on.",
+    title="One solution per step: a predictor without motion",
+    why="Expanded about the start of a step, the hinge constraints omit the rotation of the "
+    "hinge points within the step, an error of second order. Loads depend on the second difference "
+    "of that error, and centripetal accelerations are wrong however short the steps are. A "
+    "predictor with the accelerations has an error of third order. Second order is measured from "
+    "four steps on.",
     parameter="steps in 0.2 s", unit="", low=FEW, high=1024, scale=COUNT,
     measured="error over that of second order", limit=2.0,
     method=Method("newmark about y* = y", lambda steps: _excess(steps, _held)),

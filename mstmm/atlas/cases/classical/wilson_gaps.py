@@ -1,4 +1,4 @@
-"""Hinges between absolute coordinates under Wilson's method."""
+"""Gaps of hinges between absolute coordinates with Wilson's method."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ T_END, ITERATIONS = 1.0, 20
 
 
 def _gap(step: float, scheme: str) -> float:
-    """Largest distance, m, of what the pins of two falling rods of 1 m hold together."""
+    """Largest gap, m, in the pins of two falling rods of 1 m."""
     run, largest = ClassicalSteps(double_pendulum(), scheme_of(scheme), ITERATIONS), 0.0
     for _ in range(round(T_END / step)):
         run.advance(step)
@@ -27,10 +27,10 @@ def _gap(step: float, scheme: str) -> float:
 CASE = Definition(
     name="wilson-gaps",
     title="Wilson's method in absolute coordinates: hinges that open",
-    why="Wilson's collocation meets equations behind the end of the step, and constraints with "
-    "them: there hinges are closed, and the step goes back to where nobody asked whether they are. "
-    "However far a step is iterated, they stand open by its fourth power. Schemes that ask at the "
-    "end of the step close them to rounding.",
+    why="Wilson's collocation satisfies the equations, and with them the constraints, after the "
+    "end of the step. The hinges are closed there, but not at the end of the step to which the "
+    "method returns. However far a step is iterated, the gaps are of fourth order in the step. "
+    "Schemes that satisfy the constraints at the end of the step close them to rounding.",
     parameter="length of a step", unit="s", low=2e-3, high=0.1, scale=LOG,
     measured="largest gap in 1 s, m", limit=1e-6,
     method=Method("wilson, iterated", lambda step: _gap(step, "wilson")),

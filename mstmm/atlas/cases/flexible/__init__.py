@@ -1,1 +1,1 @@
-"""Models of flexible bodies."""
+"""Cases of models of flexible bodies."""

@@ -1,4 +1,4 @@
-"""Shapes that carry no moment at the end of a beam, under a moment there."""
+"""Shape functions without moment at the end of a beam, loaded by a moment there."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MOMENT = 0.05
 
 @cache
 def _deflection(basis: str, shapes: int) -> float:
-    """Of the tip of a clamped beam of 1 m and 1 N m2 at rest under a moment at its tip, m."""
+    """Static tip deflection (m) of a clamped beam of 1 m and 1 N m2 under a moment at its tip."""
     beam = {
         "name": "beam", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0,
         "modes": {"y": shapes}, "basis": basis, "frame": "tangent", "stiffening": False,
@@ -36,11 +36,11 @@ def _error(shapes: float, basis: str) -> float:
 
 CASE = Definition(
     name="end-moment",
-    title="Shapes of a free end where there is a moment",
+    title="Shapes of a free end under an end moment",
     why="The eigenfunctions of a beam with a free end have no curvature there. A moment at that "
-    "end, or a body welded to it, asks for one, and their sum comes to it slowly, however many. "
-    "Two static shapes of the loads at the end have it at once; the basis `auto` takes them where "
-    "hinges ask for it.",
+    "end, or a body welded to it, requires one, and their sum converges to it slowly. Two static "
+    "shapes of the end loads represent it at once; the basis `auto` uses them where hinges need "
+    "them.",
     parameter="number of shapes", unit="", low=2, high=40, scale=COUNT,
     measured="error of the deflection, relative", limit=1e-3,
     method=Method("clamped-free", lambda n: _error(n, "clamped-free")),

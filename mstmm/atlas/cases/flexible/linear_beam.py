@@ -1,4 +1,4 @@
-"""A linear beam in a spin-up to ever larger speeds."""
+"""Linear beam in spin-up to higher and higher speeds."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ...measures import simulated
 from ...scale import LOG
 from ...scenes import model
 
-#: Spun up within 15 s, then turning; s.
+#: Duration of the spin-up, and of the run, s.
 RAMP, T_END = 15.0, 30.0
 
 
 def _deflection(spin: float, stiffening: bool, shapes: int) -> float:
-    """Largest deflection of the tip in its run, m."""
+    """Largest deflection of the tip in a run, m."""
     rate = spin / RAMP
     ramp = f"{rate!r}*(t^2/2 + ({RAMP}/(2*pi))^2*(cos(2*pi*t/{RAMP}) - 1))"
     blade = {
@@ -43,11 +43,11 @@ def _error(spin: float, stiffening: bool) -> float:
 
 CASE = Definition(
     name="linear-beam",
-    title="Linear beam: a spin beyond its first frequency",
-    why="In the axes of a linear beam the centrifugal force pushes every deflection further out "
-    "and nothing pulls it back, for the shortening of the bent axis is left out: at a spin of its "
-    "first frequency its stiffness is gone. With the shortening the beam gets stiffer by its "
-    "spin, as it should.",
+    title="Linear beam: spin above its first frequency",
+    why="In the axes of a linear beam the centrifugal force increases every deflection. Nothing "
+    "opposes it, because the shortening of the bent axis is neglected: at a spin equal to the "
+    "first frequency the stiffness vanishes. With the shortening the spin stiffens the beam, as it "
+    "should.",
     parameter="spin after 15 s", unit="rad/s", low=0.5, high=8.0, scale=LOG,
     measured="error of the tip's largest deflection, relative", limit=1.0,
     method=Method("stiffening = false, 3 shapes", lambda spin: _error(spin, False)),

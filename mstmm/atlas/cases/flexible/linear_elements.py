@@ -1,4 +1,4 @@
-"""Solid elements of degree 1 in ever more slender bars."""
+"""Solid elements of degree 1 in more and more slender bars."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ def _error(slenderness: float, order: int) -> float:
 CASE = Definition(
     name="linear-elements",
     title="Solid elements of degree 1: slenderness of a bar in bending",
-    why="An element whose displacements are linear cannot bend: its edges stay straight, and in "
-    "place of curvature it shows shear, whose energy grows with the square of its length over its "
-    "thickness. The bar locks, as stiff as its mesh is long, and every frequency of bending is too "
-    "high. (Poisson's ratio is 0 here, so that nothing else locks.) Of degree 2 an element can be "
-    "curved; what it differs by at the thick end is the bar's own shear, which the frequency of a "
-    "slender beam does not hold.",
+    why="An element with linear displacements cannot bend: its edges stay straight, and it shows "
+    "shear instead of curvature. The energy of that shear grows with the square of its length over "
+    "its thickness. The bar locks, and all its bending frequencies are too high. (Poisson's ratio "
+    "is 0 here, so that no other locking occurs.) Elements of degree 2 can be curved. Their "
+    "difference at the thick end is the shear of the bar, which the frequency of a slender beam "
+    "neglects.",
     parameter="length of a bar of 20 hexahedra over its thickness", unit="",
     low=5.0, high=300.0, scale=LOG,
     measured="error of the first frequency, relative", limit=0.1,

@@ -1,4 +1,4 @@
-"""A linear beam that falls from a pin, in a tangent frame, beside a rigid one."""
+"""Linear beam in a tangent frame that falls from a pin, compared with a rigid one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ T_END, GRAVITY = 1.0, 9.81
 
 
 def _tip(weight: float, level: str | None = None, rtol: float = 1e-6, **of_beam: Any) -> Array:
-    """(n, 2) Path of the tip of a beam of 1 m and 1 kg of this weight, in EI/L2; m."""
+    """Path (n, 2), m, of the tip of a beam of 1 m and 1 kg with this weight, in EI/L^2."""
     fallen = {
         "name": "rod", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": GRAVITY / weight,
     }  # fmt: skip
@@ -34,8 +34,7 @@ def _tip(weight: float, level: str | None = None, rtol: float = 1e-6, **of_beam:
 
 @cache
 def _known(weight: float) -> tuple[Array, float]:
-    """The path by more shapes in a frame that moves with them, and how far that of a rigid rod is
-    from it at most (m)."""
+    """Exact path, by more shapes in the mean frame, and the largest error of a rigid rod (m)."""
     exact = _tip(weight, rtol=1e-8, frame="mean", modes={"y": 6})
     rigid = _tip(weight, "rigid", modes={"y": 6})
     return exact, float(np.abs(rigid - exact).max())
@@ -50,12 +49,11 @@ def _error(weight: float, stiffening: bool) -> float:
 CASE = Definition(
     name="linear-weight",
     title="Linear beam under its weight: worse than a rigid one",
-    why="In the axes of a pinned end a falling beam is held by its bending alone, and its weight "
-    "and the centrifugal force act on it bent. Linear equations leave out that the force along "
-    "the beam stiffens it as it swings, and what they add to a rigid rod is then worse than "
-    "nothing.",
+    why="In the axes of a pinned end only the bending stiffness of a falling beam opposes its "
+    "weight and the centrifugal force. Linear equations neglect that the force along the beam "
+    "stiffens it as it swings. Their correction of a rigid rod is then worse than none.",
     parameter="weight, in EI/L²", unit="", low=0.1, high=5.0, scale=LOG,
-    measured="error of the tip's path in 1 s, of a rigid rod's", limit=1.0,
+    measured="tip path error in 1 s over that of a rigid rod", limit=1.0,
     method=Method("stiffening = false, 2 shapes", lambda weight: _error(weight, False)),
     remedy=Method("stiffening = true, 2 shapes", lambda weight: _error(weight, True)), reach=6.0,
     source="Kane, Ryan, Banerjee, Journal of Guidance, Control, and Dynamics 10, 1987; Sharf, "

@@ -1,4 +1,4 @@
-"""The dynamic stiffness of ever longer parts of a beam."""
+"""Dynamic stiffness of longer and longer elements of a beam."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ def _error(z: float, inertia: float) -> float:
 
 CASE = Definition(
     name="long-parts",
-    title="Exact beams: dynamic stiffness of long parts",
-    why="Hyperbolic functions in the quotients of the dynamic stiffness grow with exp(beta L) and "
-    "cancel in the quotient alone. They keep their digits, longer than transfer matrices, which "
-    "have lost them at the twelfth mode, until numerator and divisor are both larger than any "
-    "number, and then the quotient is none. Divided through by what grows, only exponentials that "
-    "decay are left.",
-    parameter="beta L of a part", unit="", low=1.0, high=1e4, scale=LOG,
-    measured="error of the part's inertia, relative", limit=1e-6,
+    title="Exact beams: dynamic stiffness of long elements",
+    why="Hyperbolic functions in the quotients of the dynamic stiffness grow with exp(beta L) "
+    "and cancel only in the quotient. The quotients stay accurate longer than transfer matrices, "
+    "which have lost all digits at the twelfth mode. At last numerator and divisor both overflow, "
+    "and the quotient is undefined. Divided by the growing terms, only decaying exponentials "
+    "remain.",
+    parameter="beta L of an element", unit="", low=1.0, high=1e4, scale=LOG,
+    measured="error of the element's inertia, relative", limit=1e-6,
     method=Method("quotients of sines", lambda z: _error(z, stiffness_quotient.inertia(z))),
     remedy=Method("decaying exponentials", lambda z: _error(z, root_inertia(z))), reach=1e6,
     source="Wittrick and Williams, Q. J. Mech. Appl. Math. 24, 1971 (dynamic stiffness); "

@@ -1,4 +1,4 @@
-"""Bending shapes of ever higher number, by hyperbolic functions."""
+"""Bending shapes of higher and higher number, by hyperbolic functions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def _stable(number: int, xi: Array) -> Array:
 
 
 def _error(number: float, shape: Callable[[int, Array], Array]) -> float:
-    """Of the square of the shape over the length, which its scale makes 1."""
+    """Error of the integral of the squared shape over the length, which is scaled to 1."""
     xi, weights = gauss_between((0.0, 1.0), lambda a, b: number + 1.0)
     with np.errstate(over="ignore", invalid="ignore"):
         return abs(float(weights @ shape(int(number), xi) ** 2) - 1)
@@ -28,10 +28,9 @@ def _error(number: float, shape: Callable[[int, Array], Array]) -> float:
 CASE = Definition(
     name="mode-shapes",
     title="Mode shapes by hyperbolic functions: their number",
-    why="Printed with cosh and sinh a shape is the difference of two numbers that grow by 23 with "
-    "every half-wave and cancel but for the shape. At the end of the eleventh or so nothing is "
-    "left of it. The same shape written with exponentials that decay from either end keeps all "
-    "digits.",
+    why="In the printed form with cosh and sinh a shape is the difference of two numbers that "
+    "grow by a factor of 23 per half-wave. At the end of about the eleventh shape no digit of it "
+    "is left. The same shape written with exponentials that decay from both ends keeps all digits.",
     parameter="number of the shape", unit="", low=1, high=60, scale=COUNT,
     measured="error of the shape's square over the length", limit=1e-4,
     method=Method("cosh and sinh", lambda n: _error(n, textbook_shapes.clamped_free)),

@@ -1,4 +1,4 @@
-"""Solid elements of degree 1 in material that keeps its volume."""
+"""Solid elements of degree 1 in nearly incompressible material."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from ...measures import bending_error
 from ...scale import LOG
 
 SLENDERNESS = 10.0
-#: Hexahedra along the bar and across it; the finer mesh is the one that locks.
+#: Numbers of hexahedra along the bar and across it; the finer mesh is the one that locks.
 LINEAR, QUADRATIC = (30, 3, 3), (20, 1, 1)
 
 
 CASE = Definition(
     name="no-compression",
-    title="Solid elements of degree 1: material that keeps its volume",
-    why="Near a Poisson's ratio of 1/2 every point of integration asks that the volume around it "
-    "stay what it is, and a mesh of degree 1 has fewer displacements than points that ask: rubber "
-    "locks in every direction, whatever the shape of its elements. Of degree 2 a mesh has enough "
-    "of them to bend: the 3 % that stay at the incompressible end halve with its elements.",
+    title="Solid elements of degree 1: nearly incompressible material",
+    why="Near a Poisson's ratio of 1/2 every integration point constrains the volume around it. "
+    "A mesh of degree 1 has fewer displacements than such constraints: rubber locks in every "
+    "direction, whatever the shape of its elements. A mesh of degree 2 has enough displacements to "
+    "bend; its error of 3 % at the incompressible end halves with the element size.",
     parameter="distance of Poisson's ratio from 1/2", unit="", low=1e-8, high=0.4, scale=LOG,
     measured="error of the first frequency, relative", limit=0.1,
     method=Method(

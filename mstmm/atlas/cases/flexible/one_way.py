@@ -1,4 +1,4 @@
-"""A beam that responds to the motion of its hub, and is not felt by it."""
+"""Beam that responds to the motion of its hub without acting on the hub."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TIMES = np.linspace(0.0, 2 * PULSE, 101)
 
 
 def _tip(hub: float, level: str, shapes: int) -> tuple[Array, float]:
-    """Path of the tip and its largest deflection, m, under a torque of one swing."""
+    """Path of the tip and its largest deflection, m, under a torque of one period."""
     torque = 0.02 * (hub + BEAM)
     center = {"name": "hub", "mass": 1.0, "inertia": [hub] * 3}
     arm = {
@@ -43,12 +43,12 @@ def _error(ratio: float, level: str) -> float:
 
 CASE = Definition(
     name="one-way",
-    title="One-way response: a beam that its hub does not feel",
+    title="One-way coupling: a beam that does not act on its hub",
     why="A beam that only responds to the motion of a rigid run costs next to nothing, and is "
-    "right as long as what carries it is heavy. Else the hub yields to the vibration, which takes "
-    "another frequency and another size, and the response may be worse than none.",
+    "accurate as long as the body that carries it is heavy. Otherwise the hub moves with the "
+    "vibration, which changes its frequency and size, and the response may be worse than none.",
     parameter="inertia of the hub over that of the beam", unit="", low=0.1, high=1e3, scale=LOG,
-    measured="error of the tip, of its deflection", limit=0.1,
+    measured="error of the tip, relative to its deflection", limit=0.1,
     method=Method("one-way, 3 shapes", lambda ratio: _error(ratio, "one-way")),
     remedy=Method("coupled, 3 shapes", lambda ratio: _error(ratio, "coupled")), reach=0.1,
     source="Shabana, Dynamics of Multibody Systems, 2020, ch. 5 (linear theory of elastodynamics)",

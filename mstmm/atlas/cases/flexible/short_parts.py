@@ -1,4 +1,4 @@
-"""The dynamic stiffness of ever shorter parts of a beam."""
+"""Dynamic stiffness of shorter and shorter elements of a beam."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ def _error(z: float, inertia: float) -> float:
 
 CASE = Definition(
     name="short-parts",
-    title="Exact beams: dynamic stiffness of short parts",
-    why="Entries of the dynamic stiffness are quotients of circular and hyperbolic functions; near "
-    "rest numerator and divisor vanish together, and what is left of them is the static stiffness, "
-    "beside which inertia is beta L to the fourth power. A beam cut into many parts loses its mass "
-    "in rounding. What lies beyond the static part is a power series there.",
-    parameter="beta L of a part", unit="", low=1e-3, high=3.0, scale=LOG,
-    measured="error of the part's inertia, relative", limit=1e-6,
+    title="Exact beams: dynamic stiffness of short elements",
+    why="Entries of the dynamic stiffness are quotients of circular and hyperbolic functions. "
+    "For short elements numerator and divisor vanish together, and their quotient is the static "
+    "stiffness, next to which inertia is of the size of (beta L)^4. A beam divided into many "
+    "elements loses its mass in rounding. The remedy computes the terms beyond the static "
+    "stiffness as a power series.",
+    parameter="beta L of an element", unit="", low=1e-3, high=3.0, scale=LOG,
+    measured="error of the element's inertia, relative", limit=1e-6,
     method=Method(
         "quotients of sines", lambda z: _error(z, stiffness_quotient.inertia(z))
     ),

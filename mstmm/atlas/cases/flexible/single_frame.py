@@ -1,4 +1,4 @@
-"""One floating frame for a beam that bends far."""
+"""One floating frame for a beam with large deflections."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...scenes import model
 
 @cache
 def _tip(load: float, pieces: int, shapes: int) -> Array:
-    """Where the tip of a clamped beam of 1 m and 1 N m2 rests under a load across it (N)."""
+    """Static tip position of a clamped beam of 1 m and 1 N m2 under a load across it (N)."""
     beam = {
         "length": 1 / pieces, "mass_per_length": 1.0, "bending_stiffness": 1.0,
         "modes": {"y": shapes},
@@ -42,13 +42,13 @@ def _error(load: float, pieces: int, shapes: int) -> float:
 
 CASE = Definition(
     name="single-frame",
-    title="One floating frame: a beam that bends far",
-    why="Shapes are small deflections from a frame, and one frame serves a beam only as long as "
-    "its sections turn little against it: half the square of the slope is lost of the deflection. "
-    "More shapes change nothing; welded pieces with frames of their own do.",
-    parameter="load across the tip of a clamped beam, of EI/L²", unit="", low=0.02, high=10.0,
+    title="One floating frame: large deflections of a beam",
+    why="Shape functions are small deflections from a frame. One frame is accurate only as long "
+    "as the sections of the beam rotate little against it: the relative error of the deflection is "
+    "half the square of the slope. More shapes do not help; welded pieces with separate frames do.",
+    parameter="load across the tip of a clamped beam, in EI/L²", unit="", low=0.02, high=10.0,
     scale=LOG,
-    measured="error of the tip's place, of the length", limit=0.01,
+    measured="tip position error over the length", limit=0.01,
     method=Method("one beam, 3 shapes", lambda load: _error(load, 1, 3)),
     remedy=Method("6 welded pieces, 2 shapes each", lambda load: _error(load, 6, 2)), reach=10.0,
     source="Shabana, Dynamics of Multibody Systems, 2020, ch. 5 and 6; Rui, Wang, Zhang, Transfer "

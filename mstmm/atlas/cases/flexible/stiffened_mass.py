@@ -1,4 +1,4 @@
-"""The inertia of a stiffened beam, cut off after the second order of its deflection."""
+"""Inertia of a stiffened beam, truncated after the second order of its deflection."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SHAPES = 4
 
 
 def _lost(deflection: float, quadrature: bool) -> float:
-    """Part of the inertia that the worst of all motions has lost; above 1 it is negative."""
+    """Largest relative loss of inertia over all motions; above 1 the inertia is negative."""
     beam = {
         "name": "rod", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 50.0,
         "modes": {"y": SHAPES}, "frame": "tangent", "stiffening": True, "quadrature": quadrature,
@@ -32,15 +32,16 @@ def _lost(deflection: float, quadrature: bool) -> float:
 
 CASE = Definition(
     name="stiffened-mass",
-    title="Stiffened beam: inertia cut off after the second order",
-    why="Shortening makes the mass matrix of a beam depend on its deflection. Cut off after the "
-    "second power it takes more inertia than there is where shapes can take up nearly all of it, "
-    "as in a frame tangent to a section that turns, and accelerations change their sign. Mass in "
-    "points along the beam (`quadrature`), or the mean frame, keeps it positive.",
-    parameter="deflection of the tip of a pinned beam, of its length", unit="", low=5e-3,
+    title="Stiffened beam: inertia truncated after the second order",
+    why="Shortening makes the mass matrix of a beam depend on its deflection. Truncated after "
+    "the second power, it subtracts more inertia than there is where shapes carry nearly all of "
+    "it, as in a frame tangent to a rotating section. Accelerations then change their sign. Mass "
+    "in points along the beam (`quadrature`), or the mean frame, keeps the matrix positive "
+    "definite.",
+    parameter="deflection of the tip of a pinned beam, relative to its length", unit="", low=5e-3,
     high=0.4, scale=LOG,
-    measured="part of the inertia that is lost", limit=1.0,
-    method=Method(f"tangent frame, {SHAPES} shapes, cut off", lambda d: _lost(d, False)),
+    measured="lost part of the inertia", limit=1.0,
+    method=Method(f"tangent frame, {SHAPES} shapes, truncated", lambda d: _lost(d, False)),
     remedy=Method("the same with quadrature", lambda d: _lost(d, True)), reach=0.6,
     source="Kane, Ryan, Banerjee, Journal of Guidance, Control, and Dynamics 10, 1987; Shabana, "
     "Dynamics of Multibody Systems, 2020, ch. 5",

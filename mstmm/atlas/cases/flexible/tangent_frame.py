@@ -1,4 +1,4 @@
-"""A frame tangent to a beam at its pinned end, with ever more shapes."""
+"""Frame tangent to a beam at its pinned end, with more and more shapes."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ STEP, STEPS = 1e-3, 200
 
 
 def _angle(shapes: float, frame: str) -> float:
-    """Largest angle of the end of a beam of 1 m and 1 kg that turns at 1 rad/s against a damper in
-    its pin, rad."""
+    """Largest angle (rad) of the end of a beam of 1 m and 1 kg on a damped pin, from 1 rad/s."""
     beam = {
         "name": "beam", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0,
         "modes": {"y": int(shapes)}, "frame": frame,
@@ -31,11 +30,11 @@ def _angle(shapes: float, frame: str) -> float:
 
 CASE = Definition(
     name="tangent-frame",
-    title="A frame tangent to a beam at a pinned end",
-    why="Many shapes of a clamped beam together can all but turn a pinned one without its frame: "
-    "what is left for the frame to carry falls with the third power of their number, and "
-    "what damps the pin makes a motion of it that is faster than any of the beam. A chord, or the "
-    "mean of the beam, leaves the frame ten times more of the inertia.",
+    title="Frame tangent to a beam at a pinned end",
+    why="Many clamped shapes together can nearly represent the rotation of a pinned beam without "
+    "its frame. The inertia left for the frame falls with the third power of their number, and a "
+    "damper in the pin then causes a motion faster than any of the beam. A chord frame, or the "
+    "mean frame, has ten times more of the inertia.",
     parameter="shapes of a beam on a damped pin", unit="", low=1, high=20, scale=COUNT,
     measured="largest angle of the pinned end, rad", limit=1.0,
     method=Method("tangent frame, rk4 with h = 1 ms", lambda n: _angle(n, "tangent")),

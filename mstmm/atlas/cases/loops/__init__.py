@@ -1,1 +1,1 @@
-"""Closed loops."""
+"""Cases of closed loops."""

@@ -1,4 +1,4 @@
-"""Springs and dampers that hold closed loops together."""
+"""Springs and dampers that keep closed loops together."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ def _projected() -> float:
 
 CASE = Definition(
     name="baumgarte",
-    title="Closed loops held by springs and dampers: a four-bar",
-    why="Accelerations that keep a loop closed leave its gap to the errors of the steps, and it "
-    "opens. Baumgarte lets a spring and a damper close it, with a rate that somebody chooses: "
-    "a low one does little, and a high one makes the equations stiff for nothing, until the steps "
-    "are too long for it. Projecting positions and speeds after each step has no such number, and "
-    "leaves rounding.",
+    title="Closed loops with springs and dampers: a four-bar",
+    why="Accelerations that satisfy the constraints leave the position gap of a loop to the "
+    "errors of the steps, and it grows. Baumgarte closes it by a spring and a damper, whose rate "
+    "the user has to choose. A low rate has little effect. A high one makes the equations stiff, "
+    "until the steps are too long for it. Projecting positions and speeds after each step needs no "
+    "such number, and leaves only rounding.",
     parameter="rate of the springs times step", unit="", low=0.05, high=10.0, scale=LOG,
     measured="largest gap in 1.5 s, m or rad", limit=1e-3,
     method=Method("rk4, h = 5 ms, Baumgarte's rates", _stabilised),

@@ -1,4 +1,4 @@
-"""Rows of a loop that are counted by how far they move true masses, behind a heavy coupler."""
+"""Constraint rows of a loop counted with true masses, for a heavy coupler."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ def _error(ratio: float, by_masses: bool) -> float:
 
 CASE = Definition(
     name="dropped-rows",
-    title="Rank of a loop by its masses: a heavy coupler",
-    why="How many rows say something of their own is read from how far loads along them move the "
-    "bodies. A heavy coupler answers one of them by the ratio of masses less than light cranks "
-    "answer the others: once that is below the cut of the rank, an honest row is dropped, and the "
-    "linkage comes apart. How rows depend on each other is a matter of places, not of masses: "
-    "judged once with all bodies alike, both stay.",
+    title="Rank of a loop with true masses: a heavy coupler",
+    why="The number of independent rows follows from the motions of the bodies under loads along "
+    "the rows. A heavy coupler moves less than light cranks by the mass ratio. Once that is below "
+    "the threshold of the rank, an independent row is dropped, and the linkage comes apart. The "
+    "dependence of rows is a matter of geometry, not of masses: determined once with equal masses, "
+    "both rows stay.",
     parameter="mass per length of the coupler over that of the cranks", unit="",
     low=1.0, high=1e10, scale=LOG,
     measured="error of the accelerations, relative", limit=1e-6,
-    method=Method("rank with true masses, a cut of 1e-6", lambda x: _error(x, True)),
-    remedy=Method("rank with masses alike", lambda x: _error(x, False)), reach=1e16,
+    method=Method("rank with true masses, threshold 1e-6", lambda x: _error(x, True)),
+    remedy=Method("rank with equal masses", lambda x: _error(x, False)), reach=1e16,
     source="Garcia de Jalon, Gutierrez-Lopez, Multibody System Dynamics 30, 2013 (redundant "
     "constraints); Golub, Van Loan, Matrix Computations, 4th ed., 2013, 5.5 (rank and scale)",
 )  # fmt: skip

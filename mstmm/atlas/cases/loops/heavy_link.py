@@ -1,4 +1,4 @@
-"""Closing a loop of light rods through a heavy one."""
+"""Closing a loop of light rods with a heavy one."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ def _error(ratio: float, refined: bool) -> float:
 
 CASE = Definition(
     name="heavy-link",
-    title="Closed loops: a heavy link behind light ones",
-    why="What closes a loop is found in the sweep by the answers of its rods to a load at the cut. "
-    "Light rods in front of a heavy one answer far more than it does, and what is left for it is a "
-    "difference of large numbers. Inverse dynamics eliminates nothing: what it leaves over of the "
-    "answer is small and known well, and is answered once more.",
+    title="Closed loops: a heavy link outboard of light ones",
+    why="The loads that close a loop follow from the accelerations of its rods under a load at "
+    "the cut. Light rods inboard of a heavy one respond far more than it does, and its response is "
+    "a difference of large numbers. Inverse dynamics eliminates nothing: its residual is small and "
+    "accurate, and a second sweep corrects the result by it.",
     parameter="mass of the fourth rod over that of the others", unit="", low=1.0, high=1e13,
     scale=LOG,
     measured="error of the accelerations, relative", limit=1e-9,

@@ -1,4 +1,4 @@
-"""A loop that cannot close, of which gaps are measured by how far loads move the bodies."""
+"""Loop that cannot close, with gaps weighted by the mobility of the bodies."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from ...scale import LOG
 from ...scenes import four_bar, model
 from ...variants.gap_by_masses import nearest
 
-#: m; where the crank is held, and how far the coupler is turned on where steps begin, rad.
+#: Distance of the feet, m; fixed angle of the crank and initial rotation of the coupler, rad.
 FEET, HELD, BESIDE = 1.6, 2.8, 1.0
 CRANK, COUPLER, ROCKER = 0.5, 1.1, 0.8
 
 
 @cache
 def _linkage(spread: float) -> Model:
-    """Its crank can be turned to where the coupler, far the lightest, no longer reaches."""
+    """Four-bar linkage with a very light coupler that is too short at some crank angles."""
     scene = four_bar(ratio=1e-3, spread=spread, feet=FEET)
     closing = scene["hinge"][-1]
     closing["inboard"], closing["outboard"] = closing["outboard"], closing["inboard"]
@@ -26,7 +26,7 @@ def _linkage(spread: float) -> Model:
 
 
 def _error(spread: float, by_masses: bool) -> float:
-    """Coupler and rocker on the line from knee to heel leave the least gap."""
+    """Relative excess of the gap; the least gap has coupler and rocker on the line of the pins."""
     linkage = _linkage(spread)
     q = linkage.initial_state()[0]
     hinges = linkage.layout.hinges
@@ -45,15 +45,15 @@ def _error(spread: float, by_masses: bool) -> float:
 
 CASE = Definition(
     name="least-gap",
-    title="Least gaps of open loops measured by masses: a slender coupler",
-    why="Where a loop cannot be closed, the pose that leaves the least gap tells why. Measured in "
-    "parts of how far loads along each row would move the bodies, gaps across a coupler whose mass "
-    "sits in its middle weigh next to nothing: the steps end where the bodies stand far apart, "
-    "and the message names a gap and a pose that mislead. One scale for all rows of a kind leaves "
-    "the least gap to the geometry, and still takes the steps that move little mass.",
+    title="Least gaps of open loops weighted by masses: a slender coupler",
+    why="Where a loop cannot be closed, the pose of the least gap shows the reason. Weighted by "
+    "the mobility of each row, gaps across a coupler with its mass in the middle count next to "
+    "nothing. The iteration then ends with the bodies far apart, and the message reports a "
+    "misleading gap and pose. One scale for all rows of a kind leaves the least gap to the "
+    "geometry, and still prefers steps that move little mass.",
     parameter="moments of inertia of rods over those of uniform ones", unit="",
     low=1e-4, high=10.0, scale=LOG,
-    measured="gap that is left beyond the least one, relative", limit=1e-3,
+    measured="gap in excess of the least one, relative", limit=1e-3,
     method=Method("each row by its own mobility", lambda x: _error(x, True)),
     remedy=Method("one scale for all rows of a kind", lambda x: _error(x, False)), reach=1e-8,
     source="Levenberg, Quarterly of Applied Mathematics 2, 1944 (damped least squares); "

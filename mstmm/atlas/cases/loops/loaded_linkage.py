@@ -1,4 +1,4 @@
-"""Frequencies of a linkage under load, by matrices that leave out how loads at its cut turn."""
+"""Frequencies of a linkage under load, with loads at its cut that do not rotate."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...scale import LOG
 from ...scenes import LEAN, hung_linkage, model
 from ...variants import still_loads
 
-#: Moment of the weights of coupler and half the cranks by the metre of a crank, N*m.
+#: Moment of the weights of coupler and half the cranks with an arm of a crank (1 m), N*m.
 WEIGHT = 2 * 9.81
 
 
@@ -19,11 +19,11 @@ def _linkage(load: float) -> Model:
 
 
 def _error(load: float, squared: float) -> float:
-    """Of omega^2, beside its closed form.
+    """Relative error of omega^2, against its closed form.
 
-    With cranks of 1 m that lean by a, feet apart by 1 + 2 sin a and all masses 1, the ends of the
-    coupler stay 1 m apart to second order where the mean lean grows by (1/2 + sin a) tan a s^2 for
-    cranks that turn by s.
+    The cranks of 1 m are inclined by a, the feet are 1 + 2 sin a apart, and all masses are 1.  The
+    ends of the coupler stay 1 m apart to second order if the mean inclination grows by
+    (1/2 + sin a) tan a s^2 for cranks that rotate by s.
     """
     sine, cosine = math.sin(LEAN), math.cos(LEAN)
     lifted = cosine + (1 + 2 * sine) * sine**2 / cosine
@@ -42,16 +42,16 @@ def _turned(load: float) -> float:
 CASE = Definition(
     name="loaded-linkage",
     title="Frequencies of closed loops: a linkage under load",
-    why="The tree of a mechanism, made linear along the motions that its loops leave, has masses "
-    "and springs right, and the weight of all bodies as if each swung by itself. What the loop "
-    "carries is missing: the loads at its cut turn with the rods, and stiffen or soften the whole. "
-    "Where springs are stiff nobody sees it; of a linkage that is held by its weight the frequency "
-    "is wrong. The stiffness of these loads belongs to the matrix, with what they are there.",
+    why="The tree of a mechanism, linearised along the motions that its loops allow, has the "
+    "right masses and springs, and the weight of every body as if it swung independently. The "
+    "loads of the loop are missing: those at its cut rotate with the rods, and stiffen or soften "
+    "the whole. With stiff springs the error is small; for a linkage supported by its weight the "
+    "frequency is wrong. The geometric stiffness of these loads belongs to the stiffness matrix.",
     parameter="weight times length over stiffness of the spring", unit="",
     low=1e-4, high=10.0, scale=LOG,
     measured="error of the squared frequency, relative", limit=1e-2,
-    method=Method("tree along its motions, loads standing still", _still),
-    remedy=Method("loads turned as well (model.modes)", _turned), reach=1e6,
+    method=Method("tree along its motions, loads of fixed direction", _still),
+    remedy=Method("loads rotate as well (model.modes)", _turned), reach=1e6,
     source="Gonzalez, Masarati, Cuadrado, Naya, Journal of Computational and Nonlinear Dynamics "
     "12, 2017 (linearised equations of constrained systems)",
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""A loop of which places are projected after each step, and speeds are not."""
+"""Loop with positions projected after each step, but not its speeds."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ def _of_both(step: float) -> float:
 
 CASE = Definition(
     name="projected-places",
-    title="Closed loops projected in places alone: a four-bar",
-    why="Places that are set right after each step leave the loop closed to the eye. Its speeds "
-    "still point out of it, and the next step follows them: angles of this four-bar err 6 to 18 "
-    "times as much as where speeds are projected too, which is one more pass through factors that "
-    "are there already.",
+    title="Closed loops with projection of positions only: a four-bar",
+    why="Projected positions make the loop look closed after each step. Its speeds still violate "
+    "the constraints, and the next step follows them: angles of this four-bar have 6 to 18 times "
+    "the error of a run with projected speeds. That projection costs one more pass with factors "
+    "that are available.",
     parameter="length of a step", unit="s", low=1e-3, high=0.02, scale=LOG,
-    measured="largest slip in 1.5 s, m/s or rad/s", limit=1e-5,
-    method=Method("rk4, places projected", _of_places),
-    remedy=Method("rk4, places and speeds projected", _of_both), reach=0.02,
+    measured="largest velocity error in 1.5 s, m/s or rad/s", limit=1e-5,
+    method=Method("rk4, positions projected", _of_places),
+    remedy=Method("rk4, positions and speeds projected", _of_both), reach=0.02,
     source="Hairer, Lubich, Wanner, Geometric Numerical Integration, 2006, IV.4; Eich, SIAM "
     "Journal on Numerical Analysis 30, 1993 (both projected)",
 )  # fmt: skip

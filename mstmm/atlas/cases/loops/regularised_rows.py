@@ -1,4 +1,4 @@
-"""A loop whose rows are made regular by a little of the unit matrix, near a singular pose."""
+"""Loop whose constraint rows are regularised, near a singular configuration."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def _error(angle: float, regularised: bool) -> float:
 
 CASE = Definition(
     name="regularised-rows",
-    title="Closed loops made regular: a parallelogram near its line",
-    why="Rows that repeat others make the equations of multipliers singular, and a little of the "
-    "unit matrix makes them regular again: every row then yields by that little. Near a pose where "
-    "a mechanism may go on two ways one row of the others answers by the square of the distance, "
-    "and yields like the rest: the linkage leaves its way long before it is there. Rows that are "
-    "chosen once yield nowhere, until the one that answers is itself taken for rounding.",
-    parameter="angle from the pose where all rods lie in one line", unit="rad",
+    title="Regularised closed loops: a nearly singular parallelogram",
+    why="Redundant rows make the equations of the multipliers singular, and a small multiple of "
+    "the unit matrix regularises them: every row then yields by that amount. Near a singular "
+    "configuration one of the other rows responds with the square of the distance, and yields like "
+    "the rest. The linkage then leaves its path long before the singular pose. A fixed choice of "
+    "rows yields nowhere, until that row itself is lost in rounding.",
+    parameter="angle from the pose with all rods in line", unit="rad",
     low=1e-5, high=1.0, scale=LOG,
     measured="error of the accelerations, relative", limit=1e-6,
     method=Method("all rows, 1e-8 of the unit matrix added", lambda x: _error(x, True)),

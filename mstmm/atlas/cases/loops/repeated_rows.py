@@ -1,4 +1,4 @@
-"""Rows of a planar mechanism in space that say what others say, but for how its axes stand."""
+"""Redundant rows of a planar mechanism in space, with slightly misaligned axes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _linkage(askew: float) -> Model:
 
 
 def _error(found: Array) -> float:
-    """Beside the linkage whose axes are parallel."""
+    """Relative error against the linkage with parallel axes."""
     straight = _linkage(0.0)
     wanted = straight.accelerations(*straight.initial_state())[: len(found)]
     return float(np.abs(found - wanted).max() / np.abs(wanted).max())
@@ -42,17 +42,17 @@ def _some(askew: float) -> float:
 
 CASE = Definition(
     name="repeated-rows",
-    title="Rows that repeat others, with axes not quite parallel: a four-bar",
-    why="A pin that closes a planar loop in space has five rows, of which three say what its plane "
-    "says already. Where axes stand askew by less than any drawing tells, these three ask for "
-    "something else by the square of that: once it is more than rounding, a rank by rounding keeps "
-    "them, and the linkage is locked. Judged beside the mobility of their hinge they repeat "
-    "others, and are left out for the whole run; where the gap that they leave is a thousandth of "
-    "the scene, the scene is refused with a word.",
-    parameter="angle by which axes stand askew", unit="rad", low=1e-11, high=1e-3, scale=LOG,
+    title="Redundant rows with axes not quite parallel: a four-bar",
+    why="A pin that closes a planar loop in space has five rows, of which three are redundant. "
+    "Where the axes are misaligned by less than any drawing tolerance, these rows disagree by the "
+    "square of the angle. Once that exceeds rounding, a rank by rounding keeps them, and the "
+    "linkage is locked. Compared with the mobility of their hinge they are redundant, and are left "
+    "out for the whole run. Where the gap that they leave is a thousandth of the scene, the scene "
+    "is rejected with a message.",
+    parameter="misalignment of the axes", unit="rad", low=1e-11, high=1e-3, scale=LOG,
     measured="error of the accelerations, relative", limit=1e-3,
     method=Method("all rows, rank by rounding (pseudo-inverse)", _all),
-    remedy=Method("rows judged by mobility, a fixed choice", _some), reach=1e-2,
+    remedy=Method("rows compared by mobility, a fixed choice", _some), reach=1e-2,
     source="Garcia de Jalon, Gutierrez-Lopez, Multibody System Dynamics 30, 2013 (redundant "
     "constraints and their forces)",
 )  # fmt: skip

@@ -1,1 +1,1 @@
-"""Products of transfer matrices."""
+"""Cases of products of transfer matrices."""

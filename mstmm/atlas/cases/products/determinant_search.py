@@ -10,7 +10,7 @@ from ...scale import COUNT
 from ...scenes import model
 from ...variants import determinant
 
-#: Parts of the beam in the product, and shapes of each part in the sweep's scene.
+#: Number of elements of the beam in the product, and of shapes of each element in the sweep.
 PARTS, SHAPES = 4, 6
 
 
@@ -43,11 +43,11 @@ CASE = Definition(
     name="determinant-search",
     title="Frequencies as zeros of a determinant: their number",
     why="The determinant of the conditions at a free end is a difference of products of entries "
-    "that grow with exp(beta L). Beyond the eleventh mode or so of a cantilever nothing of it is "
-    "left but rounding, whose sign is anybody's guess; to cut the beam into more parts does not "
-    "help. The pivots of the sweep stay of the size of stiffness, and as many of them are negative "
-    "as there are modes below a frequency. Where the determinant does not change its sign once "
-    "around a mode, the error counts as 1.",
+    "that grow with exp(beta L). Above about the eleventh mode of a cantilever only rounding is "
+    "left of it, with an arbitrary sign; more elements do not help. The pivots of the sweep stay "
+    "of the size of the stiffness, and the number of negative ones is the number of modes below a "
+    "frequency. Where the determinant does not change its sign exactly once around a mode, the "
+    "error counts as 1.",
     parameter="number of the mode", unit="", low=1, high=60, scale=COUNT,
     measured="error of beta L, relative", limit=1e-3,
     method=Method(f"signs of the determinant, {PARTS} transfer matrices", _by_signs),

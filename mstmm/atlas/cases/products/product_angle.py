@@ -1,4 +1,4 @@
-"""The plain product of transfer matrices where pins stand across each other."""
+"""Plain product of transfer matrices with pins at an angle to each other."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def _error(degrees: float, **options: float | str) -> float:
 
 CASE = Definition(
     name="product-angle",
-    title="Product of transfer matrices: angle between the axes of neighbours",
-    why="The pivot of a pin's matrix is the inertia of one body between its own axis and the next "
-    "one's. It falls with the cosine of the angle and is zero at 90 degrees, the usual arm of a "
-    "robot, while the mass matrix stays as regular as ever.",
+    title="Product of transfer matrices: angle between neighbouring axes",
+    why="The pivot of a pin's matrix is the inertia of one body that couples its axis with that "
+    "of the next pin. It falls with the cosine of the angle and is zero at 90 degrees, usual in "
+    "robot arms, while the mass matrix stays regular.",
     parameter="angle between neighbouring pins", unit="degrees", low=0.0, high=90.0, scale=LINEAR,
     measured="error of the accelerations, relative", limit=1e-6,
     method=Method(

@@ -1,4 +1,4 @@
-"""The product of the discrete-time matrices of beams along a row of them."""
+"""Product of the discrete-time matrices of beams along a row of them."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def _error(count: float, method: str) -> float:
 CASE = Definition(
     name="product-beams",
     title="Product of discrete-time matrices: a row of beams",
-    why="Modal rows make the matrices of beams far worse conditioned than those of rigid bodies, "
-    "and a product of a few has no digit left; the shorter the step, the fewer. The same matrices "
-    "eliminated by Riccati from the tip inwards keep theirs.",
+    why="Modal rows make the matrices of beams far worse conditioned than those of rigid bodies. "
+    "A product of a few of them has no accurate digit, and fewer with shorter steps. The same "
+    "matrices eliminated by Riccati from the tip inwards stay accurate.",
     parameter="welded beams of three shapes", unit="", low=1, high=12, scale=COUNT,
     measured="difference from steps in hinge coordinates", limit=1e-4,
     method=Method(

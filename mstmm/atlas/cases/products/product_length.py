@@ -1,4 +1,4 @@
-"""The plain product of transfer matrices along ever longer chains."""
+"""Plain product of transfer matrices along longer and longer chains."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def _error(count: float, **options: float | str) -> float:
 CASE = Definition(
     name="product-length",
     title="Product of transfer matrices: length of a chain",
-    why="The product eliminates from the root outwards, a shooting method: what rounding leaves at "
-    "one body grows fourfold at the next, though the chain itself is harmless. The Riccati sweep "
+    why="The product eliminates from the root outwards, a shooting method: the rounding error of "
+    "one body grows fourfold at the next, though the chain is well conditioned. The Riccati sweep "
     "eliminates from the tips inwards, with positive definite pivots.",
     parameter="rods on parallel pins", unit="", low=2, high=60, scale=COUNT,
     measured="error of the accelerations, relative", limit=1e-6,

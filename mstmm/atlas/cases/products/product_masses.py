@@ -1,4 +1,4 @@
-"""The plain product of transfer matrices towards ever lighter bodies."""
+"""Plain product of transfer matrices with bodies that get lighter outboard."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def _error(ratio: float, **options: Any) -> float:
 
 CASE = Definition(
     name="product-masses",
-    title="Product of transfer matrices: light bodies behind heavy ones",
-    why="The product carries the loads of the heavy root along to a tip where they must cancel to "
-    "those of a light body: what rounding leaves of them is multiplied by the ratio of the masses. "
-    "The sweep never meets the difference.",
+    title="Product of transfer matrices: light bodies outboard of heavy ones",
+    why="The product passes the loads of the heavy root on to a tip, where they must cancel down "
+    "to those of a light body. The mass ratio multiplies their rounding error. The sweep does not "
+    "form that difference.",
     parameter="mass of a rod over that of its inboard neighbour", unit="", low=1e-3, high=1.0,
     scale=LOG,
     measured="error of the accelerations, relative", limit=1e-6,

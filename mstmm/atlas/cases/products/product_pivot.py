@@ -1,4 +1,4 @@
-"""The plain product of transfer matrices near the centre of percussion."""
+"""Plain product of transfer matrices near the centre of percussion."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ CASE = Definition(
     name="product-pivot",
     title="Product of transfer matrices: a pivot that vanishes",
     why="The pivot of a planar pin is zero where the output end of its body is the centre of "
-    "percussion of the input end, as of a dumbbell: a blow there moves the inner end not at all. "
-    "Digits go long before the guard names the hinge.",
+    "percussion of the input end, as for a dumbbell. An impact there does not move the inner end. "
+    "Digits are lost long before the guard names the hinge.",
     parameter="distance of the moment of inertia from that of a dumbbell", unit="",
     low=1e-10, high=0.5, scale=LOG,
     measured="error of the accelerations, relative", limit=1e-6,

@@ -1,4 +1,4 @@
-"""The plain product of transfer matrices along light bodies behind one heavy root."""
+"""Plain product of transfer matrices along light bodies outboard of one heavy root."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def _error(ratio: float, **options: Any) -> float:
 CASE = Definition(
     name="product-root",
     title="Product of transfer matrices: one heavy body at the root",
-    why="Whatever the root carries passes through all matrices before the tip says that nothing "
-    "of it is left. One heavy body is enough: its loads are rounded in their own size, and the "
-    "light ones behind it are moved by what that leaves. The sweep comes to the heavy body last, "
-    "and what light ones add to it may well be rounded there.",
+    why="All loads of the root pass through all matrices before the condition at the tip cancels "
+    "them. One heavy body is enough: its loads are rounded at their size, and that error moves the "
+    "light bodies outboard of it. The sweep reaches the heavy body last, and the contribution of "
+    "the light bodies may be rounded there without harm.",
     parameter="mass of the first rod over that of the others", unit="", low=1.0, high=1e14,
     scale=LOG,
     measured="error of the accelerations, relative", limit=1e-6,

@@ -1,1 +1,1 @@
-"""Coordinates of rotations."""
+"""Cases of coordinates of rotations."""

@@ -1,4 +1,4 @@
-"""Three angles on the way past the attitude at which they fail."""
+"""Three angles that pass the attitude at which they are singular."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ STEP, T_END = 1e-3, 2.0
 
 
 def _end(kind: str, distance: float, *method: str | float, **options: float) -> Array:
-    """Attitude, as a quaternion, of a body that turns at about 1 rad/s, by way of an attitude whose
-    second angle is `distance` rad before 90 degrees."""
+    """Final attitude (quaternion) of a body that rotates at about 1 rad/s.
+
+    It passes an attitude whose second angle is `distance` rad below 90 degrees.
+    """
     half = distance / 2
     start = [0.0, 0.0, distance] if kind == "gimbal" else [np.cos(half), 0.0, 0.0, np.sin(half)]
     turning = [np.sin(distance), np.cos(distance), 0.0]
@@ -34,11 +36,11 @@ def _error(distance: float, kind: str) -> float:
 
 CASE = Definition(
     name="gimbal-passage",
-    title="Three angles: the attitude at which they fail",
-    why="Where the second of three angles passes 90 degrees the axes of the first and the third "
-    "are one, and their rates grow without bound; steps that were fine everywhere else lose all "
-    "digits. Whether a step hits or jumps the place is luck. The quaternion of a ball hinge has "
-    "no such place.",
+    title="Three angles: the attitude at which they are singular",
+    why="Where the second of three angles passes 90 degrees, the axes of the first and the third "
+    "coincide. Their rates grow without bound, and steps that are accurate elsewhere lose all "
+    "digits. Whether a step hits or jumps over the attitude is a matter of chance. The quaternion "
+    "of a ball hinge has no such attitude.",
     parameter="distance of the second angle from 90 degrees", unit="rad", low=1e-5, high=0.5,
     scale=LOG,
     measured="error of the attitude after 2 s", limit=1e-6,

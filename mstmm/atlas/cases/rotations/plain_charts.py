@@ -1,4 +1,4 @@
-"""Rotation vectors that forget that rotations do not add."""
+"""Rotation vectors integrated as if rotations could be added."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from ...variants import plain_charts
 CASE = Definition(
     name="plain-charts",
     title="Rotation vectors whose rate is the angular velocity",
-    why="Within a step an attitude may be told by a rotation vector, three numbers without a tie. "
-    "Its rate is the angular velocity only where it is zero; beyond, products of both come in. "
-    "Without them every method falls to second order, whatever its table promises. Runs keep two "
-    "of them, enough for fifth order, or go by quaternions.",
+    why="Within a step an attitude may be described by a rotation vector, three numbers without "
+    "a constraint. Its rate equals the angular velocity only where it is zero; elsewhere products "
+    "of both are added. Without them every method falls to second order, whatever the order of its "
+    "table. Runs keep two of them, enough for fifth order, or use quaternions.",
     parameter="length of a step", unit="s", low=2e-3, high=0.1, scale=LOG,
     measured=f"error of the attitude after {TURNING:g} s, rad", limit=1e-4,
     method=Method("rk4, the products left out", lambda h: error_of_turning(plain_charts.end_of, h)),

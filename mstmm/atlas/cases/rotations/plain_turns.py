@@ -1,4 +1,4 @@
-"""Turns in space that are taken for sums of small ones, in steps of the classical method."""
+"""Finite rotations added like small ones, in steps of the classical method."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ T_END, SPIN, RADIUS = 1.0, 6.0, 0.8
 
 @cache
 def _rods() -> Model:
-    """Two rods on balls that fall while the first turns about its axis, the second across."""
+    """Two falling rods on ball hinges; the first spins about its axis, the second across it."""
     spins = ([SPIN, 0, 0], [0, 0, SPIN / 2])
     places = (("shoulder", "ground", "upper"), ("elbow", "upper.tip", "lower"))
     return model({
@@ -53,10 +53,10 @@ def _error(rate: float, plain: bool) -> float:
 
 CASE = Definition(
     name="plain-turns",
-    title="Turns in space without the tangent of the rotation",
-    why="The unknown of a body in space is a rotation vector from where it was predicted; a change "
-    "of that vector is a turn only next to zero. With the hinges as constraints, what the linear "
-    "equations then miss is a gap, the next step pays for it by loads, and the motion is lost "
+    title="Finite rotations without the tangent operator",
+    why="The unknown of a body in space is a rotation vector from the predicted attitude; a "
+    "change of that vector is a rotation only near zero. With the hinges as constraints, the error "
+    "of the linear equations is a gap, which causes loads in the next step. The motion is lost "
     "within a second at steps that are far from long. The tangent operator in the matrices keeps "
     "the hinges closed.",
     parameter="step times angular velocity", unit="", low=3e-3, high=0.1, scale=LOG,

@@ -1,4 +1,4 @@
-"""The length of a quaternion that is integrated as four numbers."""
+"""Length of a quaternion that is integrated as four numbers."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def _kept(step: float) -> float:
 CASE = Definition(
     name="quaternion-drift",
     title="Quaternions as four numbers: their length",
-    why="Four numbers for three rotations are tied by their length, and a method of integration "
-    "does not know of it: it shrinks by the sixth power of the step a step, and axes that a "
-    "quaternion of another length gives are no axes. Every run here brings quaternions back to "
-    "length 1 after each step.",
+    why="Four numbers for three rotations are constrained by their length, which a method of "
+    "integration does not preserve. The length decreases per step with the sixth power of the "
+    "step, and a quaternion of another length gives no orthonormal axes. Every run normalises "
+    "quaternions after each step.",
     parameter="length of a step", unit="s", low=5e-3, high=0.5, scale=LOG,
     measured="change of the length in 50 s", limit=1e-6,
-    method=Method("rk4, length left alone", _drift),
+    method=Method("rk4, length not restored", _drift),
     remedy=Method("rk4, length restored after each step", _kept), reach=0.5,
     source="Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, 2019, ch. 2; Shabana, "
     "Dynamics of Multibody Systems, 2020, ch. 2",

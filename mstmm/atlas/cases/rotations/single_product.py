@@ -1,4 +1,4 @@
-"""Rotation vectors that keep one of the products that turns bring in."""
+"""Rotation vectors with only one of the products of their rate."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from ...measures import TURNING, error_of_turning
 from ...scale import LOG
 from ...variants import plain_charts
 
-#: With one product.
+#: Variant with one product.
 ONE = partial(plain_charts.end_of, products=1)
 
 CASE = Definition(
     name="single-product",
-    title="Rotation vectors with one product of two",
-    why="The rate of a rotation vector is the angular velocity and products of both, each of a "
-    "power of the vector more. The first alone is right to third order within a step, and so is "
-    "what comes out: a table of fourth or fifth order gains nothing on shorter steps that it was "
-    "chosen for. Runs on charts keep two products, enough for the fifth order of their tables.",
+    title="Rotation vectors with one of two products",
+    why="The rate of a rotation vector is the angular velocity plus products of both, each with "
+    "one more power of the vector. With the first product alone the rate is accurate to third "
+    "order within a step, and so is the result: a table of fourth or fifth order gains nothing. "
+    "Runs with rotation vectors keep two products, enough for the fifth order of their tables.",
     parameter="length of a step", unit="s", low=4e-3, high=0.2, scale=LOG,
     measured=f"error of the attitude after {TURNING:g} s, rad", limit=1e-6,
     method=Method("rk4, one product kept", lambda h: error_of_turning(ONE, h)),

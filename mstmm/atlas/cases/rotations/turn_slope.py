@@ -1,4 +1,4 @@
-"""Rosenbrock steps on rotation vectors whose rate is taken not to change with them."""
+"""Rosenbrock steps on rotation vectors without the derivative of their rate."""
 
 from __future__ import annotations
 
@@ -14,14 +14,13 @@ WITHOUT = partial(chart_rosenbrock.end_of, method=TABLE, slope=False)
 
 CASE = Definition(
     name="turn-slope",
-    title="Rosenbrock steps on rotation vectors: a slope left out",
-    why="A rotation vector begins every step at zero, where its rate is the angular velocity; but "
-    "how that rate changes with the vector is half a product that does not vanish there. Left out "
-    "of the tangent, for the vector is nothing anyway, it takes all tables to second order. Runs "
-    "have it in their tangent.",
+    title="Rosenbrock steps on rotation vectors: a missing derivative",
+    why="A rotation vector starts every step at zero, where its rate is the angular velocity. "
+    "The derivative of that rate by the vector, however, is half a product that does not vanish "
+    "there. Without it in the tangent matrix all tables fall to second order. Runs include it.",
     parameter="length of a step", unit="s", low=4e-3, high=0.1, scale=LOG,
     measured=f"error of the attitude after {TURNING:g} s, rad", limit=1e-6,
-    method=Method(f"{TABLE}, the slope left out", lambda h: error_of_turning(WITHOUT, h)),
+    method=Method(f"{TABLE}, the derivative left out", lambda h: error_of_turning(WITHOUT, h)),
     remedy=Method(TABLE, lambda h: error_of_turning(TABLE, h)), reach=0.1,
     source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.7 (order takes "
     "the whole Jacobian); Munthe-Kaas, BIT 38, 1998",

@@ -1,1 +1,1 @@
-"""Steps in time."""
+"""Cases of steps in time."""

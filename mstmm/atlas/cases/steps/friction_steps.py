@@ -1,4 +1,4 @@
-"""Rosenbrock steps across ever sharper friction."""
+"""Rosenbrock steps with sharper and sharper friction."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TIMES = np.linspace(0.0, T_END, 31)
 
 
 def _path(velocity: float, method: str, step: float) -> Array:
-    """Of 1 kg with friction of 1 N, pulled by a spring of 10 N/m whose end moves at 0.3 m/s."""
+    """Path (m) of 1 kg with friction of 1 N, pulled by 10 N/m whose end moves at 0.3 m/s."""
     law = {
         "effort": "10*(0.3*t - q)",
         "friction": {"coulomb": 1.0, "regularisation_velocity": velocity},
@@ -37,13 +37,13 @@ def _error(velocity: float, method: str) -> float:
 CASE = Definition(
     name="friction-steps",
     title="Linearised friction: a body that sticks and slips",
-    why="Methods of Rosenbrock's kind linearise friction where a step begins. A body that sticks "
-    "has a slope there that is gone as soon as it slips, and nothing in the step sees it: it is "
-    "held too long. Methods that iterate look where they arrive, until their iteration finds no "
-    "way through the bend; then they say so.",
+    why="Rosenbrock methods linearise friction at the start of a step. A body that sticks has a "
+    "slope there that vanishes as soon as it slips, but the step keeps it: the body sticks too "
+    "long. Methods that iterate evaluate friction at the end of the step, until their iteration "
+    "does not converge across the bend; then they report it.",
     parameter="velocity over which friction is regularised", unit="m/s", low=1e-7, high=0.1,
     scale=LOG,
-    measured="error of the way, m", limit=1e-4,
+    measured="error of the displacement, m", limit=1e-4,
     method=Method("rodas4p2, h = 10 ms", lambda velocity: _error(velocity, "rodas4p2")),
     remedy=Method("esdirk436, h = 10 ms", lambda velocity: _error(velocity, "esdirk436")),
     reach=1e-7,

@@ -16,11 +16,11 @@ def _overshoot(rate: float, method: str) -> float:
 CASE = Definition(
     name="genalpha-overshoot",
     title="Generalised-alpha: speeds after a stretched spring",
-    why="Displacements do not overshoot, but speeds do, in proportion to step times frequency: the "
-    "acceleration of a stretched spring is carried into the next step as if it lasted. Relax "
-    "such a start, resolve it, or take a method that carries no accelerations over.",
+    why="Displacements do not overshoot, but speeds do, in proportion to step times frequency: "
+    "the step extrapolates the acceleration of a stretched spring. Start from an equilibrium, "
+    "resolve the vibration, or use a method that carries no accelerations over.",
     parameter="step times angular frequency", unit="", low=0.1, high=1e5, scale=LOG,
-    measured="largest amplitude in 20 steps, of the start's", limit=1.05,
+    measured="largest over initial amplitude in 20 steps", limit=1.05,
     method=Method("genalpha", lambda rate: _overshoot(rate, "genalpha")),
     remedy=Method("rodas4p2", lambda rate: _overshoot(rate, "rodas4p2")), reach=1e6,
     source="Hilber, Hughes, Earthquake Engineering and Structural Dynamics 6, 1978; Chung, "

@@ -1,4 +1,4 @@
-"""Iterated steps beside a very stiff spring that begins stretched."""
+"""Iterated steps with a very stiff spring that is stretched at the start."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ def _gained(stiffness: float, method: str) -> float:
 
 CASE = Definition(
     name="iterated-steps",
-    title="Iterated steps: a spring that holds more than the motion",
-    why="Generalised-alpha carries the accelerations of the start along; those of a stretched "
-    "spring may be thousands of times what the motion needs, and even converged steps then throw "
-    "the bodies about. Rodas4P2 is L-stable stage by stage: it drops what it cannot resolve, and "
-    "the spring's energy with it.",
+    title="Iterated steps: a stiff spring with much energy",
+    why="Generalised-alpha carries the accelerations of the start over. Those of a stretched "
+    "spring may be thousands of times those of the motion, and then even converged steps give the "
+    "bodies a wrong motion. Rodas4P2 is L-stable in every stage: it damps the unresolved "
+    "vibration, and with it the energy of the spring.",
     parameter="stiffness of bushings (stretched by 1 mm)", unit="N/m", low=1e3, high=1e9, scale=LOG,
-    measured="largest energy in 2 s, of that exchanged", limit=1.05,
+    measured="largest energy in 2 s over that exchanged", limit=1.05,
     method=Method("genalpha, h = 10 ms", lambda k: _gained(k, "genalpha")),
     remedy=Method("rodas4p2, h = 10 ms", lambda k: _gained(k, "rodas4p2")), reach=1e10,
     source="Chung, Hulbert, Journal of Applied Mechanics 60, 1993; Steinebach, in Progress in "

@@ -1,4 +1,4 @@
-"""A method that is stable for every stiffness and forgets nothing of what it cannot follow."""
+"""Method that is A-stable but keeps unresolved vibrations."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ def _forgotten(steps: float) -> float:
 
 CASE = Definition(
     name="lasting-vibration",
-    title="Stable for every stiffness, and nothing forgotten",
-    why="A method may be stable however stiff a scene is and still keep most of a vibration far "
-    "too fast for its steps: of this one three quarters are left after each step, and over the "
-    "first ten or so they cover whatever else moves. The methods of a run leave next to nothing "
-    "(they are L-stable, or damp by a radius that is chosen).",
+    title="A-stable but not L-stable: unresolved vibration remains",
+    why="A method may be stable for any stiffness and still keep most of a vibration far too "
+    "fast for its steps. This one keeps three quarters of it per step, and over about the first "
+    "ten steps the vibration hides all other motion. The methods of a run keep next to nothing "
+    "(they are L-stable, or damp by a chosen radius).",
     parameter="steps after the start", unit="", low=1.0, high=100.0, scale=LOG,
-    measured="amplitude left, of the start's", limit=0.01,
+    measured="remaining amplitude, relative to the start", limit=0.01,
     method=Method("ros3p, step times frequency 1e4", _lasting),
     remedy=Method("rodas4p2", _forgotten), reach=1.0,
     source="Lang, Verwer, BIT 41, 2001; Hairer, Wanner, Solving Ordinary Differential Equations "

@@ -1,4 +1,4 @@
-"""An iteration whose tangent knows of laws alone."""
+"""Iteration with a tangent matrix of hinge laws only."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def _watched(rate: float) -> float:
 
 CASE = Definition(
     name="laws-iterations",
-    title="Iterated by laws alone: stiffness that loads make",
-    why="Where a tangent leaves out what weight, spin and preload do, every iteration leaves the "
-    "quarter of (step times frequency) squared of the error: from 2 on it is carried away. Runs "
-    "begin with the slopes of laws, for they cost little, watch how fast the iteration contracts, "
-    "and take the exact tangent where it is slow.",
+    title="Iteration with hinge laws only: stiffness due to loads",
+    why="Where a tangent matrix neglects weight, spin and preload, every iteration leaves a "
+    "quarter of (step times frequency) squared of the error: from 2 on it diverges. Runs start "
+    "with the derivatives of hinge laws, which cost little, observe the convergence of the "
+    "iteration, and use the exact tangent where it is slow.",
     parameter="step times angular frequency of a hanging rod", unit="", low=0.03, high=20.0,
-    scale=LOG, measured="iterations a step", limit=float(MOST),
-    method=Method("newmark, laws alone", _by_laws),
+    scale=LOG, measured="iterations per step", limit=float(MOST),
+    method=Method("newmark, hinge laws only", _by_laws),
     remedy=Method("newmark, exact where laws are slow", _watched), reach=30.0,
     source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.8 (simplified "
     "iteration); Kelley, Solving Nonlinear Equations with Newton's Method, 2003, ch. 2",

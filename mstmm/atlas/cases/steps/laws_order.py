@@ -1,4 +1,4 @@
-"""Tables of Rosenbrock's kind whose tangent knows of laws alone: their order."""
+"""Order of Rosenbrock tables with a tangent matrix of hinge laws only."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ T_END = 0.5
 
 @cache
 def _arm() -> tuple[Model, Array]:
-    """The falling rods, and their angles at the end."""
+    """Falling rods, and their exact angles at the end."""
     arm = sprung_elbow(10.0, 0.2)
     return arm, simulated(arm, T_END, rtol=1e-12, atol=1e-14, output_times=[T_END]).q[-1]
 
@@ -41,11 +41,11 @@ def _whatever(step: float) -> float:
 
 CASE = Definition(
     name="laws-order",
-    title="A tangent of laws alone: the order of a table",
-    why="Most tables of Rosenbrock's kind owe their order to the exact tangent. With the slopes of "
-    "springs and dampers alone, which cost less, Rodas4 is left with first order, Rodas4P2 and "
-    "Rodas5P with second; runs refuse that. The tables of W-methods, ROS34PW2 and Rodas4PW, keep "
-    "theirs whatever the tangent.",
+    title="Tangent of hinge laws only: the order of a table",
+    why="Most Rosenbrock tables need the exact tangent for their order. With the derivatives of "
+    "springs and dampers only, which cost less, Rodas4 falls to first order, Rodas4P2 and Rodas5P "
+    "to second; runs reject that. The tables of W-methods, ROS34PW2 and Rodas4PW, keep their order "
+    "with any tangent.",
     parameter="length of a step", unit="s", low=2e-4, high=0.05, scale=LOG,
     measured="error of the angles after 0.5 s, rad", limit=1e-5,
     method=Method("rodas4, tangent of laws", _laws),

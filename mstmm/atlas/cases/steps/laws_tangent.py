@@ -1,4 +1,4 @@
-"""A Rosenbrock method whose tangent knows of laws alone."""
+"""Rosenbrock method with a tangent matrix of hinge laws only."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ def _growth(rate: float, tangent: str) -> float:
 
 CASE = Definition(
     name="laws-tangent",
-    title="A tangent of laws alone: stiffness that loads make",
-    why="Weight, spin and preload make a motion stiff without any spring. A linearisation that "
-    "takes the slopes of springs and dampers alone does not see it; a method of Rosenbrock's kind "
-    "is then an explicit one in that direction. The exact tangent knows it.",
+    title="Tangent of hinge laws only: stiffness due to loads",
+    why="Weight, spin and preload make a motion stiff without any spring. A linearisation with "
+    "the derivatives of springs and dampers only does not include that stiffness; a Rosenbrock "
+    "method is then explicit in that direction. The exact tangent includes it.",
     parameter="step times angular frequency of a hanging rod", unit="", low=0.03, high=100.0,
     scale=LOG,
-    measured="largest angle in 400 steps, of the start's", limit=1.01,
+    measured="largest over initial angle in 400 steps", limit=1.01,
     method=Method("ros34pw2, tangent of laws", lambda rate: _growth(rate, "laws")),
     remedy=Method("ros34pw2, exact tangent", lambda rate: _growth(rate, "exact")), reach=1e3,
     source="Rang, Angermann, BIT 45, 2005 (W-methods); Hairer, Wanner, Solving Ordinary "

@@ -1,4 +1,4 @@
-"""A force that is narrow in the motion, under control of the error."""
+"""Force that is narrow along the motion, with error control."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from ...measures import simulated
 from ...scale import LOG
 from ...scenes import model, rod
 
-#: Where the pulse lies, rad, and its work, J.
+#: Position of the pulse, rad, and its work, J.
 PLACE, WORK = 5.0, 0.5
 
 
 def _error(width: float, switched: bool) -> float:
-    """Of the speed at the end, which the work of the pulse tells."""
+    """Relative error of the final speed, which follows from the work of the pulse."""
     strength = WORK / (width * math.sqrt(math.pi))
     effort = f"{strength!r}*exp(-((q - {PLACE})/{width!r})^2)"
     if switched:
@@ -32,13 +32,13 @@ def _error(width: float, switched: bool) -> float:
 
 CASE = Definition(
     name="narrow-pulse",
-    title="Narrow pulses: what lies between the stages of a step",
-    why="A method sees a force at the stages of its steps and nowhere else. Where nothing else "
-    "happens steps grow, and a smooth force that is narrow in the motion is passed over, its work "
-    "with it, while every estimated error is zero. Said with a comparison, the same force is "
-    "located on the way however narrow it is; max_step helps as well, at its price.",
+    title="Narrow pulses between the stages of a step",
+    why="A method evaluates a force only at the stages of its steps. In a uniform motion steps "
+    "grow, and a smooth force that is narrow along the motion may be missed with all its work, "
+    "while every estimated error is zero. Written with a comparison, the same force is located "
+    "however narrow it is; max_step helps as well, at a cost.",
     parameter="width of the pulse", unit="rad", low=1e-4, high=1.0, scale=LOG,
-    measured="error of the speed behind it, relative", limit=1e-6,
+    measured="error of the speed after it, relative", limit=1e-6,
     method=Method("dop853, rtol 1e-9", lambda width: _error(width, False)),
     remedy=Method("dop853, the pulse within where()", lambda width: _error(width, True)),
     reach=1e-8,

@@ -1,4 +1,4 @@
-"""What implicit methods leave of a vibration that is wanted."""
+"""Numerical damping of a wanted vibration by implicit methods."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def _lost(rate: float, method: str) -> float:
 
 CASE = Definition(
     name="numerical-damping",
-    title="Numerical damping: a vibration that is wanted",
-    why="What makes implicit methods forget fast vibration also takes from one that is wanted, by "
-    "a power of step times frequency that is the order of the method and one more. A higher order "
-    "keeps it longer; generalised-alpha with radius 1 keeps all of it, with a period too long and "
-    "nothing forgotten; exprb32 follows it exactly.",
+    title="Numerical damping of a wanted vibration",
+    why="Implicit methods damp fast vibration, but a wanted one too, with a power of step times "
+    "frequency that is one above the order of the method. A higher order keeps the vibration "
+    "longer. Generalised-alpha with radius 1 keeps all of it, with a period too long and no "
+    "damping of fast motion; exprb32 follows it exactly.",
     parameter="step times angular frequency", unit="", low=0.03, high=3.0, scale=LOG,
-    measured="amplitude lost in 10 periods, of the start's", limit=0.01,
+    measured="relative loss of amplitude in 10 periods", limit=0.01,
     method=Method("genalpha", lambda rate: _lost(rate, "genalpha")),
     remedy=Method("rodas5p", lambda rate: _lost(rate, "rodas5p")), reach=3.0,
     source="Chung, Hulbert, Journal of Applied Mechanics 60, 1993; Steinebach, BIT 63, 2023",

@@ -1,4 +1,4 @@
-"""Implicit steps that begin with accelerations from before an event."""
+"""Implicit steps that start with accelerations from before an event."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def _error(step: float, old: bool) -> float:
 
 CASE = Definition(
     name="old-accelerations",
-    title="Accelerations from before an event: rods that are let go",
-    why="Steps that take accelerations for unknowns begin with those of the step before. Behind a "
-    "release, a blow or a load that comes at once they belong to other equations: the tangent is "
-    "that of a state that never was, the error of the first step is of lower order and stays. Two "
-    "rods are let go whose accelerations were zero while they were held. One evaluation mends it; "
-    "every run does it behind each event and each break of the equations.",
+    title="Accelerations from before an event: rods that are released",
+    why="Steps with accelerations as unknowns start from those of the step before. After a "
+    "release, an impact or a sudden load these belong to other equations: the tangent is that of a "
+    "wrong state. The first step then has a lasting error of lower order. Here two rods are "
+    "released whose accelerations were zero before. One evaluation corrects them; every run makes "
+    "it after each event and each discontinuity of the equations.",
     parameter="length of a step", unit="s", low=1e-3, high=0.05, scale=LOG,
     measured="error of the angles after 0.5 s, rad", limit=1e-9,
     method=Method("rodas5p, accelerations kept", lambda step: _error(step, True)),

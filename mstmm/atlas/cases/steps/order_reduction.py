@@ -1,4 +1,4 @@
-"""Rosenbrock steps where a stiff spring is moved by a drive."""
+"""Rosenbrock steps with a stiff spring moved by a prescribed motion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...scenes import model
 
 STEP = 0.05
 
-#: Judged once the start from rest has died away, s.
+#: Output times of the error, s, after the transient of the start.
 TIMES = np.linspace(1.0, 2.0, 21)
 
 
@@ -34,9 +34,9 @@ CASE = Definition(
     name="order-reduction",
     title="Order reduction: a stiff spring moved by a drive",
     why="Where a stiff spring is moved from outside, the error of a stage is that of the moved "
-    "base and no longer that of the motion: of fourth order on paper, the table is of second "
-    "order here, and the load in the spring wrong by a hundred times. Tables made for it, such as "
-    "Rodas4P2, keep theirs.",
+    "base and not that of the motion. The table of fourth order is of second order here, and its "
+    "error in the spring load a hundred times larger. Tables made for this case, such as Rodas4P2, "
+    "keep their order.",
     parameter="stiffness of the spring (of 1 kg, critically damped)", unit="N/m",
     low=10.0, high=1e7, scale=LOG,
     measured="error of the spring's load, relative", limit=2e-6,

@@ -1,4 +1,4 @@
-"""One linearised equation a step beside stiff springs, about the loads that the predictor gives."""
+"""One linearised equation per step with stiff springs, about predicted loads."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ def _gained(stiffness: float, method: str, **options: Any) -> float:
 
 CASE = Definition(
     name="predicted-loads",
-    title="One linearised equation a step: turns by the loads of a predictor",
-    why="A predictor misses the length of a spring by the third power of the step, and the load "
-    "there by stiffness times that. How loads turn with their bodies is linearised about it: from "
-    "slack springs, which hold some 40 N, it makes a step of meganewtons, and these the next. Runs "
-    "stop at the pivot that changes its sign. The classical form in absolute coordinates, damped, "
-    "turns no more than the springs held before.",
+    title="One linearised equation per step: rotation of predicted loads",
+    why="A predictor has an error of third order in the length of a spring, and the load there "
+    "has that error times the stiffness. The rotation of loads with their bodies is linearised "
+    "about this load. Slack springs carry some 40 N, but the predicted load is of the order of "
+    "meganewtons, and it disturbs the next step as well. Runs stop at the pivot that changes its "
+    "sign. The classical form in absolute coordinates, with damping, rotates only the loads that "
+    "the springs had before.",
     parameter="stiffness of bushings (slack at the start)", unit="N/m", low=1e3, high=1e9,
-    scale=LOG, measured="largest energy in 1 s, of that exchanged", limit=1.05,
+    scale=LOG, measured="largest energy in 1 s over that exchanged", limit=1.05,
     method=Method("dttmm, h = 10 ms", lambda k: _gained(k, "dttmm")),
     remedy=Method(
         "dttmm-classical, generalised-alpha:0.8",

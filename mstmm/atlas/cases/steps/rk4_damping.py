@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta steps beside ever stronger dampers."""
+"""Explicit Runge-Kutta steps with stronger and stronger dampers."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ def _growth(damping: float, method: str) -> float:
 CASE = Definition(
     name="rk4-damping",
     title="Explicit steps: strength of a damper",
-    why="A strong damper stops a motion within a time that has nothing to do with the motion that "
-    "follows. Explicit steps must still be shorter than 2.785 of that time, or they blow up; "
-    "implicit ones pass over it.",
+    why="A strong damper stops a motion within a time that is unrelated to the motion that "
+    "follows. Explicit steps must still be shorter than 2.785 times that time, or they are "
+    "unstable; implicit ones need not resolve it.",
     parameter="damping of a rod's pin", unit="N m s/rad", low=1.0, high=1e8, scale=LOG,
-    measured="largest angle in 400 steps, of the start's", limit=1.01,
+    measured="largest over initial angle in 400 steps", limit=1.01,
     method=Method("rk4, h = 1 ms", lambda c: _growth(c, "rk4")),
     remedy=Method("rodas4p2, h = 1 ms", lambda c: _growth(c, "rodas4p2")), reach=1e10,
     source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.2",

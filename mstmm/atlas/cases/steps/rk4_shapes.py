@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta steps of a beam with ever more shapes."""
+"""Explicit Runge-Kutta steps of a beam with more and more shapes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ STEP, T_END = 1e-3, 0.2
 
 
 def _deflection(shapes: float, method: str) -> float:
-    """Largest of the tip of a clamped beam of 1 m that begins to bend under its weight, m."""
+    """Largest tip deflection (m) of a clamped beam of 1 m under its weight, from straight."""
     beam = {
         "name": "beam", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 50.0,
         "modes": {"y": int(shapes)}, "stiffening": False,
@@ -26,12 +26,12 @@ def _deflection(shapes: float, method: str) -> float:
 
 CASE = Definition(
     name="rk4-shapes",
-    title="Explicit steps: shapes of a beam",
+    title="Explicit steps: number of shapes of a beam",
     why="Frequencies of shapes grow with the square of their number, and an explicit step must "
-    "resolve the highest, though the motion is that of the first. Take few shapes and good ones, "
-    "or implicit steps, which forget what they do not resolve.",
+    "resolve the highest, even if the motion is that of the first. Use few suitable shapes, or "
+    "implicit steps, which damp what they do not resolve.",
     parameter="shapes of a clamped beam", unit="", low=1, high=20, scale=COUNT,
-    measured="largest deflection of the tip, of the length", limit=0.1,
+    measured="largest tip deflection over the length", limit=0.1,
     method=Method("rk4, h = 1 ms", lambda n: _deflection(n, "rk4")),
     remedy=Method("rodas4p2, h = 1 ms", lambda n: _deflection(n, "rodas4p2")), reach=20,
     source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.2; shapes: Rao, "

@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta steps beside ever stiffer springs."""
+"""Explicit Runge-Kutta steps with stiffer and stiffer springs."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ def _growth(stiffness: float, method: str) -> float:
 CASE = Definition(
     name="rk4-stiffness",
     title="Explicit steps: stiffness of a spring",
-    why="An explicit step must resolve the fastest vibration whether it is wanted or not: that of "
-    "Runge and Kutta is stable as long as the step times its angular frequency is below the "
-    "square root of 8. Implicit steps stay bounded at any stiffness (what is left of the vibration "
-    "is another question: see numerical-damping).",
+    why="An explicit step must resolve the fastest vibration whether it is wanted or not. The "
+    "classical Runge-Kutta method is stable as long as the step times its angular frequency is "
+    "below the square root of 8. Implicit steps stay bounded for any stiffness (for the accuracy "
+    "of the vibration see numerical-damping).",
     parameter="stiffness of a rod's pin", unit="N m/rad", low=1e2, high=1e10, scale=LOG,
-    measured="largest angle in 400 steps, of the start's", limit=1.01,
+    measured="largest over initial angle in 400 steps", limit=1.01,
     method=Method("rk4, h = 1 ms", lambda k: _growth(k, "rk4")),
     remedy=Method("genalpha, h = 1 ms", lambda k: _growth(k, "genalpha")), reach=1e12,
     source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.2",

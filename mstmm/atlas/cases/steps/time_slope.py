@@ -1,4 +1,4 @@
-"""Rosenbrock steps over a road that pass over how the equations change in time."""
+"""Rosenbrock steps over a road without the time derivative of the equations."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ from ...scenes import model
 from ...variants.plain_rosenbrock import Steps
 
 STEP, STEPS = 0.01, 200
-#: Of the waves, m.
+#: Height of the waves, m.
 HEIGHT = 0.01
 
 TIMES = STEP * np.arange(STEPS + 1)
 
 
 def _road(rate: float) -> dict[str, object]:
-    """1 kg on a spring of 400 N/m and a damper of 12 N s/m over waves, which pass with an angular
-    frequency of `rate` over the step."""
+    """Scene of 1 kg on a spring of 400 N/m and a damper of 12 N s/m over waves.
+
+    The waves pass with an angular frequency of `rate` over the step.
+    """
     wave = f"{rate / STEP!r}"
     effort = f"400*({HEIGHT}*sin({wave}*t) - q) + 12*({HEIGHT}*{wave}*cos({wave}*t) - u)"
     slide = {
@@ -43,14 +45,14 @@ def _error(rate: float, time_slope: bool) -> float:
 
 CASE = Definition(
     name="time-slope",
-    title="Rosenbrock steps without the slope in time: a road",
-    why="A linearised step looks ahead in time by the slope of the equations there, as it does in "
-    "the coordinates by the tangent. Where drives, roads or loads go by time and that slope is "
-    "left out, the table is of first order. Runs keep it; tables of W-methods, such as "
-    "ROS34PW2, do without.",
+    title="Rosenbrock steps without the time derivative: a road",
+    why="A linearised step needs the time derivative of the equations, as it needs the tangent "
+    "matrix for the coordinates. Where drives, roads or loads depend on time and that derivative "
+    "is left out, the table is of first order. Runs include it; tables of W-methods, such as "
+    "ROS34PW2, do not need it.",
     parameter="step times angular frequency of the road", unit="", low=1e-4, high=1.0, scale=LOG,
-    measured="error of the way, of the waves' height", limit=1e-3,
-    method=Method("rodas4 without the slope, h = 10 ms", lambda rate: _error(rate, False)),
+    measured="error of the displacement over wave height", limit=1e-3,
+    method=Method("rodas4 without the derivative, h = 10 ms", lambda rate: _error(rate, False)),
     remedy=Method("rodas4, h = 10 ms", lambda rate: _error(rate, True)), reach=10.0,
     source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.7; Rang, "
     "Angermann, BIT 45, 2005 (W-methods)",

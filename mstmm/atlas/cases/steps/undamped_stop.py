@@ -1,4 +1,4 @@
-"""Fixed steps across a stop that gives back what it takes."""
+"""Fixed steps across an elastic stop."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ STEP, PHASES = 0.01, 40
 
 
 def _rebound(rate: float, fixed: bool) -> float:
-    """Energy with which 1 kg leaves a stop, of that with which it came at 1 m/s: the largest over
-    PHASES places within a step at which it meets the stop."""
+    """Energy of 1 kg after a stop, relative to that before, at 1 m/s.
+
+    It is the largest over PHASES instants within a step at which the contact starts.
+    """
     stop = {"lower": 0.0, "stiffness": (rate / STEP) ** 2, "damping": 0.0}
     slide = {
         "name": "slide", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
@@ -35,12 +37,12 @@ def _rebound(rate: float, fixed: bool) -> float:
 CASE = Definition(
     name="undamped-stop",
     title="Fixed steps across a stop without damping",
-    why="A stop is a spring that begins all at once. Somewhere within a step it is met, the step "
-    "takes it for there from its beginning or its end on, and what comes back is not what went in: "
-    "according to the place more or less energy, the more the stiffer the stop. Steps under error "
-    "control shrink until the contact is followed.",
+    why="A stop is a spring that starts suddenly. The contact occurs within a step, but the step "
+    "assumes it from its start or its end on, so that the rebound has another energy than the "
+    "approach. It is larger or smaller depending on the position within the step, and more so the "
+    "stiffer the stop. Steps with error control shrink until the contact is resolved.",
     parameter="step times angular frequency on the stop", unit="", low=0.1, high=100.0, scale=LOG,
-    measured="energy after the rebound, of that before", limit=1.05,
+    measured="energy after over that before the rebound", limit=1.05,
     method=Method("genalpha, fixed steps", lambda rate: _rebound(rate, True)),
     remedy=Method("genalpha, rtol = 1e-6", lambda rate: _rebound(rate, False)), reach=1e4,
     source="Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 1993, II.6",

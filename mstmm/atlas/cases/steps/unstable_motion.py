@@ -1,4 +1,4 @@
-"""Implicit fixed steps where a motion leaves by itself."""
+"""Implicit fixed steps of an unstable motion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...scenes import model, rod
 
 STEP, AWAY = 0.01, 1e-9
 
-#: Length of a run, in times of growth by e.
+#: Duration of a run, in time constants of growth.
 GROWTHS = 8.0
 
 
@@ -24,7 +24,7 @@ def _standing(weight: float) -> dict[str, object]:
 
 
 def _error(rate: float, fixed: bool) -> float:
-    """`rate` is the step times the rate at which a rod that stands on its pin falls."""
+    """Relative error; `rate` is the step times the growth rate of an inverted rod on its pin."""
     still = model(_standing(1.0))
     slope = float(still.derivatives(np.zeros(1), np.zeros(1)).q[0, 0])
     falling = model(_standing((rate / STEP) ** 2 / slope))
@@ -41,13 +41,13 @@ def _error(rate: float, fixed: bool) -> float:
 
 CASE = Definition(
     name="unstable-motion",
-    title="Implicit steps: a motion that leaves by itself",
-    why="Implicit steps forget what is fast, and what grows fast with it. Beside an inverted or "
-    "buckled body a step of half the time of growth is wrong, and at twice that time the matrix "
-    "of the step loses its sign: the run says so and ends. The error of the step knows; only steps "
-    "that are fixed do not heed it.",
+    title="Implicit steps: an unstable motion",
+    why="Implicit steps damp fast motion, including fast growth. For an inverted or buckled body "
+    "a step of half the time constant of growth is inaccurate. At twice that time the matrix of "
+    "the step changes its sign: the run reports this and ends. The error of the step shows it, but "
+    "fixed steps do not use it.",
     parameter="step times rate of growth", unit="", low=0.01, high=8.0, scale=LOG,
-    measured="error of the way, relative", limit=0.1,
+    measured="error of the displacement, relative", limit=0.1,
     method=Method("genalpha, h = 10 ms", lambda rate: _error(rate, True)),
     remedy=Method("rodas4p2, rtol 1e-5", lambda rate: _error(rate, False)), reach=8.0,
     source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.3",

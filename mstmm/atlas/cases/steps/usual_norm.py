@@ -1,4 +1,4 @@
-"""Adaptive steps that judge speeds by themselves, beside a spring that begins slack."""
+"""Adaptive steps with errors of speeds weighted separately, for a slack stiff spring."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...variants.plain_rosenbrock import Steps
 
 T_END, RTOL, ATOL = 0.5, 1e-4, 1e-6
 
-#: Where counting steps ends.
+#: Largest number of steps that is counted.
 MOST = 4000
 
 
@@ -26,16 +26,16 @@ def _ours(stiffness: float) -> float:
 
 CASE = Definition(
     name="usual-norm",
-    title="The usual norm of errors: a stiff spring that begins slack",
-    why="A slack spring begins to swing with the speed of the load over its frequency, which is "
-    "far above any tolerance where the way it swings is far below. Judged by itself that speed "
-    "makes every period resolved. Judged by what it moves within the step it is let go, and the "
-    "run follows the motion alone. (A spring so stiff that even its speed is below the tolerance "
-    "is harmless either way.)",
+    title="The usual error norm: a stiff spring that is slack at the start",
+    why="A slack spring starts to vibrate with the speed of the load over its frequency, far "
+    "above any tolerance, while the displacement of that vibration is far below. In the usual norm "
+    "that speed forces every period to be resolved. Weighted by the displacement within the step "
+    "the speed is ignored, and the run follows only the slow motion. (A spring so stiff that even "
+    "its speed is below the tolerance is harmless in both norms.)",
     parameter="stiffness of an elbow between falling rods", unit="N m/rad", low=1.0, high=1e8,
     scale=LOG,
-    measured="steps in 0.5 s, rejected ones with them", limit=500,
-    method=Method("rodas4p2, rtol 1e-4, speeds by themselves", _usual),
+    measured="steps in 0.5 s, including rejected ones", limit=500,
+    method=Method("rodas4p2, rtol 1e-4, speeds weighted separately", _usual),
     remedy=Method("rodas4p2, rtol 1e-4", _ours), reach=1e16,
     source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.8 (the norm); "
     "Lubich, ZAMP 44, 1993 (stiff mechanical systems)",

@@ -1,1 +1,1 @@
-"""Sweeps over the bodies."""
+"""Cases of sweeps over the bodies."""

@@ -1,4 +1,4 @@
-"""The Riccati sweep towards ever heavier tips."""
+"""Riccati sweep with heavier and heavier tips."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ RODS = 8
 
 
 def error(ratio: float, sweep: str) -> float:
-    """Of the accelerations of some drawn states."""
+    """Largest relative error of the accelerations over some random states."""
     masses = [1.0] * (RODS - 1) + [ratio]
     bodies = [rod(f"rod{i}", mass=mass) for i, mass in enumerate(masses)]
     hinges = [
@@ -25,11 +25,11 @@ def error(ratio: float, sweep: str) -> float:
 
 CASE = Definition(
     name="heavy-tip",
-    title="Riccati sweep: a heavy body behind light ones",
-    why="Of the inertia that a hinge carries the sweep subtracts what the hinge gives way to. "
-    "Three hinges inboard of a heavy tip, in a plane, nothing is left of its inertia but rounding, "
-    "beside the inertia of light links. Least squares carry rows, of which both are sums of "
-    "squares: rotations mix them without a difference.",
+    title="Riccati sweep: a heavy body outboard of light ones",
+    why="The sweep subtracts from the inertia that a hinge carries the part that moves freely in "
+    "the hinge. Three hinges inboard of a heavy tip, in a plane, only rounding is left of its "
+    "inertia, next to the inertia of light links. Least squares carry rows, whose sums of squares "
+    "are both inertias: rotations combine them without a difference.",
     parameter="mass of the last rod over that of the others", unit="", low=1.0, high=1e12,
     scale=LOG,
     measured="error of the accelerations, relative", limit=1e-8,

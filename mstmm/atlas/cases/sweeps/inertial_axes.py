@@ -1,4 +1,4 @@
-"""The Riccati sweep of an oblique chain in inertial axes, in ever longer chains."""
+"""Riccati sweep of an oblique chain in inertial axes, for longer and longer chains."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NUMBERS = np.array([1.0, 0.5, 0.0, 0.0, THIN, 0.0, 0.0, ROD + 0.25, 0.0, ROD + 0
 
 
 def _scene(rods: int) -> dict[str, object]:
-    """Rods along ALONG, written in inertial axes."""
+    """Scene of rods along ALONG, given in inertial axes."""
     tensor = PLANE @ MOMENTS @ PLANE.T
     body = {
         "mass": 1.0, "center_of_mass": (ALONG / 2).tolist(),
@@ -56,10 +56,11 @@ def _error(rods: float, inertial: bool) -> float:
 CASE = Definition(
     name="inertial-axes",
     title="Sweep in inertial axes: length of an oblique chain",
-    why="What a chain in a plane resists with across that plane grows with the cube of its length. "
-    "In axes to which the plane is oblique every entry of its inertia is a mixture of that with "
-    "the small one that moves, and rounding of the large part falls into the small. In axes along "
-    "the hinges, which the engines choose whatever a scene is written in, the two never meet.",
+    why="The inertia of a planar chain against motions out of its plane grows with the cube of "
+    "its length. In axes oblique to that plane every entry of the inertia mixes that large part "
+    "with the small one that moves. Rounding of the large part then disturbs the small one. In "
+    "axes along the hinges, which the engines choose whatever the axes of a scene, the two are "
+    "separate.",
     parameter="rods on parallel pins", unit="", low=2, high=3000, scale=COUNT,
     measured="error of the accelerations, relative", limit=1e-10,
     method=Method("Riccati sweep, inertial axes", partial(_error, inertial=True)),

@@ -1,4 +1,4 @@
-"""The fastest motion of heavy bodies with light ones between them."""
+"""Fastest motion of heavy bodies with light ones between them."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ...scale import LOG
 from ...scenes import model
 from ...variants import pivots
 
-#: Enough that not all motions are looked at to find the fastest one.
+#: Number of bodies, large enough that the fastest motion is found by power iterations.
 BODIES = 14
-#: Of the springs inboard and outboard of light bodies, N/m.
+#: Stiffness of the springs inboard and outboard of light bodies, N/m.
 SOFT, STIFF = 1.0, 1e6
 
 
 def _row(masses: Array, springs: Array) -> Model:
-    """Bodies on slides along one line, each behind the one before."""
+    """Chain of bodies on slides along one line."""
     bodies = [{"name": f"body{i}", "mass": mass} for i, mass in enumerate(masses.tolist())]
     hinges = [
         {"name": f"slide{i}", "type": "prismatic", "axis": [1, 0, 0], "outboard": f"body{i}",
@@ -32,7 +32,7 @@ def _row(masses: Array, springs: Array) -> Model:
 
 
 def _exact(masses: Array, springs: Array) -> float:
-    """|lambda| of the fastest motion, in displacements from the ground."""
+    """Exact |lambda| of the fastest motion, from displacements relative to the ground."""
     stretch = np.eye(BODIES) - np.eye(BODIES, k=-1)
     weighed = np.sqrt(springs)[:, None] * stretch / np.sqrt(masses)
     return float(np.linalg.norm(weighed, 2))
@@ -50,12 +50,12 @@ def _by_iterations(row: Model) -> float:
 
 CASE = Definition(
     name="light-between",
-    title="The fastest motion by pivots: a light body between heavy ones",
-    why="The sweep divides by the inertia D that a hinge moves outboard of it. A spring over that "
-    "is no frequency: the inboard side does not stand still. Where it is light and held softly, it "
-    "is what swings, and explicit steps that are chosen by k/D are too long by the root of the "
-    "ratio of masses. A few power iterations with M^-1, each two passes over the bodies, see both "
-    "sides.",
+    title="Fastest motion by pivots: a light body between heavy ones",
+    why="The sweep divides by the inertia D that a hinge moves outboard of it. The stiffness "
+    "over D is no squared frequency, because the inboard side moves too. Where the inboard side is "
+    "light and softly supported, it is the part that vibrates. Explicit steps chosen by k/D are "
+    "then too long by the root of the mass ratio. A few power iterations with M^-1, each two "
+    "passes over the bodies, include both sides.",
     parameter="mass of the heavy bodies over that of the light ones", unit="", low=1.0, high=1e6,
     scale=LOG,
     measured="fastest frequency over the one found", limit=2.0,

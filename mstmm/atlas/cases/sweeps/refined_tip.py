@@ -1,4 +1,4 @@
-"""The Riccati sweep refined, towards ever heavier tips."""
+"""Refined Riccati sweep with heavier and heavier tips."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from .heavy_tip import RODS, error
 def _refined(ratio: float) -> float:
     try:
         return error(ratio, "refined")
-    except SceneError as refused:  # it does not help any more
+    except SceneError as refused:  # refinement does not converge any more
         raise NumericalFailure(str(refused)) from None
 
 
 CASE = Definition(
     name="refined-tip",
-    title="Refined sweep: a heavy body behind light ones",
-    why="Inverse dynamics eliminates nothing: what it leaves over of accelerations is known well. "
-    "The sweep answers it with the digits that it has, so that of what is wrong each refinement "
-    "leaves the part that was wrong of the whole; up to four are made, as many as the start needs. "
-    "Where the sweep has no digit left there is nothing to refine with.",
+    title="Refined sweep: a heavy body outboard of light ones",
+    why="Inverse dynamics eliminates nothing: the residual that it gives for the accelerations "
+    "is accurate. The sweep solves for it with the digits that it has, so that each refinement "
+    "reduces the error by the relative error of the sweep. Up to four are made, as many as the "
+    "start needs. Where the sweep has no accurate digit, refinement fails.",
     parameter="mass of the last rod over that of the others", unit="", low=1e8, high=1e18,
     scale=LOG,
     measured="error of the accelerations, relative", limit=1e-8,

@@ -1,4 +1,4 @@
-"""A ball hinge under an ever thinner rod."""
+"""Ball hinge with a thinner and thinner rod."""
 
 from __future__ import annotations
 
@@ -26,8 +26,10 @@ BENT = np.array([0.3, -0.5]), np.array([0.7, -0.2])
 
 
 def _error(ratio: float, foot: dict[str, Any], state: tuple[Array, Array]) -> float:
-    """Of the accelerations of a rod of 1 m and 1 kg on this hinge; `ratio` is of its moment of
-    inertia about its own line over that across."""
+    """Relative error of the accelerations of a rod of 1 m and 1 kg on the hinge `foot`.
+
+    `ratio` is its moment of inertia about its axis over that across.
+    """
     tensor = ROD * (np.eye(3) + (ratio - 1) * np.outer(ALONG, ALONG))
     rod = {
         "name": "rod", "mass": 1.0, "center_of_mass": (ALONG / 2).tolist(),
@@ -37,24 +39,26 @@ def _error(ratio: float, foot: dict[str, Any], state: tuple[Array, Array]) -> fl
     scene = {"gravity": [0, -9.81, 0], "body": [rod], "hinge": [hinge]}
     try:
         found = model(scene)
-    except SceneError as refused:  # nothing else about this scene can be
+    except SceneError as refused:  # the inertia is the only possible reason in this scene
         raise NumericalFailure(str(refused)) from None
     return rounding(found, [state])
 
 
 CASE = Definition(
     name="thin-rod",
-    title="Riccati sweep: a hinge that turns what has no inertia",
-    why="What a hinge leaves free is divided by the inertia D that it moves. A ball lets a rod "
-    "spin about its own line, where there is hardly any, and written in axes oblique to the rod "
-    "that little is the difference of large entries: the spin is rounding over rounding. Below "
-    "1e-14 of the mean a pivot of D counts as none, and the run stops and names the hinge. What "
-    "has no inertia is not to be left free: a universal hinge holds the spin.",
+    title="Riccati sweep: a hinge that rotates a body without inertia",
+    why="The sweep divides by the inertia D of the free motions of a hinge. A ball lets a rod "
+    "spin about its axis, where there is hardly any inertia. In axes oblique to the rod that "
+    "inertia is the difference of large entries: the spin is rounding over rounding. Below 1e-14 "
+    "of the mean a pivot of D counts as zero, and the run stops and names the hinge. A motion "
+    "without inertia should not be free: a universal hinge constrains the spin.",
     parameter="moment of inertia along a rod over that across", unit="",
     low=1e-18, high=0.1, scale=LOG,
     measured="error of the accelerations, relative", limit=1e-6,
     method=Method("ball", lambda ratio: _error(ratio, BALL, TURNED)),
-    remedy=Method("universal hinge, the spin held", lambda ratio: _error(ratio, UNIVERSAL, BENT)),
+    remedy=Method(
+        "universal hinge, spin constrained", lambda ratio: _error(ratio, UNIVERSAL, BENT)
+    ),
     reach=1e-20,
     source="Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 7 and 10 (D, singular "
     "articulated inertia); Higham, Accuracy and Stability of Numerical Algorithms, 2002, ch. 10",
