@@ -1,7 +1,7 @@
 """Risks: findings about the reliability of an answer, in one form for all checks.
 
 Different packages check a scene, the start of a run and its result; all of them report their
-findings as rows of this one type.  docs/use/risks.md lists their names.
+findings as rows of this one type.  docs/howto/warnings.md lists their names.
 """
 
 from __future__ import annotations

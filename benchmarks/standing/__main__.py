@@ -73,7 +73,9 @@ def main(given: list[str] | None = None) -> None:
     print(table(record))
     places = [(options.out / "result.md", options.out / "result.png")]
     if options.out == HERE:
-        places.append((DOCS / "use" / "standing.md", DOCS / "images" / "standing.png"))
+        places.append(
+            (DOCS / "benchmarks" / "scene-comparison.md", DOCS / "images" / "standing.png")
+        )
     from .picture import draw
 
     for text, picture in places:

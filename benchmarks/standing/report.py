@@ -14,7 +14,7 @@ def words(point: dict[str, Any]) -> str:
 
 
 _PAGE = """\
-# Eight scenes, charted
+# Benchmark: eight scenes against other programs
 
 Every method of mstmm over its tolerances or steps, on both engines (the fused one up to 20 speeds,
 its C compiled before), as `mstmm chart` tries them; beside them SciPy and SUNDIALS on mstmm's
@@ -23,7 +23,7 @@ Written by `python -m benchmarks.standing`.
 
 ![CPU time over achieved error of eight scenes, mstmm and its peers]({picture})
 
-## What to take
+## Recommended settings
 
 The cheapest setting of mstmm that errs by at most so much in the place of one end at the end, as
 all tighter ones of its method do, beside the cheapest of the best peer that does. CPU time of one
@@ -39,7 +39,7 @@ C and Pinocchio run in a bare loop: where a motion takes no time, that is the di
 
 {scenes}
 
-## Everybody
+## All programs
 
 {everybody}
 """

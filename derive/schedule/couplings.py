@@ -3,7 +3,7 @@
 A row begins at each hinge that it names.  In the tree its column is zero there, and -C is the
 effort of a multiplier of one; a hinge that closes a loop has its speeds from the two bodies that it
 joins.
-See docs/theory/loops.md.
+See docs/explanation/closed-loops.md.
 """
 
 from __future__ import annotations

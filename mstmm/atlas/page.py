@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from .found import Found
 
 HEAD = """\
-# Where methods fail
+# Failure atlas: limits of numerical methods
 
 Atlas of failures, written by `mstmm stability --out DIR`. Every frontier is measured in that run,
 by a coarse grid and bisection. A method *fails* where its error measure exceeds the limit, or where

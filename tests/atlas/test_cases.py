@@ -30,7 +30,7 @@ EXPECTED = {
     "inertial-axes": ((100, 2000), 1e5),
     # one spring between a light and a heavy mass: the square of what is missed is 1 + M/m
     "light-between": ((2.7, 3.3), 1e12),
-    # docs/theory/classical-steps.md: 4 welded beams of three shapes at h = 0.001
+    # docs/explanation/discrete-time-method.md: 4 welded beams of three shapes at h = 0.001
     "product-beams": ((3, 4), 40),
     # h omega = sqrt 8, omega = sqrt(3 k) of a rod
     "rk4-stiffness": ((0.95 * 8e6 / 3, 1.06 * 8e6 / 3), 1e12),
@@ -41,7 +41,7 @@ EXPECTED = {
     "genalpha-overshoot": ((10.0, 100.0), 1e6),
     # amplitude left after ten periods: 0.995 at h omega = 0.5, 0.967 at 1; of rodas5p 0.9989 at 1
     "numerical-damping": ((0.5, 1.0), 1.0),
-    # docs/theory/classical-steps.md: lost at 6.0 s
+    # docs/explanation/discrete-time-method.md: lost at 6.0 s
     "newmark-constraints": ((4.0, 6.1), 60.0),
     # of fourth order: 6.2e-7 m at 10 ms
     "wilson-gaps": ((1e-2, 1.3e-2), 0.1),

@@ -12,8 +12,8 @@ from atlas.test_cases import EXPECTED
 from mstmm.atlas.found import Found
 from mstmm.atlas.page import page
 
-FOLDER = Path(__file__).parents[2] / "docs" / "theory" / "failures"
-AGAIN = "mstmm stability --out docs/theory/failures writes it anew"
+FOLDER = Path(__file__).parents[2] / "docs" / "explanation" / "failures"
+AGAIN = "mstmm stability --out docs/explanation/failures writes it anew"
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,9 @@ from pathlib import Path
 
 from cli.commands import Command
 
-PAGE = (Path(__file__).parents[2] / "docs" / "use" / "command-line.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "reference" / "command-line.md").read_text(
+    encoding="utf-8"
+)
 COMMON = {"--help", "--json"}
 
 

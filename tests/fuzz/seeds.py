@@ -22,7 +22,8 @@ def seeds() -> dict[str, Data]:
         path.parent.name: whole(tomllib.loads(path.read_text("utf-8")), path.parent)
         for path in sorted(ROOT.glob("examples/*/scene.toml"))
     }
-    for page in [ROOT / "README.md", *sorted(ROOT.glob("docs/use/*.md"))]:
+    pages = [*ROOT.glob("docs/howto/*.md"), *ROOT.glob("docs/reference/*.md")]
+    for page in [ROOT / "README.md", *sorted(pages, key=lambda path: path.name)]:
         blocks = re.findall(r"^```toml\n(.*?)^```", page.read_text("utf-8"), re.M | re.S)
         for i, block in enumerate(blocks):
             found[f"{page.stem}-{i}"] = tomllib.loads(block)

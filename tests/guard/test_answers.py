@@ -154,7 +154,7 @@ def test_every_check_of_runs_serves_answers_or_is_not_applicable() -> None:
 
 
 def test_every_risk_is_in_the_docs() -> None:
-    page = (ROOT / "docs/use/risks.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/howto/warnings.md").read_text(encoding="utf-8")
     assert not [name for name in risk_names() if f"`{name}`" not in page]
 
 

@@ -10,5 +10,5 @@ from pages.blocks import Follow, play
 
 @pytest.fixture(scope="session")
 def played(tmp_path_factory: pytest.TempPathFactory) -> Follow:
-    """What became of a page, such as "docs/use/flexible.md"."""
+    """What became of a page, such as "docs/howto/flexible-bodies.md"."""
     return cache(lambda page: play(page, tmp_path_factory.mktemp("page")))

@@ -9,7 +9,7 @@ from pages.blocks import Follow, page_text
 
 from mstmm.runtime.model.derivatives import Derivatives
 
-PAGE = "docs/use/derivatives.md"
+PAGE = "docs/howto/derivatives.md"
 
 
 def test_the_example_is_right(played: Follow) -> None:

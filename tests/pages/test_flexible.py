@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pages.blocks import Follow, page_text
 
-PAGE = "docs/use/flexible.md"
+PAGE = "docs/howto/flexible-bodies.md"
 TEXT = page_text(PAGE)
 
 

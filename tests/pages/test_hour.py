@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture
 def page(played: Follow) -> dict[str, Any]:
     """The names that the page leaves behind."""
-    return played("docs/theory/hour.md").names
+    return played("docs/tutorials/riccati-sweep.md").names
 
 
 def test_both_programs_agree_with_the_engine_on_a_short_chain(page: dict[str, Any]) -> None:

@@ -15,7 +15,7 @@ MASS, HALF, LENGTH, INERTIA, GRAVITY = 1.0, 0.5, 1.0, 0.084, 9.81
 @pytest.fixture
 def page(played: Follow) -> dict[str, Any]:
     """The names that the page leaves behind."""
-    return played("docs/use/model.md").names
+    return played("docs/howto/evaluate-a-model.md").names
 
 
 def weights(q: np.ndarray[Any, Any]) -> list[float]:

@@ -39,7 +39,7 @@ from mstmm.scene import (
 )
 from mstmm.scene.rules.values import Table
 
-PAGE = "docs/use/scenes.md"
+PAGE = "docs/reference/scene-format.md"
 BLOCKS = shown(PAGE, "toml")
 FORMAT = page_text(PAGE)
 

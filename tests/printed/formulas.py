@@ -2,7 +2,7 @@
 
 Each entry of `PRINTED_FORMULAS` states a formula as the book prints it (in our symbols), what the
 derivation of `newton_euler` gives, and a check that computes which of the two the mechanics
-supports.  `as_markdown` renders the list for docs/theory.
+supports.  `as_markdown` renders the list for docs/explanation.
 
 Source: L. Jing, O. Stephansson, Fundamentals of Discrete Element Methods for Rock Engineering:
 Theory and Applications, Developments in Geotechnical Engineering 85, Elsevier, Amsterdam 2007.
@@ -195,7 +195,7 @@ PRINTED_FORMULAS: tuple[PrintedFormula, ...] = (
 )  # fmt: skip
 
 
-_PREFACE = """# Printed formulas: misprints and tacit conventions
+_PREFACE = """# Errata and conventions of the source texts
 
 L. Jing, O. Stephansson, *Fundamentals of Discrete Element Methods for Rock Engineering*, Elsevier
 2007, chapter 2, as read from an electronic text of the book. Symbols are ours: `omega` is the
@@ -210,7 +210,7 @@ the tests repeat the checks.
 
 
 def as_page() -> str:
-    """The page docs/theory/printed-formulas.md."""
+    """The page docs/explanation/errata.md."""
     return _PREFACE + as_markdown()
 
 

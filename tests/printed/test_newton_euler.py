@@ -154,7 +154,7 @@ def test_printed_formulas_cover_the_chapter_and_render() -> None:
 
 
 def test_the_page_of_printed_formulas_is_current() -> None:
-    page = Path(__file__).parents[2] / "docs" / "theory" / "printed-formulas.md"
+    page = Path(__file__).parents[2] / "docs" / "explanation" / "errata.md"
     assert page.read_text(encoding="utf-8") == as_page()
 
 

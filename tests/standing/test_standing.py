@@ -147,7 +147,9 @@ def test_the_kept_results_are_whole() -> None:
     """All eight scenes, each with a setting and a ratio for both errors; the pages say the same."""
     record = json.loads((FOLDER / "result.json").read_text())
     assert (FOLDER / "result.md").read_text() == page(record, "result.png")
-    assert (DOCS / "use" / "standing.md").read_text() == page(record, "../images/standing.png")
+    assert (DOCS / "benchmarks" / "scene-comparison.md").read_text() == page(
+        record, "../images/standing.png"
+    )
     kept = record["results"]
     assert [one["case"] for one in kept] == list(CASES)
     for one in kept:

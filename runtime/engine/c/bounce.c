@@ -2,7 +2,7 @@
  *
  * An event holds where g(t, q, x) >= 0.  Its rate v = g_t + A u is that with which it is met; the
  * impulse acts along A^T: u' = u - (1 + e) v / (A w) w, w = M^-1 A^T among closed loops, so that
- * v' = -e v.  See docs/theory/loops.md. */
+ * v' = -e v.  See docs/explanation/closed-loops.md. */
 #include <math.h>
 #include <string.h>
 

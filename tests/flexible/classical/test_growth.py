@@ -1,7 +1,7 @@
 """Where products of flexible transfer matrices lose their digits: along welded chains, with modes.
 
-The figures stand in docs/theory/classical-flexible.md; the Riccati sweep of the same chains keeps
-its digits.
+The figures stand in docs/explanation/classical-flexible.md; the Riccati sweep of the same chains
+keeps its digits.
 """
 
 from __future__ import annotations
