@@ -47,7 +47,7 @@ class Expression:
     #: The named constants in it with their values, which the terms contain.
     constants: tuple[tuple[str, float], ...] = field(default=(), kw_only=True)
 
-    # --- what it depends on -------------------------------------------------------------------
+    # --- dependencies -------------------------------------------------------------------------
 
     @property
     def is_constant(self) -> bool:
@@ -243,7 +243,7 @@ def _where_false(graph: Terms, comparison: Term, nodes: Mapping[int, Node], no: 
 
 
 def _line(term: Term, args: list[_Line | None]) -> _Line | None:
-    """(slope, offset) of a term that is slope*t + offset and nothing else."""
+    """Slope and offset of a term that is linear in `t` alone; None for others."""
     if term.constant is not None:
         return Fraction(0), term.exact if term.exact is not None else Fraction(term.constant)
     if term.name is not None:

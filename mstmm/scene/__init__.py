@@ -1,4 +1,4 @@
-"""The public face of scenes: the tables that a scene is built from, and how one is read."""
+"""Public interface of scenes: the tables of a scene, and functions to read one."""
 
 from __future__ import annotations
 

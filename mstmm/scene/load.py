@@ -1,4 +1,4 @@
-"""Reading a scene from a file."""
+"""Loading of scene files and robot files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .tables.elastic_keys import FOLDER
 
 
 def is_scene_file(name: str) -> bool:
-    """Whether a name ends as that of a file that `load_scene` reads."""
+    """Whether a file name has a suffix that `load_scene` reads."""
     return os.path.splitext(name)[1].lower() in MAX_SIZE or is_robot(name)
 
 
@@ -25,27 +25,27 @@ def load_scene(
     *,
     units: Mapping[str, str] | None = None,
 ) -> Scene:
-    """Read and validate a scene file (.toml or .json), or that of a robot as `import_robot` does.
+    """Read and validate a scene file (.toml or .json) or a robot file (see `import_robot`).
 
-    Relative paths in it start from its folder.  Of the files that it names the numbers of signals
-    are read, from no other folder.
+    Relative paths in the file start from its folder.  CSV files of signals are read as well, but
+    only from this folder and below.
 
-    `known_types` maps (kind, name), kind one of hinge, body, force, to the definitions of users'
-    types.  When it is given every type must be built in or in it; without it types that are not
-    built in are left to `Scene.check_types`.
+    `known_types` maps (kind, name), kind one of hinge, body, force, to the definitions of
+    user-defined types.  If it is given, every type must be built in or defined in it.  Without it,
+    types that are not built in are left to `Scene.check_types`.
 
-    units: those of a robot's file where they are not m and kg, as {"length": "mm", "mass": "g"}; a
-    scene file is in m and kg always.
+    units: units of a robot file that is not in m and kg, as {"length": "mm", "mass": "g"}.  Scene
+    files are always in m and kg.
 
-    Raises SceneError, and EnvironmentFailure where MuJoCo is needed and not there.
+    Raises SceneError, and EnvironmentFailure where MuJoCo is needed but not installed.
     """
     if isinstance(path, str | os.PathLike) and is_robot(path):
         return import_robot(path, units=units).scene
     where, data = read(path)
     if units is not None:
         raise SceneError(
-            f"{where}: units: expected none, for a scene file is in m and kg; found {units!r:.60}. "
-            "Leave it out, units are those of a robot's file"
+            f"{where}: units: expected none for a scene file, found {units!r:.60}; leave it out, "
+            "scene files are in m and kg, only robot files have other units"
         )
     token = FOLDER.set(str(Path(os.fsdecode(os.fspath(path))).absolute().parent))
     try:

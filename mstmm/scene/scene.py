@@ -1,8 +1,8 @@
-"""A scene: bodies, hinges, beams, loads, events and springs, validated and frozen.
+"""Scene of a multibody system: bodies, hinges, beams, loads, events, springs; validated, frozen.
 
-The same model is read from TOML and JSON (`load_scene`) and built in Python
-(`Scene(gravity=[...], body=[{...}], hinge=[{...}])`).  Everything that does not describe a system
-raises SceneError, one line per problem.
+The same class is read from TOML and JSON (`load_scene`) and built in Python
+(`Scene(gravity=[...], body=[{...}], hinge=[{...}])`).  Invalid data raise SceneError, with one line
+per problem.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ from .tables.all import SceneTables
 from .tables.beam_keys import ROOT
 from .tables.constants import evaluated
 
-#: What messages call the scene that is being read.
+#: Name of the scene that is being validated, for messages.
 _source: ContextVar[str] = ContextVar("source", default="scene")
 
 
 class Scene(SceneTables, Displayed):
-    """Everything a simulation needs to know, SI units and radians, frozen.
+    """Validated description of a multibody system in SI units and radians; frozen.
 
-    `gravity` in m/s^2, inertial axes; `constants` are numbers by their names.  Lists keep the order
-    of the file: hinge coordinates appear in q and u in the order of `hinge`, then those of the
+    `gravity` is in m/s^2, inertial axes; `constants` are named numbers.  Lists keep the order of
+    the file.  q and u contain the hinge coordinates in the order of `hinge`, then those of the
     chains in the order of `chain`, then the modal coordinates in the order of `beam` and `elastic`.
     """
 
     model_config = ConfigDict(title="mstmm scene")
 
     def __init__(self, /, **data: Any) -> None:
-        """Validate; SceneError names every problem (at most ten lines)."""
+        """Validate the tables of a scene; raise SceneError with up to ten problems, one a line."""
         try:
             constants = evaluated(data.get("constants", {}))
         except Refused as refused:
@@ -58,9 +58,9 @@ class Scene(SceneTables, Displayed):
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any], where: str = "scene") -> Scene:
-        """Scene from the keys of a file; `where` begins every message."""
+        """Create a scene from the keys of a file; `where` begins every message."""
         if not isinstance(data, Mapping) or not all(isinstance(key, str) for key in data):
-            raise SceneError(f"{where}: expected the keys of a scene, found {short(data)}")
+            raise SceneError(f"{where}: expected a table of scene keys, found {short(data)}")
         token = _source.set(where)
         try:
             return cls(**data)
@@ -69,7 +69,7 @@ class Scene(SceneTables, Displayed):
 
     @property
     def summary(self) -> str:
-        """How much there is of what: 3 bodies, 3 hinges, 1 spring."""
+        """Number of elements of each kind: 3 bodies, 3 hinges, 1 spring."""
         counts = {"body": len(self.bodies), "hinge": len(self.hinges)}
         counts |= {name: len(getattr(self, name)) for name in _COUNTED}
         return ", ".join(_count(n, word) for word, n in counts.items() if n)
@@ -86,20 +86,23 @@ class Scene(SceneTables, Displayed):
 
     @property
     def risks(self) -> tuple[Risk, ...]:
-        """What is accepted but worth knowing."""
+        """Warnings about accepted but doubtful input."""
         return checks.risks(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The same, one sentence each."""
+        """Warnings as text, one sentence each."""
         return sentences(self.risks)
 
     def to_toml(self) -> str:
-        """The scene as TOML with every default filled in; it loads back to an equal scene."""
+        """Convert to TOML text with all defaults; loading it gives an equal scene."""
         return to_toml(self)
 
     def check_against(self, spec: ElementSpec, where: str = "scene") -> None:
-        """Check every element of a user's type against the definition of that type."""
+        """Check every element of a user-defined type against its definition.
+
+        Raises SceneError; `where` begins every message.
+        """
         problems = types.problems_with(self, spec)
         if problems:
             raise report(problems, self._tables(), where)
@@ -107,10 +110,10 @@ class Scene(SceneTables, Displayed):
     def check_types(
         self, known_types: Mapping[tuple[str, str], ElementSpec], where: str = "scene"
     ) -> None:
-        """Check that every type is built in or known, and fits its definition.
+        """Check that every type is built in or defined, and that elements fit their definition.
 
-        `known_types` maps (kind, name), kind one of hinge, body, force, to the definition.  From
-        then on hinges of users' types have the facts of theirs.
+        `known_types` maps (kind, name), kind one of hinge, body, force, to the definition.  Hinges
+        of user-defined types then have the facts of their type.  Raises SceneError.
         """
         if not isinstance(known_types, Mapping):
             raise SceneError(f"known_types: expected a table, found {short(known_types)}")
@@ -148,12 +151,12 @@ def _count(n: int, word: str) -> str:
     return f"{n} {one if n == 1 else _MANY.get(word, word + 's')}"
 
 
-#: Tables whose elements need no name.
+#: Tables whose elements need no name; they are numbered.
 _UNNAMED = ("load", "event", "spring", "bushing", "constraint", "coupling", "shape")
 
 
 def _names(data: Mapping[str, Any]) -> Iterator[str]:
-    """The names of inputs and signals, of what has one."""
+    """Names of inputs and signals in unvalidated data."""
     for table in ("input", "signal"):
         elements = data.get(table, ())
         for element in elements if isinstance(elements, (list, tuple)) else ():
@@ -164,7 +167,7 @@ def _names(data: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _named(table: str, elements: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Elements without a name get "load1" and so on, avoiding names that are taken."""
+    """Name elements without a name "load1" and so on, avoiding existing names."""
     taken = {element.name for element in elements}
     named = []
     for i, element in enumerate(elements, 1):
@@ -178,7 +181,7 @@ def _named(table: str, elements: tuple[Any, ...]) -> tuple[Any, ...]:
     return tuple(named)
 
 
-#: The keys that refer to a body or an end of one.
+#: Keys that refer to a body or one of its ends.
 _REFERENCES = {
     "hinge": ("inboard", "outboard"), "chain": ("inboard",), "load": ("on",),
     "spring": ("from_", "to"), "bushing": ("from_", "to"), "constraint": ("from_", "to"),
@@ -187,9 +190,9 @@ _REFERENCES = {
 
 
 def _at_roots(scene: SceneTables) -> dict[str, tuple[Any, ...]]:
-    """The tables in which a beam's name stands for its root, with "blade.root" in its place.
+    """Tables in which the name of a beam is replaced by its root, "blade.root".
 
-    Loads per length keep the name of the beam alone.
+    Loads per length keep the name of the beam.
     """
     beams = {beam.name for beam in scene.beam}
     changed: dict[str, tuple[Any, ...]] = {}

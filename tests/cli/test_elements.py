@@ -39,7 +39,7 @@ def knee(folder: Path) -> Path:
 
 def test_the_whole_way(mstmm: Command, knee: Path) -> None:
     unknown = mstmm("check", "leg.toml")
-    assert unknown.code == 2 and 'no hinge type "knee"' in unknown.err
+    assert unknown.code == 2 and 'unknown hinge type "knee"' in unknown.err
     checked = mstmm("check", "my_knee.py")
     assert checked.code == 0 and "hinge knee: agrees" in checked.out
     generated = mstmm("generate", "my_knee.py")

@@ -16,7 +16,7 @@ def test_a_robot_becomes_a_scene_that_runs(mstmm: Command) -> None:
     Path("arm.urdf").write_text(ARM)
     done = mstmm("import", "arm.urdf", "--stops", "1e4")
     assert done.code == 0
-    assert "joint 'other jaw' (line 36): goes with 'jaw', by a coupling" in done.out
+    assert "joint 'other jaw' (line 36): mimics 'jaw', by a coupling" in done.out
     assert "link 'base' (line 5): part of the ground" in done.out
     assert "arm.toml: 3 bodies, 3 hinges" in done.out.splitlines()[-1]
     assert mstmm("check", "arm.toml").code == 0

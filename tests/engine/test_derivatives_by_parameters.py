@@ -34,7 +34,7 @@ def eighth_order(f: Any, step: float) -> Array:
 
 def scene_of(seed: int, **options: Any) -> tuple[mstmm.Scene, Array, Array]:
     data, q, u = drawn(seed, **options)
-    # Steps of some per cent may break the triangle inequality of an inertia.
+    # Steps of some per cent may violate the triangle inequality of an inertia.
     data["allow_unphysical_inertia"] = True
     for body in data["body"]:
         body["allow_unphysical_inertia"] = True

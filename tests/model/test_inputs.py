@@ -158,7 +158,7 @@ def test_a_model_with_inputs_can_be_pickled() -> None:
         ({"motor": ([0, 1], [0, np.inf])}, 'inputs["motor"] values[1] = inf'),
         ({"motor": {"time": [0, 1]}}, 'unknown key; did you mean "times"'),
         ({"motor": {"file": "../a.csv"}}, "expected a file in the folder of the scene"),
-        ({1: 2.0}, "there is no such input in the scene; one of motor, push, angle"),
+        ({1: 2.0}, "there is no such input in the scene; use one of motor, push, angle"),
         (3.0, "inputs"),
     ],
 )

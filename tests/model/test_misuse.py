@@ -21,9 +21,9 @@ def model() -> mstmm.Model:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda _: mstmm.Scene.from_data([1], "x"), "x: expected the keys of a scene"),  # type: ignore[arg-type]
-        (lambda _: mstmm.Scene.from_data(None), "scene: expected the keys"),  # type: ignore[arg-type]
-        (lambda _: mstmm.Scene.from_data({1: 2}), "expected the keys of a scene"),  # type: ignore[dict-item]
+        (lambda _: mstmm.Scene.from_data([1], "x"), "x: expected a table of scene keys"),  # type: ignore[arg-type]
+        (lambda _: mstmm.Scene.from_data(None), "scene: expected a table of scene keys"),  # type: ignore[arg-type]
+        (lambda _: mstmm.Scene.from_data({1: 2}), "expected a table of scene keys"),  # type: ignore[dict-item]
         (lambda model: model.scene.check_types(3), "known_types: expected a table"),
         (lambda model: model.linearize().symbolic(3), "keep = 3: expected a list of names"),
         (lambda model: model.simulate(0.0).certificate.verdict("a"), "accuracy = 'a'"),
@@ -50,5 +50,5 @@ def test_batches_of_no_states_have_no_derivatives(model: mstmm.Model) -> None:
              {"inertia": [1e200, 1e200, 1e200]}],
 )  # fmt: skip
 def test_masses_whose_products_overflow_are_not_taken_for_none(body: dict[str, object]) -> None:
-    with pytest.raises(mstmm.SceneError, match="beyond which products overflow"):
+    with pytest.raises(mstmm.SceneError, match="above which products overflow"):
         mstmm.Scene(gravity=(0, 0, 0), body=[ROD | body], hinge=[PIN])

@@ -153,7 +153,7 @@ def test_carnot_in_a_loop() -> None:
         ({"restitution": None}, "needs a number above 0"),
         ({"when": "ball.vy < -1"}, "strikes places"),
         ({"when": "t > 1"}, "reads no place"),
-        ({"do": "stop"}, 'only do = "bounce" takes a restitution'),
+        ({"do": "stop"}, 'only do = "bounce" has a restitution'),
     ],
 )
 def test_refused(event: Scene, said: str) -> None:

@@ -196,7 +196,7 @@ def test_equalities_that_are_off(flag: str, active: str, tmp_path: Path) -> None
     data.qpos[:], data.qvel[:] = [0.3, 0.1], [0.7, -0.2]
     mujoco.mj_forward(peer, data)
     robot = mstmm.import_robot(path)
-    assert any(note.text == "left out, as it is off" for note in robot.notes)
+    assert any(note.text == "left out: switched off" for note in robot.notes)
     found = mstmm.compile(robot.scene).accelerations(data.qpos, data.qvel)
     assert found == pytest.approx(data.qacc, rel=1e-12)
 
@@ -216,10 +216,8 @@ def test_curves_of_springs_and_dampers_are_told(
 ) -> None:
     path = tmp_path / "robot.xml"
     path.write_text(CURVED.format(stiffness, damping))
-    notes = [
-        note.text for note in mstmm.import_robot(path).notes if "beyond the first" in note.text
-    ]
-    assert notes == [f"of its {told} the terms beyond the first are left out"]
+    notes = [note.text for note in mstmm.import_robot(path).notes if "nonlinear terms" in note.text]
+    assert notes == [f"the nonlinear terms of its {told} are left out"]
 
 
 def test_armature_of_a_free_joint(tmp_path: Path) -> None:

@@ -252,18 +252,18 @@ def test_what_of_mjcf_is_left_out_is_told_by_name_and_line(tmp_path: Path) -> No
     assert "line 27: tendon 'cord': left out" in told
     assert "line 28: exclude 'apart': left out" in told
     assert "line 20: joint 'flap': actuatorfrcrange from -2 to 3 left out" in told
-    rows = "3 joints of it are hinges in a row, with bodies without mass between"
+    rows = "its 3 joints are hinges in series, with massless bodies between them"
     assert f"line 5: body 'cart': {rows}" in told
-    assert "line 12: body 'ball': its origin is where its joint is; its own frame is an end" in told
+    assert "line 12: body 'ball': its origin is at its joint; its original frame is an end" in told
 
 
 def test_what_mujoco_refuses_is_refused_in_one_message(tmp_path: Path) -> None:
     path = tmp_path / "machine.xml"
     path.write_text("<mujoco><worldbody><body><joint type='spring'/></body></worldbody></mujoco>")
-    with pytest.raises(mstmm.SceneError, match="MuJoCo does not read it"):
+    with pytest.raises(mstmm.SceneError, match="MuJoCo cannot read the file"):
         mstmm.import_robot(path)
     path.write_text(MACHINE)
-    with pytest.raises(mstmm.SceneError, match="in MJCF a <freejoint> says so"):
+    with pytest.raises(mstmm.SceneError, match="in MJCF use a <freejoint>"):
         mstmm.import_robot(path, base="free")
 
 

@@ -120,10 +120,10 @@ PIN = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "bar"}
         ({"hinge": [PIN | {"type": "cylindrical"}]}, "no joint like a cylindrical hinge"),
         ({"hinge": [PIN], "constraint": [
             {"type": "distance", "from": "ground", "to": "bar.tip", "length": 1.0}
-        ]}, "URDF has no loops"),
+        ]}, "URDF has no closed loops"),
         ({"body": [], "hinge": [PIN], "beam": [
             {"name": "bar", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 10.0}
-        ]}, "rigid bodies alone"),
+        ]}, "only rigid bodies"),
     ],
 )  # fmt: skip
 def test_what_urdf_cannot_say_is_refused(tables: dict[str, Any], message: str) -> None:
@@ -157,7 +157,7 @@ def test_a_loop_is_refused_by_the_hinge_that_is_cut() -> None:
     with pytest.raises(mstmm.SceneError) as told:
         mstmm.export_robot(scene)
     assert str(told.value).startswith(f'hinge "{cut}" closes a loop')
-    assert 'body "bucket" is held by hinges "bucket_link" and "bucket_pin"' in str(told.value)
+    assert 'body "bucket" has the inboard hinges "bucket_link" and "bucket_pin"' in str(told.value)
     assert "keep the bodies" in str(told.value)
     for name in ("bucket_link", "bucket_pin"):
         assert mstmm.export_robot(excavator(name)).joints >= 6
@@ -169,7 +169,7 @@ def test_arguments_that_are_none(tmp_path: Path) -> None:
         with pytest.raises(mstmm.SceneError, match="expected a Scene; mstmm"):
             mstmm.export_robot(wrong)  # type: ignore[arg-type]
     for name in ("a\x01b", 5):
-        with pytest.raises(mstmm.SceneError, match="expected a name of letters and signs"):
+        with pytest.raises(mstmm.SceneError, match="expected printable text"):
             mstmm.export_robot(scene, name)  # type: ignore[arg-type]
     path = tmp_path / "odd.urdf"
     path.write_text(mstmm.export_robot(scene, 'Ü "<&').text, "utf-8")
@@ -213,7 +213,7 @@ def test_a_wheel_is_rated_without_a_range(tmp_path: Path) -> None:
 def test_ratings_that_are_no_numbers_are_left_out(tmp_path: Path, value: str) -> None:
     found = mstmm.import_robot(written(tmp_path, ARM.replace('"30"', f'"{value}"')))
     assert found.scene.hinge[0].rated == Rated(lower=-1.0, upper=2.0, velocity=5.0)
-    told = f"limits that are no finite numbers left out: effort '{value}'"
+    told = f"limits that are not finite numbers left out: effort '{value}'"
     assert told in [note.text for note in found.notes]
 
 

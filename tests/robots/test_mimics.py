@@ -82,7 +82,7 @@ def test_what_goes_with_several_coordinates_is_left_free() -> None:
     robot = chain(pin(0, kind="free"), pin(1), mimics=(Mimic("j1", "j0", 1.0, 0.0),))
     found = converted(robot, Choices())
     assert not found.scene.coupling and found.scene.hinges[1].drive is None
-    told = "left free: it mimics 'j0', which has more coordinates than one"
+    told = "left free: it mimics 'j0', which has more than one coordinate"
     assert told in [note.text for note in found.notes]
 
 
@@ -94,5 +94,5 @@ def test_a_long_row_of_them_is_followed_to_its_end() -> None:
     assert last is not None and last[0] is not None
     assert last[0].constant == (count - 1) / 2
     ring = chain(pin(0), pin(1), mimics=(Mimic("j0", "j1", 1.0, 0.0), Mimic("j1", "j0", 1.0, 0.0)))
-    with pytest.raises(mstmm.SceneError, match="joint 'j0' mimics itself in the end"):
+    with pytest.raises(mstmm.SceneError, match="joint 'j0' mimics itself through other joints"):
         converted(ring, Choices())

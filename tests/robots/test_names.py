@@ -102,7 +102,7 @@ def test_a_moving_link_may_be_called_as_the_ground_is(tmp_path: Path, merge: boo
     mine, theirs = (mstmm.compile(one.scene).simulate(0.1) for one in (found, other))
     assert np.array_equal(mine.q, theirs.q)
     note = next(note.text for note in found.notes if note.element == "names")
-    assert note == "1 that neither a scene nor its [names] take: 'ground' is ground_3"
+    assert note == "1 allowed neither in a scene nor in its [names]: 'ground' is ground_3"
 
 
 def test_names_that_are_not_kept_are_told_apart(tmp_path: Path) -> None:
@@ -110,6 +110,6 @@ def test_names_that_are_not_kept_are_told_apart(tmp_path: Path) -> None:
     notes = [one.text for one in mstmm.import_robot(written(tmp_path, text)).notes
              if one.element == "names"]  # fmt: skip
     assert len(notes) == 2
-    assert notes[0].startswith("4 that a scene does not take, kept in its [names]: '1st arm' is")
-    assert notes[1].startswith("1 that neither a scene nor its [names] take: 'xxxx")
+    assert notes[0].startswith("4 not allowed in a scene, kept in its [names]: '1st arm' is")
+    assert notes[1].startswith("1 allowed neither in a scene nor in its [names]: 'xxxx")
     assert len(notes[1]) < 200

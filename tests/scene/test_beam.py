@@ -269,7 +269,7 @@ def test_no_warning_for_a_slender_beam_left_to_the_defaults() -> None:
             "7.7 times the height of the section along",
         ),
         ({"rotary_inertia": [1.2 * 1.3**2 / 12, 1e-4]}, "(1.3 m from rotary_inertia"),
-        ({"damping": 5}, "a ratio of 5 is critical or more; 0.01 is 1 percent"),
+        ({"damping": 5}, "a ratio of 5 is critical or above; write 0.01 for 1 percent"),
         ({"basis": "free-free"}, 'no bending moment at "root", but hinge "hub" carries one there'),
     ],
 )

@@ -143,20 +143,20 @@ def test_arrays_of_numpy_and_scipy_and_lists_are_the_same() -> None:
 
 ENDS = "ends.root: expected exactly one of nodes, box, plane, sphere, set for the nodes of this end"
 BAD: list[tuple[Data, str]] = [
-    (linked({}), 'elastic "link": expected exactly one of matrices, arrays, mesh, box to say what'),
+    (linked({}), 'elastic "link": expected exactly one of matrices, arrays, mesh, box as the'),
     (linked(matrices="a.npz"), "found matrices and box; write for example matrices = \"link.npz\""),
     (linked({"matrices": "a.csv"}), "matrices: expected the path of a file ending in .npz, found"),
     (linked({"matrices": 3}), "matrices: expected the path of a file ending in .npz, found 3"),
     (linked({"matrices": "a\0.npz"}), "matrices: expected the path of a file ending in .npz"),
     (linked({"mesh": ""} | STEEL), "mesh: expected the path of a file, found ''"),
-    (linked({"matrices": "a.npz"}, young=1), "young: matrices hold the material already; leave it"),
-    (linked(arrays(), density=1), "density: arrays hold the material already; leave it out"),
-    (linked({"matrices": "a.npz"}, order=2), "order: only mesh and box have elements of an order"),
-    (linked(scale=0.001), "scale: only a mesh file has a unit of its own; leave it out"),
+    (linked({"matrices": "a.npz"}, young=1), "young: matrices already contain the material;"),
+    (linked(arrays(), density=1), "density: arrays already contain the material; leave it out"),
+    (linked({"matrices": "a.npz"}, order=2), "order: only mesh and box have an element order"),
+    (linked(scale=0.001), "scale: only a mesh file has its own length unit; leave it out"),
     (linked(young=...), "young: missing; a body from a box needs Young's modulus in Pa"),
     (linked(young=0), "young: expected a number in Pa, more than 0, found 0"),
     (linked(density=-1), "density: expected a number in kg/m^3, more than 0, found -1"),
-    (linked(poisson=0.5), "found 0.5; no element here is incompressible"),
+    (linked(poisson=0.5), "found 0.5; no element is incompressible"),
     (linked(poisson=-1), "poisson: expected Poisson's ratio, more than -1 and less than 0.5"),
     (linked(order=3), "order: expected a whole number from 1 to 2, found 3"),
     (linked(modes=-1), 'modes: expected a whole number from 0 to 200 or "auto", found -1'),
@@ -171,7 +171,7 @@ BAD: list[tuple[Data, str]] = [
     (linked(box={"size": [1, 1, 1], "divisions": [0, 1, 1]}), "numbers from 1 to 10000, found"),
     (linked(box={"size": [1, 1, 1]}), "box.divisions: missing; expected three whole numbers"),
     # ends
-    (linked(ends=...), "ends: missing; an elastic body is met at its ends alone"),
+    (linked(ends=...), "ends: missing; an elastic body connects only at its ends"),
     (linked(ends={"a b": ROOT}), "expected the name of an end, found 'a b'"),
     (linked(ends={"root": {}}), f"{ENDS}, found none; write for example plane = [1, 0, 0, 0.0]"),
     (linked(ends={"root": ROOT | {"set": "a"}}), f"{ENDS}, found plane, set"),
@@ -199,13 +199,13 @@ BAD: list[tuple[Data, str]] = [
     (linked(arrays(order="rows")), 'arrays.order: expected "node" or "component"'),
     # among the other elements
     (linked() | {"hinge": []}, 'elastic "link": no hinge connects it to the ground'),
-    (linked() | {"load": [{"on": "link"}]}, '"link" is an elastic body, which is met at its ends'),
-    (linked() | {"load": [{"on": "link"}]}, 'alone; write "link.root"'),
+    (linked() | {"load": [{"on": "link"}]}, '"link" is an elastic body, which connects only at'),
+    (linked() | {"load": [{"on": "link"}]}, 'ends; write "link.root"'),
     (linked() | {"load": [{"on": "link.top"}]}, 'body "link" has no end "top"; did you mean'),
     (linked() | {"load": [{"on": "link", "force_per_length": [1, 0, 0]}]}, '"link" is an elastic'),
     (linked() | {"body": [{"name": "link", "mass": 1}]}, '"link" is also the name of a body;'),
     (linked() | {"hinge": [HUB | {"outboard": "link"}]},
-     'hinge "hub": outboard: "link" is an elastic body, which is met at its ends alone; write "li'),
+     'hinge "hub": outboard: "link" is an elastic body, which connects only at its ends; write'),
 ]  # fmt: skip
 
 

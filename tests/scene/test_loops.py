@@ -117,7 +117,7 @@ def test_a_beam_may_spin_only_if_all_that_hold_it_let_it() -> None:
     spin = {"axis": [1, 0, 0]}
     data = boomed(hinge("grip", outboard="boom.tip", type="ball"))
     data["hinge"][0] |= spin
-    with pytest.raises(SceneError, match='hinge "root" lets the beam spin about its axis'):
+    with pytest.raises(SceneError, match='hinge "root" allows the beam to spin about its axis'):
         Scene(**data)
     data["hinge"][1]["type"] = "fixed"
     assert Scene(**data).beam[0].polar_inertia_per_length is None
@@ -138,32 +138,31 @@ def test_what_else_closes_is_counted_behind_the_hinges() -> None:
     ("data", "message"),
     [
         (arm(hinge=[hinge(cut=True), hinge("elbow", inboard="rod1.tip", outboard="rod2")]),
-         'hinge "shoulder": cut: it is the only hinge that holds "rod1", so it cannot be cut'),
+         'hinge "shoulder": cut: cannot be cut: it is the only inboard hinge of "rod1"'),
         (four_bar(tip={"cut": True}, rocker={"cut": True}),
-         'hinge "tip": cut: with what is to be cut, and what not, nothing holds "c"; leave cut out '
+         'hinge "tip": cut: with these cut keys no tree of hinges reaches "c"; leave cut out '
          'of "tip" or "rocker"'),
         (four_bar(tip={"cut": False}, rocker={"cut": False}),
-         'hinge "rocker": cut: a body hangs on one hinge, and "tip" is not to be cut either, which '
-         'holds "c" too'),
+         'hinge "rocker": cut: "c" already has the inboard hinge "tip" with cut = false; leave'),
         (four_bar(tip={"cut": 1}), 'hinge "tip": cut: expected true or false, found 1'),
         (four_bar(tip={"hold": "yes"}), 'hinge "tip": hold: expected true or false'),
         (four_bar(tip={"type": "fixed", "hold": True}),
-         'hinge "tip": hold: a fixed hinge has nothing to hold; leave it out'),
+         'hinge "tip": hold: a fixed hinge has no coordinates; leave it out'),
         (four_bar(crank={"drive": "t", "hold": True}),
-         'hinge "crank": hold: the drive says where it starts; leave hold out'),
+         'hinge "crank": hold: the drive gives the initial values; leave it out'),
         (arm(chain=[rope(hinge={"type": "pin", "cut": True})]),
          "hinge[0].cut: hinges of a chain are never cut"),
         (four_bar(tip={"inboard": "c.tip", "outboard": "b.tip"},
                   knee={"inboard": "b", "outboard": "a.tip"},
                   rocker={"inboard": "b", "outboard": "c"}),
-         'body "b": held by no hinge; turn hinge "knee" round'),
+         'body "b": it has no inboard hinge; swap inboard and outboard of hinge "knee"'),
         (arm(constraint=[{"type": "rope", "from": "rod1", "to": "rod2"}]),
          'constraint number 1: type: expected "distance" or "point-on-plane" or "point-on-curve" '
          'or "rolling", found'),
         (arm(constraint=[{"type": "distance", "from": "rod1", "to": "rod3.tip", "length": 1}]),
          'constraint number 1: to: there is no body "rod3"; did you mean "rod'),
         (arm(constraint=[{"type": "distance", "from": "rod1", "to": "rod1.tip", "length": 1}]),
-         'to: both ends are on "rod1"; join two bodies'),
+         'to: both ends are on "rod1"; connect two bodies'),
         (arm(constraint=[{"type": "distance", "from": "rod1", "to": "rod2.tip"}]),
          "length: missing; expected a number in m, more than 0"),
         (arm(constraint=[{"type": "distance", "from": "rod1", "to": "rod2.tip", "length": 0}]),
@@ -179,18 +178,18 @@ def test_what_else_closes_is_counted_behind_the_hinges() -> None:
                           "position": [1, 0, 0]}]), "position: only a constraint on the ground"),
         (arm(constraint=[{"type": "distance", "from": "rod1", "to": "rod2.tip", "length": 1},
                          {"type": "distance", "from": "rod2.tip", "to": "rod1", "length": 2}]),
-         "constraint number 2: constraint number 1 says the same; leave one out"),
+         "constraint number 2: repeats constraint number 1; leave one out"),
         (wire(curve=["s", "s"]), "curve: expected three expressions of s"),
-        (wire(curve=["s", "t", 0]), "curve[1]: a curve goes by s alone, found 't'"),
-        (wire(curve=["s", "abs(s)", 0]), "curve[1]: it has no slope where 'abs(s)' switches"),
-        (wire(curve=["s", "sqrt(s)", 0]), "its first two slopes is not finite at s = 0"),
-        (wire(curve=["s^2", "cos(s)", 1]), "curve: it stands still at s = 0, so it has no"),
-        (wire(name="work"), '"work" is a quantity of every result; choose another name'),
+        (wire(curve=["s", "t", 0]), "curve[1]: expected a function of s only, found 't'"),
+        (wire(curve=["s", "abs(s)", 0]), "curve[1]: no derivative where 'abs(s)' switches"),
+        (wire(curve=["s", "sqrt(s)", 0]), "its first two derivatives is not finite at s = 0"),
+        (wire(curve=["s^2", "cos(s)", 1]), "curve: all derivatives are 0 at s = 0; set start"),
+        (wire(name="work"), '"work" is reserved for a quantity of results; choose another name'),
         (wire(radius=1), 'radius: a "point-on-curve" has no radius; leave it out'),
         (arm(constraint=[{"type": "rolling", "from": "ground", "to": "rod2", "normal": [0, 1, 0]}]),
          "radius: missing; expected a number in m, more than 0"),
         (arm(constraint=[{"type": "rolling", "from": "rod2", "to": "ground", "normal": [0, 1, 0],
-                          "radius": 1}]), "to: the ground does not roll; swap from and to"),
+                          "radius": 1}]), "to: expected a body, found the ground; swap from and"),
     ],
 )  # fmt: skip
 def test_refused_with_element_key_and_way_out(data: Data, message: str) -> None:

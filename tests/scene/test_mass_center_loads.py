@@ -92,7 +92,7 @@ def test_a_force_where_a_body_turns_about_has_a_warning(load: Tables, moves: boo
     found = [risk for risk in one.risks if risk.name == "idle-load"]
     assert len(found) == (not moves)
     for told in found:
-        assert told.means.startswith('load "push" acts where "rod" turns about (hinge "p")')
+        assert told.means.startswith('load "push" acts at the pivot of "rod" (hinge "p")')
         assert not told.doubt
 
 
@@ -127,9 +127,9 @@ def test_it_is_written_and_read_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("load", "expected"),
     [
-        ({"on": "rod.c", "at": "center_of_mass"}, 'at: "center_of_mass" is a place of the body'),
+        ({"on": "rod.c", "at": "center_of_mass"}, 'at: "center_of_mass" needs a body without an'),
         ({"on": "rod", "at": "middle"}, 'at: expected "center_of_mass", found'),
-        ({"on": "jib", "at": "center_of_mass"}, 'at: "jib" is no rigid body'),
+        ({"on": "jib", "at": "center_of_mass"}, 'at: "jib" is not rigid'),
         ({"on": "jib", "force": [0, 0, 0], "moment": [0, 0, 0], "force_per_length": [0, 1, 0],
           "at": "center_of_mass"}, "at: force_per_length acts along a beam"),
     ],

@@ -98,7 +98,9 @@ def test_a_hinge_is_not_called_as_a_flexible_body_is() -> None:
             "modes": {"y": 2, "z": 2, "twist": 1}}  # fmt: skip
     root = {"name": "root", "type": "fixed", "inboard": "arm_1.tool", "outboard": "rod"}
     more = {"beam": [beam], "hinge": [*data()["hinge"], root]}
-    with pytest.raises(mstmm.SceneError, match='"rod" is the name of a flexible body of the scene'):
+    with pytest.raises(
+        mstmm.SceneError, match='"rod" is already the name of a flexible body of the scene'
+    ):
         mstmm.Scene(**data(names={"hinge": {"rod": "joint_1"}}, **more))
 
 
@@ -138,18 +140,21 @@ def test_a_wrong_name_is_told_with_the_nearest_one(ask: Any, message: str) -> No
     ("names", "message"),
     [
         (3, "names: expected a table"),
-        ({"joint": {}}, "names.joint: unknown key; one of body, hinge"),
-        ({"body": ["a"]}, "names.body: expected a table of bodies and ends by the names"),
+        ({"joint": {}}, "names.joint: unknown key; use one of body, hinge"),
+        ({"body": ["a"]}, "names.body: expected a table of bodies and ends by their names"),
         ({"body": {"a-b": 3}}, "names.body.'a-b': expected a name of the scene, found 3"),
         ({"body": {"": "arm_1"}}, "expected printable names of 1 to 200 characters"),
-        ({"body": {"  ": "arm_1"}}, "characters, not blanks alone"),
+        ({"body": {"  ": "arm_1"}}, "characters, not only blanks"),
         ({"body": {"a-b": "arm_1."}}, 'there is no body or end "arm_1."'),
         ({"body": {"a\n": "arm_1"}}, "expected printable names of 1 to 200 characters"),
         ({"body": {"a" * 201: "arm_1"}}, "expected printable names of 1 to 200 characters"),
         ({"body": {"a-b": "arm"}}, 'no body or end "arm"; did you mean "arm_1"?'),
         ({"body": {"a-b": "arm_1.tip"}}, 'there is no body or end "arm_1.tip"'),
-        ({"body": {"arm_1": "arm_1.tool"}}, '"arm_1" is the name of a body or an end of the scene'),
-        ({"body": {"ground": "arm_1"}}, '"ground" is the name of a body or an end'),
+        (
+            {"body": {"arm_1": "arm_1.tool"}},
+            '"arm_1" is already the name of a body or an end of the scene',
+        ),
+        ({"body": {"ground": "arm_1"}}, '"ground" is already the name of a body or an end'),
         ({"hinge": {"a-b": "arm_1"}}, 'there is no hinge "arm_1"'),
     ],
 )

@@ -112,12 +112,12 @@ def test_a_file_of_columns_is_read_with_the_scene(
         ("0,1\n1,2\n1,3\n", 2, ("row 2 and", "row 3 are both at 1 s", "keep one of them")),
         ("t,v\n0,1\n2,2\n\n1,3\n", 2, ("row 5, 1 s, comes after", "row 3, 2 s", "sort them")),
         ("0,1\n1,x\n", 2, ("row 2", "expected a number", "'x'")),
-        ("0,1\n1\n", 2, ("row 2 has 1 columns", "expected 2")),
-        ("t,v\n0,1\n", "w", ("there is no column 'w'", "t, v")),
-        ("0,1\n", "v", ("there is no column", "give its number")),
-        ("0,1\n", 3, ("there is no column 3", "it has 2")),
-        ("t,v\n", 2, ("there is no row of numbers in it", "expected times in s")),
-        ("", 2, ("there is no row of numbers in it",)),
+        ("0,1\n1\n", 2, ("row 2: expected 2 columns or more", "found 1")),
+        ("t,v\n0,1\n", "w", ("no column 'w'", "t, v")),
+        ("0,1\n", "v", ("no column", "give the column number")),
+        ("0,1\n", 3, ("no column 3", "it has 2")),
+        ("t,v\n", 2, ("expected rows of numbers, times in s first, found none",)),
+        ("", 2, ("expected rows of numbers",)),
         ("0,1\n1_0,2\n", 2, ("row 2", "expected a number", "'1_0'")),
         ("0,1_0\n", 2, ("row 1", "'1_0'")),
         ("0,nan\n", 2, ("expected a number", "'nan'")),
@@ -169,11 +169,11 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest.Monk
         ({"times": [0, 1]}, ("values", "expected 2", "found 5")),
         ({"times": [], "values": []}, ("missing; expected times in s and values",)),
         ({"interpolation": "spline"}, ("interpolation", '"hold" or "line" or "cubic"')),
-        ({"file": "wind.csv"}, ("file stands instead of times and values",)),
-        ({"column": 2}, ("only a file has columns",)),
-        ({"name": "t"}, ("has a meaning in expressions already",)),
-        ({"name": "energy"}, ('"energy" is a quantity of every result',)),
-        ({"name": "sin"}, ("has a meaning in expressions already",)),
+        ({"file": "wind.csv"}, ("expected a file, or times and values, found both",)),
+        ({"column": 2}, ("only a signal from a file has a column",)),
+        ({"name": "t"}, ("already has a meaning in expressions",)),
+        ({"name": "energy"}, ('"energy" is reserved for a quantity of results',)),
+        ({"name": "sin"}, ("already has a meaning in expressions",)),
         ({"unit": "x" * 65}, ('unit such as "N m"',)),
         ({"values": [0, 1, "k", 0, 0]}, ("values[2]", "expected a number")),
     ],
@@ -193,7 +193,7 @@ def test_what_a_signal_cannot_be(changes: Data, says: tuple[str, ...]) -> None:
         ({"input": [{"name": "wind", "value": "wnd"}], "signal": [wind(name="wnt")]},
          ('input "wind": value: there is no signal "wnd"', 'did you mean "wnt"')),
         ({"input": [{"name": "wind", "value": "a", "rates": [0, 0]}], "signal": [wind(name="a")]},
-         ("rates: the signal", "has rates of its own")),
+         ("rates: the signal", "has its own rates")),
         ({"input": [{"name": "wind", "rates": [1]}]}, ("rates", "rate, second rate")),
         ({"input": [{"name": "wnd"}]}, ("'wind' is unknown", 'did you mean "wnd"')),
         ({"input": [{"name": "wind", "value": [1]}]}, ("a number or the name of a signal",)),
@@ -207,7 +207,7 @@ def test_what_names_cannot_be(tables: Data, says: tuple[str, ...]) -> None:
 
 def test_an_input_is_one_number() -> None:
     message = refused(motor("wind[1]", signal=[wind()]))
-    assert "'wind' is one number; leave out [1]" in message
+    assert "'wind' is a scalar; leave out [1]" in message
 
 
 def test_a_parameter_of_the_same_name_is_refused() -> None:
@@ -224,7 +224,7 @@ def test_a_drive_needs_rates() -> None:
     data["input"][0]["rates"] = [0.3, 0.1]
     Scene.from_data(data)
     data["hinge"][0]["drive"] = ["sin(q)"]
-    assert "a drive depends on t and inputs alone, found 'q'" in refused(data)
+    assert "expected a function of t and inputs only, found 'q'" in refused(data)
     data["hinge"][0]["drive"] = ["2*abs(angle - 0.3) + where(t < 1, t, 1)"]
     assert "a drive cannot switch with an input, found 'abs(angle - 0.3)'" in refused(data)
     data["hinge"][0]["drive"] = ["1/(angle - 0.2)"]

@@ -88,13 +88,13 @@ def test_random_trees_against_the_definition(seed: int) -> None:
 NOT_TREES = [
     (
         {"h1": ("ground", "a"), "h2": ("a.tip", "b"), "h3": ("c", "b.tip")},
-        ['body "c": held by no hinge; turn hinge "h3" round: swap its inboard and outboard'],
+        ['body "c": it has no inboard hinge; swap inboard and outboard of hinge "h3"'],
     ),
     (
         {"h1": ("ground", "a"), "h2": ("c", "a.tip"), "h3": ("b", "c")},
         [
-            'body "c": held by no hinge; turn hinge "h2"',
-            'body "b": held by no hinge; turn hinge "h3"',
+            'body "c": it has no inboard hinge; swap inboard and outboard of hinge "h2"',
+            'body "b": it has no inboard hinge; swap inboard and outboard of hinge "h3"',
         ],
     ),
     (

@@ -16,12 +16,12 @@ from scene.scenes import one
     [
         (
             "30 deg",
-            "found '30 deg'; units are not written, all are SI and rad: write 0.523598775598",
+            "found '30 deg'; leave out the unit, all numbers are in SI units and rad: write",
         ),
         ("-90°", "write -1.57079632679"),
         ("1e3 mm", "write 1"),
         ("120 rpm", "write 12.5663706144"),
-        ("3 bananas", "write the number alone, without quotes, in SI units and rad"),
+        ("3 bananas", "write only the number, without quotes, in SI units and rad"),
     ],
 )
 def test_a_number_as_text_is_answered_with_the_number_to_write(written: str, words: str) -> None:

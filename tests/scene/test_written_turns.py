@@ -48,8 +48,8 @@ def test_an_inertia_in_rows_and_in_axes_of_its_own() -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"orientation": [[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]}, r"at right angles \(off by 0.1\)"),
-        ({"orientation": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "found one that mirrors"),
+        ({"orientation": [[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]}, r"not orthonormal \(error 0.1\)"),
+        ({"orientation": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "found a reflection"),
         ({"orientation": [[1, 0, 0], [0, 1], [0, 0, 1]]}, "found a row of 2 entries"),
         ({"orientation": [[1, 0, 0], [0, "x", 0], [0, 0, 1]]}, "found 'x'"),
         ({"inertia": [[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]}, r"found 0.1 at \[1\]\[2\] and 0 at"),

@@ -386,7 +386,7 @@ def test_defaults_are_filled_in_and_bounds_kept(tmp_path: Path) -> None:
 
 
 def test_unknown_type_says_how_to_make_it_known() -> None:
-    with pytest.raises(mstmm.SceneError, match='there is no hinge type "mine"'):
+    with pytest.raises(mstmm.SceneError, match='unknown hinge type "mine"'):
         mstmm.compile(mstmm.Scene(**crank({})))
 
 

@@ -44,7 +44,7 @@ def with_shape(**shape: Any) -> mstmm.Scene:
         ({"on": "hubb", "type": "sphere", "radius": 1}, 'did you mean "hub"'),
         ({"on": "hub", "type": "sphere", "radius": 1, "color": "red"}, 'such as "#4477aa"'),
         ({"on": "hub", "type": "sphere", "radius": 1, "opacity": 2}, "opacity: expected at most"),
-        ({"on": "hub", "type": "sphere", "radius": 1, "scale": 2}, "only a mesh is scaled"),
+        ({"on": "hub", "type": "sphere", "radius": 1, "scale": 2}, "only a mesh has a scale"),
         ({"on": "hub", "type": "mesh", "file": "hub.step"}, r"ending in \.stl or \.obj"),
     ],
 )

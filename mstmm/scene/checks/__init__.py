@@ -1,1 +1,1 @@
-"""What the tables of a scene say to each other."""
+"""Consistency checks between the tables of a scene."""

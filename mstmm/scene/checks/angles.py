@@ -1,4 +1,4 @@
-"""Angles of a scene that look like degrees, where radians are expected."""
+"""Warnings about angles that look like degrees where radians are expected."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def notes(scene: SceneTables) -> Iterator[Risk]:
-    """Angles of more than a turn, which are degrees more often than not."""
+    """Warnings about angles above one turn, which are usually meant in degrees."""
     for hinge in scene.hinge:
         yield from _of_hinge(f'hinge "{hinge.name}"', hinge)
     for chain in scene.chain:

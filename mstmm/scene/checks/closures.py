@@ -1,4 +1,4 @@
-"""Rows of what closes a loop: cut hinges, constraints, couplings."""
+"""Constraint rows of loop closures: cut hinges, constraints, couplings."""
 
 from __future__ import annotations
 
@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 
 
 def rows_of(hinge: HingeTable) -> int:
-    """Rows of a hinge where it is cut: 6 less its coordinates, and one for each coordinate that is
-    driven or carries rotor inertia.  A user's type that nobody has defined yet counts as a pin."""
+    """Number of constraint rows of a hinge if it is cut.
+
+    These are 6 less its coordinates, plus one for each coordinate that is driven or carries rotor
+    inertia.  A user-defined type counts as a pin until its definition is loaded.
+    """
     speeds = 1 if hinge.facts is None else len(hinge.facts.speeds)
     drive, inertia = hinge.drive or (), hinge.law.inertia
     own = sum(any(drive[k : k + 1]) or any(inertia[k : k + 1]) for k in range(speeds))
@@ -24,7 +27,7 @@ def rows_of(hinge: HingeTable) -> int:
 
 
 def rows_of_closures(scene: SceneTables) -> Iterator[Rows]:
-    """The rows of the scene's constraints, then those of its couplings, between its bodies."""
+    """Row groups of the constraints of a scene, then those of its couplings."""
     for constraint in scene.constraint:
         yield _rows(scene, (constraint.from_, constraint.to), constraint.rows)
     for coupling in scene.coupling:
@@ -35,9 +38,9 @@ def rows_of_closures(scene: SceneTables) -> Iterator[Rows]:
 
 
 def coordinate(scene: SceneTables, name: Name) -> tuple[int, str, int]:
-    """(hinge, "q" or "u", entry) that a name in a coupling stands for: `arm.q`, `arm.q[1]`,
-    `arm.u`, or a coordinate by its own name, `arm.angle`.
+    """Resolve a name in a coupling to (hinge number, "q" or "u", entry).
 
+    The name is `arm.q`, `arm.q[1]`, `arm.u`, or a coordinate by its own name, `arm.angle`.  Raises
     KeyError where the scene has no such hinge, ValueError where the hinge has no such entry.
     """
     hinge = scene.hinges.find(name.hinge)
@@ -51,6 +54,6 @@ def coordinate(scene: SceneTables, name: Name) -> tuple[int, str, int]:
 
 
 def _rows(scene: SceneTables, ends: Sequence[str], count: int) -> Rows:
-    """Rows between ends of bodies, the ground among them."""
+    """Row group between ends of bodies or the ground."""
     bodies = (scene.bodies.find(split(end)[0]) for end in ends)
     return Rows(tuple(GROUND if body is None else body for body in bodies), count)

@@ -1,4 +1,4 @@
-"""Constraints: whether a curve can be followed, and constraints among each other."""
+"""Checks of constraints: smooth curves, and no constraint twice."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def problems(scene: SceneTables) -> Iterator[Problem]:
-    """Everything for which a constraint is no row, or none of its own."""
+    """Problems of constraints: curves that cannot be followed, and duplicates."""
     for i, constraint in enumerate(scene.constraint):
         if constraint.curve is not None:
             yield from _curve(constraint.curve, constraint.start or 0.0, ("constraint", i, "curve"))
@@ -31,15 +31,15 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
 def _curve(
     curve: tuple[Expression, ...], start: float, place: Location
 ) -> Iterator[tuple[Location, str]]:
-    """A curve that does not go by s alone, bends sharply, or has no direction where it starts."""
+    """Problems of a curve: other names than s, kinks, or no direction at its start."""
     slopes = []
     for k, entry in enumerate(curve):
         others = [name.text for name in entry.names if name.text != "s"]
         switch = switching(entry, {"s"})
         if others:
-            yield (*place, k), f"a curve goes by s alone, found {others[0]!r}; leave that out"
+            yield (*place, k), f"expected a function of s only, found {others[0]!r}; leave it out"
         elif switch:
-            yield (*place, k), f"it has no slope where {switch!r} switches; write it without"
+            yield (*place, k), f"no derivative where {switch!r} switches; use a smooth expression"
         else:
             try:
                 at = _at(entry, start)
@@ -50,30 +50,30 @@ def _curve(
             if not all(map(math.isfinite, at)):
                 yield (
                     (*place, k),
-                    f"{found(entry.text)} or one of its first two slopes is not finite at s = "
-                    f"{start:g}; begin elsewhere, with start",
+                    f"{found(entry.text)} or one of its first two derivatives is not finite at "
+                    f"s = {start:g}; set start to another value",
                 )
     if len(slopes) == len(curve) and not any(slopes):
-        yield place, f"it stands still at s = {start:g}, so it has no direction; begin elsewhere"
+        yield place, f"all derivatives are 0 at s = {start:g}; set start to another value"
 
 
 def _at(entry: Expression, start: float) -> list[float]:
-    """An expression of s and its first two slopes."""
+    """Value of an expression of s and its first two derivatives at the start."""
     s = Graph().element("s")
     return [value(node, lambda _: start) for node in motion(entry, s, lambda _: s)]
 
 
 def _repeated(scene: SceneTables) -> Iterator[Problem]:
-    """Constraints between the same points for the second time."""
+    """Problems of constraints that repeat an earlier one."""
     seen: dict[tuple[object, ...], int] = {}
     for i, constraint in enumerate(scene.constraint):
         first = seen.setdefault(_same(constraint), i)
         if first != i:
-            yield ("constraint", i), f"constraint number {first + 1} says the same; leave one out"
+            yield ("constraint", i), f"repeats constraint number {first + 1}; leave one out"
 
 
 def _same(one: Constraint) -> tuple[object, ...]:
-    """What two constraints have in common that ask for the same, or contradict each other."""
+    """Key that is equal for constraints which repeat or contradict each other."""
     ends = (one.from_, one.to)
     kept = tuple(sorted(ends)) if one.type == DISTANCE else ends
     curve = tuple(entry.text for entry in one.curve or ())

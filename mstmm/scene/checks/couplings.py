@@ -1,5 +1,4 @@
-"""Couplings: what they name, whether it can be differentiated, and whether anything is left to
-couple."""
+"""Checks of couplings: defined names, differentiable expressions, free coordinates."""
 
 from __future__ import annotations
 
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def problems(scene: SceneTables) -> Iterator[Problem]:
-    """Everything for which a coupling is no row, as far as the types of its hinges are known."""
+    """Problems of couplings, as far as the types of their hinges are defined."""
     seen: dict[str, int] = {}
     for i, coupling in enumerate(scene.coupling):
         place: Location = ("coupling", i, coupling.key)
@@ -37,11 +36,11 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
         yield from _right_side(coupling, ("coupling", i, "equals"))
         first = seen.setdefault(coupling.row.text.replace(" ", ""), i)
         if first != i:
-            yield place, f"coupling number {first + 1} couples the same; leave one out"
+            yield place, f"repeats coupling number {first + 1}; leave one out"
 
 
 def _are_known(scene: SceneTables, coupling: Coupling) -> bool:
-    """Whether all types of its hinges have been defined."""
+    """Whether the types of all hinges of a coupling are defined."""
     return all(scene.hinges.by_name[name.hinge].facts is not None for name in coupling.names)
 
 
@@ -52,7 +51,7 @@ def _right_side(coupling: Coupling, place: Location) -> Iterator[Problem]:
     others = [name for name in equals.names if name.text != "t"]
     if others:
         named = f"{others[0].text!r}{around(equals.text, others[0])}"
-        yield place, f"it depends on t alone, found {named}; write that in the coupling"
+        yield place, f"expected a function of t only, found {named}; move it to the coupling"
     else:
         yield from unsmooth(equals, place)
 
@@ -61,23 +60,23 @@ def _right_side(coupling: Coupling, place: Location) -> Iterator[Problem]:
 
 
 def _unknown(scene: SceneTables, name: Name, key: str) -> str | None:
-    """Why a name means no coordinate and no speed; None where it means one."""
+    """Message about a name that is no coordinate or speed of a hinge; None for others."""
     if name.text == "t" or name.text in scene.channels:
-        return f"{name.text!r} is no coordinate of a hinge; what goes by time belongs to equals"
+        return f"{name.text!r} is no coordinate of a hinge; write functions of time in equals"
     if len(name.parts) == 1:
         return f"{name.text!r} is no coordinate; write the name of a hinge and .q or .u"
     if name.owner in flexible(scene):
-        return f"{name.text!r} is no coordinate of a hinge, and couplings are of hinges alone"
+        return f"{name.text!r} is no coordinate of a hinge; couplings accept only those of hinges"
     number = scene.hinges.find(name.hinge)
     if number is None:
         return scene.hinges.missing(name.hinge, repr(name.hinge))
     if key == "expression" and name.quantity == "u":
-        return f"{name.text!r} is a speed; write speeds in place of expression"
+        return f"{name.text!r} is a speed; use speeds in place of expression"
     return _no_entry(scene.hinges[number], name, key)
 
 
 def _no_entry(hinge: Hinge, name: Name, key: str) -> str | None:
-    """Why a hinge has no such coordinate or speed."""
+    """Message about a coordinate or speed that a hinge does not have; None for others."""
     facts = hinge.facts
     if facts is None:
         return None
@@ -90,13 +89,13 @@ def _no_entry(hinge: Hinge, name: Name, key: str) -> str | None:
             return problem
     elif name.quantity not in own or name.index is not None:
         known = "".join(f", {hinge.name}.{one}" for one in own)
-        return f"{name.text!r} is unknown; of this hinge there is {hinge.name}.q{known}"
+        return f"{name.text!r} is unknown; this hinge has {hinge.name}.q{known}"
     else:
         entry = own.index(name.quantity)
     first = facts.quaternion
     if key == "expression" and first is not None and first <= entry < first + 4:
         return (
-            f"{name.text!r} is an entry of a quaternion, which is no angle; use universal or "
+            f"{name.text!r} is an entry of a quaternion, not an angle; use universal or "
             "gimbal hinges, or couple speeds"
         )
     return None
@@ -106,40 +105,43 @@ def _no_entry(hinge: Hinge, name: Name, key: str) -> str | None:
 
 
 def _no_row(scene: SceneTables, coupling: Coupling) -> Iterator[str | None]:
-    """Why an expression of coordinates and speeds that there are gives no row."""
+    """Reasons why an expression of existing coordinates and speeds gives no constraint row."""
     row, names = coupling.row, coupling.names
     kept = [name for name in names if coupling.expression is not None or name.quantity == "u"]
     switch = switching(row, {name.text for name in names})
     if switch:
-        yield f"it has no slope where {switch!r} switches; write it without"
+        yield f"no derivative where {switch!r} switches; use a smooth expression"
         return
     if not kept:
-        yield f"{found(row.text)} names no speed, as in cart.u; write expression in place of speeds"
+        yield f"{found(row.text)} has no speed, as in cart.u; use expression in place of speeds"
         return
     ways, rest = parted(row, kept)
     idle = [name.text for name, way in zip(kept, ways, strict=True) if way is None]
     if idle:
-        yield f"it does not change with {idle[0]!r}; leave that out"
+        yield f"{idle[0]!r} has no effect; leave it out"
     if coupling.speeds is not None and any(set(way or ()) & set(kept) for way in ways):
-        yield "it is not linear in the speeds; write a sum of speeds times what is none"
+        yield "not linear in the speeds; write a sum of speeds with factors that contain none"
     elif coupling.speeds is not None and rest:
-        yield "it has a part without speeds; write that in equals"
+        yield "a term has no speed; move it to equals"
     else:
         yield _no_slope(scene, row, kept)
         yield _all_driven(scene, kept)
 
 
 def _no_slope(scene: SceneTables, row: Expression, kept: Collection[Name]) -> str | None:
-    """A row that is not finite at the start, or does not change there with any of what it keeps."""
+    """Message about a row that is not finite or has no derivatives at the start."""
     known = {name: _start(scene, name) for name in row.names}
     found = slopes(row, known.__getitem__)
     at = ", ".join(f"{name.text} = {known[name]:g}" for name in row.names[:4])
     if not all(map(math.isfinite, (row.evaluate(known.__getitem__), *found.values()))):
-        return f"it or one of its slopes is not finite at the start ({at}); start elsewhere"
+        return (
+            f"the expression or one of its derivatives is not finite at the start ({at}); use "
+            "another initial state"
+        )
     if not any(found[name] for name in kept):
         return (
-            f"all of its slopes are 0 at the start ({at}), so nothing tells which way it goes; "
-            "start beside, or write what it keeps without the square"
+            f"all derivatives are 0 at the start ({at}), so the direction of motion is undefined; "
+            "use another initial state, or an expression without the square"
         )
     return None
 
@@ -157,7 +159,7 @@ def _start(scene: SceneTables, name: Name) -> float:
 
 
 def _all_driven(scene: SceneTables, names: list[Name]) -> str | None:
-    """A coupling of driven coordinates alone; one that is let go is driven no longer."""
+    """Message about a coupling of driven coordinates only; released hinges are not driven."""
     let_go = {event.hinge for event in scene.event}
     for name in names:
         number, _, entry = coordinate(scene, name)
@@ -165,4 +167,4 @@ def _all_driven(scene: SceneTables, names: list[Name]) -> str | None:
         if hinge.lets_go or hinge.name in let_go or not any((hinge.drive or ())[entry : entry + 1]):
             return None
     which = " and ".join(dict.fromkeys(name.text for name in names))
-    return f"a drive says already how {which} goes; leave one drive or the coupling out"
+    return f"drives already prescribe {which}; leave out one drive or the coupling"

@@ -1,4 +1,4 @@
-"""Flexible bodies among the other elements of a scene: loads per length, hinges, frames, bases."""
+"""Checks of flexible bodies: loads per length, spin, slenderness, frames and shape bases."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ Problem = tuple[Location, str]
 
 #: Length over height of the section below which shear and rotary inertia are no longer small.
 SLENDER = 10.0
-#: A direction counts as free to turn about when so much of it lies among the axes of the hinge.
+#: Least component of a direction along the hinge axes for which it counts as free to rotate.
 _MOSTLY = 0.7
 _ALONG: Vector = (1.0, 0.0, 0.0)
-#: Direction of deflection -> axis about which the beam turns with it.
+#: Direction of deflection -> axis of the rotation that goes with it.
 _TURNS: dict[str, Vector] = {"y": (0.0, 0.0, 1.0), "z": (0.0, 1.0, 0.0)}
 _AXES: tuple[Vector, ...] = (_ALONG, (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _CF, _FF, _SS = "clamped-free", "free-free", "simply-supported"
@@ -35,7 +35,7 @@ _CF, _FF, _SS = "clamped-free", "free-free", "simply-supported"
 
 
 def problems(scene: SceneTables) -> Iterator[Problem]:
-    """Everything in which flexible bodies and other elements do not fit each other."""
+    """Problems of flexible bodies with other elements of the scene."""
     beams = {beam.name: beam for beam in scene.beam}
     for i, load in enumerate(scene.load):
         if load.force_per_length is None:
@@ -43,8 +43,8 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
         beam = beams.get(load.on)
         if beam is None:
             if scene.skeleton.bodies.find(load.on) is not None:
-                message = f'"{load.on}" is no beam, and a load per length acts on beams alone; '
-                yield ("load", i, "on"), message + "write force at one of its ends"
+                message = f'"{load.on}" is no beam; force_per_length acts only on beams; '
+                yield ("load", i, "on"), message + "use force at one of its ends"
             continue
         if load.span is not None and load.span[1] > beam.length * (1 + 1e-9):
             yield (
@@ -55,15 +55,15 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
         if load.name in beam.ends:
             yield (
                 ("load", i, "name"),
-                f'"{load.name}" is also an end of the beam "{beam.name}"; name the load otherwise',
+                f'"{load.name}" is also an end of the beam "{beam.name}"; rename the load',
             )
 
 
-# --- what hinges leave free -----------------------------------------------------------------------
+# --- free rotation axes of hinges -----------------------------------------------------------------
 
 
 def spins(scene: SceneTables) -> Iterator[Problem]:
-    """Beams without inertia about their axis where a hinge lets them spin about it."""
+    """Problems of beams that can spin about their axis but have no inertia about it."""
     carriers = {name for name, _ in _carried(scene)}
     released = {hinge.name for hinge in scene.hinge if hinge.lets_go}
     released |= {event.hinge for event in scene.event if event.hinge is not None}
@@ -80,21 +80,21 @@ def spins(scene: SceneTables) -> Iterator[Problem]:
         if held and all(_spins(beam, hinge, hinge.name in released) for hinge in held):
             yield (
                 ("beam", i, "polar_inertia_per_length"),
-                f'missing; hinge "{held[0].name}" lets the beam spin about its axis and nothing '
-                "resists it; expected rho I_p in kg m, more than 0, or rotary_inertia, or "
-                "another hinge",
+                f'missing; hinge "{held[0].name}" allows the beam to spin about its axis, about '
+                "which it has no inertia; expected rho I_p in kg m, more than 0, or "
+                "rotary_inertia, or another hinge",
             )
 
 
 def _spins(beam: Beam, hinge: Hinge, released: bool) -> bool:
-    """Whether a hinge lets a beam spin about its axis, its mass not resisting."""
+    """Whether a hinge allows a beam to spin about its axis without moving its mass."""
     free = _share(beam, hinge, _ALONG, released) > 1 - 1e-9
     slid = hinge.facts is not None and set(hinge.facts.turns) & set(hinge.facts.slides)
-    return free and not slid  # what slides as it turns is resisted by the mass
+    return free and not slid  # a screw also moves the mass along the axis
 
 
 def _carried(scene: SceneTables) -> Iterator[tuple[str, str]]:
-    """(body, end) of everything that a hinge or chain hangs on."""
+    """Inboard (body, end) of every hinge and chain."""
     for hinge in scene.hinge:
         yield split(hinge.inboard)
     for chain in scene.chain:
@@ -102,8 +102,11 @@ def _carried(scene: SceneTables) -> Iterator[tuple[str, str]]:
 
 
 def free_axes(hinge: Hinge, released: bool = False) -> tuple[Vector, ...]:
-    """Unit axes, in the axes of the outboard end at q = 0, about which a hinge turns and is not
-    driven, or, with `released`, turns once it is let go; none for a type that is not known."""
+    """Unit axes of free rotation of a hinge, in the axes of the outboard end at q = 0.
+
+    Driven coordinates count as fixed, except with `released`: then a fixed hinge has all axes.  A
+    type that is not defined has none.
+    """
     if released and hinge.is_weld:
         return _AXES
     drive = () if released else hinge.drive or ()
@@ -118,13 +121,13 @@ def _unit(axis: Vector) -> Vector:
 
 
 def _share(beam: Beam, hinge: Hinge, direction: Vector, released: bool = False) -> float:
-    """How much of a direction of the beam its hinge leaves free to turn about: 0 to 1."""
+    """Component (0 to 1) of a direction of the beam along the free rotation axes of its hinge."""
     turn = beam.ends[hinge.outboard_end].rotation
     return _within(direction, [apply(turn, axis) for axis in free_axes(hinge, released)])
 
 
 def _within(direction: Vector, axes: list[Vector]) -> float:
-    """Length of the part of a unit vector in the span of others."""
+    """Length of the projection of a unit vector onto the span of others."""
     basis: list[Vector] = []
     for axis in axes:
         for known in basis:
@@ -141,14 +144,14 @@ def _within(direction: Vector, axes: list[Vector]) -> float:
 
 
 def risks(scene: SceneTables) -> Iterator[Risk]:
-    """What is accepted but worth knowing of flexible bodies."""
+    """Warnings about flexible bodies."""
     yield from short_beams(scene)
     for body in (*scene.beam, *scene.elastic):
         if max(body.damping.ratio) >= 1:
             ratio, name = max(body.damping.ratio), _called(scene, body.name)
             yield Risk(
-                "damping", name, f"{name}: damping: a ratio of {ratio:g} is critical or more",
-                "0.01 is 1 percent", ratio, 1.0, doubt=False, before=True,
+                "damping", name, f"{name}: damping: a ratio of {ratio:g} is critical or above",
+                "write 0.01 for 1 percent", ratio, 1.0, doubt=False, before=True,
             )  # fmt: skip
     held = holders(scene)
     for beam in scene.beam:
@@ -169,7 +172,7 @@ def _called(scene: SceneTables, name: str) -> str:
 
 
 def short_beams(scene: SceneTables) -> Iterator[Risk]:
-    """Beams that are short for their height; those welded in line are one, and named once."""
+    """Warnings about beams that are short for their height; welded lines count as one beam."""
     if not scene.beam:
         return
     lines, said = lines_of(scene), set[str]()
@@ -179,19 +182,21 @@ def short_beams(scene: SceneTables) -> Iterator[Risk]:
         if not 0 < line.length < SLENDER * height or line.first in said or beam.model == "rigid":
             continue
         said.add(line.first)
-        whole = "its length is" if line.length == beam.length else "the line it is welded into is"
+        whole = "its length is" if line.length == beam.length else "its line of welded beams is"
         yield Risk(
             "short-beam", f'beam "{beam.name}"',
             f'beam "{beam.name}": {whole} {line.length / height:.2g} times the height of the '
             f"section along {direction} ({height:.3g} m from {source}), less than {SLENDER:g}: "
-            "shear, which Euler-Bernoulli beams leave out, is not small",
+            "shear deformation, which Euler-Bernoulli beams neglect, is not small",
             "use an elastic body from a mesh", line.length / height, SLENDER, before=True,
         )  # fmt: skip
 
 
 def _heights(beam: Beam) -> Iterator[tuple[float, str, str]]:
-    """(height in m, direction, keys it comes from) of the sections, as of rectangles: sqrt(12)
-    times the radius of gyration, from rotary inertia or else from E I / E A."""
+    """Heights of the sections as if rectangular: (height in m, direction, source keys).
+
+    The height is sqrt(12) times the radius of gyration, from rotary inertia or else from E I / E A.
+    """
     for piece in beam.sections:
         rotary, bending = piece.rotary_inertia, piece.bending_stiffness
         for k, direction in enumerate(("z", "y")):
@@ -210,7 +215,7 @@ def _bends(beam: Beam, direction: str) -> bool:
 
 
 def _loose_frame(beam: Beam, hinge: Hinge) -> Iterator[Risk]:
-    """A tangent frame at an end that its hinge leaves free to turn."""
+    """Warning about a tangent frame at an end that its hinge leaves free to rotate."""
     at = hinge.outboard_end
     if beam.frame_kind != "tangent" or beam.frame_end not in ("", at) or beam.quadrature:
         return
@@ -224,13 +229,13 @@ def _loose(body: str, hinge: Hinge) -> Risk:
     return Risk(
         "frame", body,
         f'{body}: frame: a tangent frame at "{hinge.outboard_end}", which hinge "{hinge.name}" '
-        "leaves free to turn, keeps little inertia there: the more shapes, the smaller the steps",
-        'write frame = "auto"', doubt=False, before=True,
+        "leaves free to rotate, has little inertia there: more shapes need smaller steps",
+        'use frame = "auto"', doubt=False, before=True,
     )  # fmt: skip
 
 
 def _weak_basis(scene: SceneTables, beam: Beam) -> Iterator[Risk]:
-    """A basis asked for by name whose shapes have no bending moment where a hinge carries one."""
+    """Warning about a basis whose shapes have no bending moment where a hinge carries one."""
     if beam.basis not in (_CF, _FF, _SS):
         return
     slack = 1e-9 * beam.length
@@ -246,14 +251,14 @@ def _weak_basis(scene: SceneTables, beam: Beam) -> Iterator[Risk]:
                     "basis", f'beam "{beam.name}"',
                     f'beam "{beam.name}": basis: {beam.basis} shapes have no bending moment at '
                     f'"{at}", but hinge "{hinge.name}" carries one there, so that they converge '
-                    "slowly", 'write basis = "static+fixed-interface" or "auto"', doubt=False,
+                    "slowly", 'use basis = "static+fixed-interface" or "auto"', doubt=False,
                     before=True,
                 )  # fmt: skip
                 return
 
 
 def _carries_moment(beam: Beam, hinge: Hinge, at: str, outboard: bool) -> bool:
-    """Does a hinge hold the section against turning in a plane in which the beam bends?"""
+    """Whether a hinge constrains the rotation of the section in a plane in which the beam bends."""
     if hinge.facts is None:
         return False
     turn = beam.ends[at].rotation

@@ -1,4 +1,4 @@
-"""Forces that act where a body turns about, and so move nothing."""
+"""Warnings about forces that act at a pivot and therefore have no effect."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 #: Distances below this part of a body's own are rounding.
 _ROUNDING = 1e-12
-#: Bodies between a load and the ground that are looked at.
+#: Most bodies between a load and the ground that are checked.
 _DEEPEST = 20
 
 
 def risks(scene: SceneTables) -> Iterator[Risk]:
-    """Loads whose force acts at a point of a moving body that stands still in any motion."""
+    """Warnings about loads whose point is at rest in every motion of the body."""
     if not scene.load:
         return
     held: dict[str, list[Hinge]] = {}
@@ -37,16 +37,15 @@ def risks(scene: SceneTables) -> Iterator[Risk]:
             body = split(load.on)[0]
             yield Risk(
                 "idle-load", f'load "{load.name}"',
-                f'load "{load.name}" acts where "{body}" turns about (hinge "{pivot.name}"): its '
-                "force moves nothing",
-                f'name an end of the body, or write at = "{MASS_CENTER}"',
+                f'load "{load.name}" acts at the pivot of "{body}" (hinge "{pivot.name}"): its '
+                "force has no effect",
+                f'apply it at an end of the body, or use at = "{MASS_CENTER}"',
                 doubt=False, before=True,
             )  # fmt: skip
 
 
 def _pivot_of(load: Load, scene: SceneTables, held: Mapping[str, list[Hinge]]) -> Hinge | None:
-    """The hinge about which the body turns where the force acts; None where that point moves, or
-    where nothing moves."""
+    """Hinge that keeps the point of a load at rest; None where it moves, or nothing moves."""
     name, end = split(load.on)
     bodies, hinges = scene.bodies.by_name, scene.hinges.by_name
     pushed = any(not entry.is_zero for entry in load.force)
@@ -74,14 +73,14 @@ def _pivot_of(load: Load, scene: SceneTables, held: Mapping[str, list[Hinge]]) -
 
 
 def _arm(hinge: Hinge, body: Body, point: Vector) -> Vector:
-    """A point of the outboard body from the hinge, in the axes of its end."""
+    """Vector from the hinge to a point of the outboard body, in the axes of its end."""
     end = split(hinge.outboard)[1]
     (a, b, c), (x, y, z) = point, body.end_position(end)
     return apply(transpose(body.end_rotation(end)), (a - x, b - y, c - z))
 
 
 def _keeps(hinge: Hinge, body: Body, point: Vector) -> bool:
-    """Whether a hinge turns its outboard body about a point and does not move that."""
+    """Whether a hinge only rotates its outboard body about a given point."""
     facts, motions = hinge.facts, start_motion(hinge)
     if facts is None or motions is None or hinge.lets_go:
         return False
@@ -95,7 +94,7 @@ def _keeps(hinge: Hinge, body: Body, point: Vector) -> bool:
 
 
 def _seen_inboard(hinge: Hinge, bodies: Mapping[str, Body], point: Vector) -> Vector:
-    """The point in the axes of the inboard body, where the hinge does not move it."""
+    """Position in the inboard body of a point that the hinge does not move."""
     inboard, end = bodies[hinge.inboard_body], split(hinge.inboard)[1]
     arm = _arm(hinge, bodies[hinge.outboard_body], point)
     turned = apply(product(inboard.end_rotation(end), hinge.rotation), arm)

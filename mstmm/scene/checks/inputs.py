@@ -1,4 +1,4 @@
-"""Inputs, signals and outputs of a scene: their names, who follows which, which nobody uses."""
+"""Checks of inputs, signals, outputs and controllers: names, references, unused inputs."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 _WORDS = {"input": "an input", "signal": "a signal", "output": "an output",
           "controller": "a controller"}  # fmt: skip
 
-#: Quantities of results that belong to no body and no hinge.
+#: Quantities of results that belong to no body or hinge.
 OF_SCENE = ("energy", "power", "work", "momentum", "angular_momentum")
 
 
 def problems(scene: SceneTables) -> Iterator[Problem]:
-    """Names that mean something else already, and signals that are not there."""
+    """Problems of names with another meaning, and of missing signals and inputs."""
     taken = dict.fromkeys(scene.constants, "a constant")
     for table, word in _WORDS.items():
         for i, element in enumerate(getattr(scene, table)):
@@ -58,17 +58,19 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
             if name in scene.constants or name in scene.channels:
                 yield (
                     (*place, "parameters"),
-                    f'"{name}" is also the name of {taken[name]} of the scene; rename that',
+                    f'"{name}" is also the name of {taken[name]} of the scene; rename the latter',
                 )
 
 
 def _taken(name: str) -> str:
-    return f'"{name}" is a quantity of every result; choose another name'
+    return f'"{name}" is reserved for a quantity of results; choose another name'
 
 
 def _outputs(scene: SceneTables) -> Iterator[Problem]:
-    """Outputs whose components could be mistaken for quantities of others, and outputs of outputs.
-    Whether there are such quantities results know."""
+    """Problems of outputs with ambiguous names, and of outputs of outputs.
+
+    Whether the quantities of outputs exist is checked by results.
+    """
     outputs = {output.name for output in scene.output}
     owners = {body.name for body in scene.skeleton.body} | {hinge.name for hinge in scene.hinge}
     owners |= {chain.name for chain in scene.chain}
@@ -84,13 +86,15 @@ def _outputs(scene: SceneTables) -> Iterator[Problem]:
             yield ("output", i, "name"), problem
         for name in output.of.names:
             if name.parts[0] in outputs:
-                problem = f'"{name.text}" is an output itself; write what it is of'
+                problem = f'"{name.text}" is an output; write its expression instead'
                 yield ("output", i, "of"), problem
 
 
 def _controllers(scene: SceneTables) -> Iterator[Problem]:
-    """Controllers that set what is no input, what drives, or what another one sets.  Whether what
-    they measure can be measured the engine knows."""
+    """Problems of controller outputs: no input, an input of a drive, or one set twice.
+
+    Whether the measured quantities exist is checked by the engine.
+    """
     setting: dict[str, str] = {}
     inputs = [one.name for one in scene.input]
     driving = {
@@ -106,13 +110,16 @@ def _controllers(scene: SceneTables) -> Iterator[Problem]:
             if name not in inputs:
                 yield place, f'there is no input "{name}"{near(name, inputs)}'
             elif name in driving:
-                yield place, f'"{name}" drives a hinge, whose motion would jump; push instead'
+                yield (
+                    place,
+                    f'"{name}" drives a hinge, whose motion would jump; use an effort or a load',
+                )
             elif other != one.name:
                 yield place, f'"{name}" is set by controller "{other}" already'
 
 
 def drives(scene: SceneTables) -> Iterator[Problem]:
-    """Inputs that drives cannot follow: without rates, or not finite at the start."""
+    """Problems of drives with inputs: switches, inputs without rates, or no finite start."""
     inputs = {one.name: one for one in scene.input}
     for kind, place, table in tables(scene):
         drive = table.drive if kind == "hinge" else None
@@ -122,27 +129,27 @@ def drives(scene: SceneTables) -> Iterator[Problem]:
             at: Location = (*place, "drive", k)
             unknown = [name.text for name in entry.names if name.text not in scene.channels]
             if [name for name in unknown if name != "t"]:
-                continue  # the hinge's own check has said so
+                continue  # reported by the check of the hinge
             still = [n.text for n in entry.names if _has_no_rates(inputs.get(n.text))]
             switch = switching(entry, scene.channels)
             if switch:
                 yield (
                     at,
-                    f"a drive cannot switch with an input, found {switch!r}; let the input go the "
-                    "whole way that is meant",
+                    f"a drive cannot switch with an input, found {switch!r}; give the whole motion "
+                    "in the input",
                 )
             elif still:
                 yield (
                     at,
-                    f"a drive needs the rates of the input {still[0]!r}; declare them there, as in "
-                    "rates = [0, 0], or let it follow a signal",
+                    f"a drive needs the rates of the input {still[0]!r}; give them there, as in "
+                    "rates = [0, 0], or use a signal as its value",
                 )
             else:
                 yield from _start(scene, entry, at)
 
 
 def switching(entry: Expression, names: Collection[str]) -> str:
-    """The first term that switches with one of these names; "" where there is none."""
+    """Text of the first term that switches with one of these names, or ""."""
     follows = set[int]()
     for number, term in enumerate(entry.terms):
         if term.name is not None and term.name.text in names:
@@ -168,20 +175,25 @@ def _start(scene: SceneTables, entry: Expression, at: Location) -> Iterator[Prob
         yield (
             at,
             f"{found(entry.text)} or one of its first two derivatives is not finite at t = 0; "
-            "begin with a smooth motion",
+            "start with a smooth motion",
         )
 
 
 def users(scene: SceneTables) -> Iterator[tuple[str, str]]:
-    """(name, who names it) of inputs and signals, each as often as it is named; of signals that
-    inputs follow the input, else ""."""
+    """References to inputs and signals: (name, input that follows the signal or "").
+
+    A name occurs as often as it is referenced.
+    """
     for one in (*expressions(scene), *(output.of for output in scene.output)):
         yield from ((name.text, "") for name in one.names)
     yield from ((one.value, one.name) for one in scene.input if isinstance(one.value, str))
 
 
 def risks(scene: SceneTables) -> list[Risk]:
-    """Inputs and signals that nobody uses; signals beside inputs wait for these to follow them."""
+    """Warnings about unused inputs, or about unused signals where there are no inputs.
+
+    Signals of a scene with inputs are available as values of these.
+    """
     if not (scene.input or scene.signal):
         return []
     used = {name for name, _ in users(scene)}
@@ -192,15 +204,15 @@ def risks(scene: SceneTables) -> list[Risk]:
                 name = f'{table} "{element.name}"'
                 found_risks.append(
                     Risk(
-                        "unused-input", name, f"{name}: nobody uses it",
-                        "name it in an expression, or take it out", doubt=False, before=True,
+                        "unused-input", name, f"{name} is not used",
+                        "use it in an expression, or remove it", doubt=False, before=True,
                     )
                 )  # fmt: skip
     return found_risks
 
 
 def expressions(scene: SceneTables) -> Iterator[Expression]:
-    """Every expression that may name inputs."""
+    """Yield every expression that may contain inputs."""
     for kind, _, table in tables(scene):
         if kind == "hinge":
             yield from table.law.effort

@@ -1,4 +1,4 @@
-"""The graph of a scene: what holds what, chains as one, and with every body for itself."""
+"""Connectivity graph of a scene, with chains as single nodes or with every body separate."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
 
 class Joints:
-    """Nodes are the scene's bodies, then its chains; edges its hinges, then the chains' first."""
+    """Graph of a scene: nodes are bodies, then chains; edges are hinges, then those of chains.
+
+    The edge of a chain is its first hinge.
+    """
 
     def __init__(self, scene: SceneTables) -> None:
         self.scene = scene
@@ -26,7 +29,7 @@ class Joints:
         self.outboard += range(len(scene.body), self.nodes)
 
     def holder(self, edge: int) -> tuple[int, int]:
-        """(node on which an edge hangs, member of it where it is a chain); -1: the ground."""
+        """Inboard end of an edge: (node or -1 for the ground, member of it if it is a chain)."""
         name = split(self.inboard[edge])[0]
         known = self.index.get(name)
         if known is not None:
@@ -35,24 +38,24 @@ class Joints:
         return (GROUND, 0) if place is None else (len(self.index) + place[0], place[1])
 
     def place(self, edge: int) -> tuple[str, int]:
-        """Table and number of an edge."""
+        """Table and index of an edge in the scene."""
         hinges = len(self.scene.hinge)
         return ("hinge", edge) if edge < hinges else ("chain", edge - hinges)
 
     def name(self, node: int) -> str:
-        """What a message calls a node."""
+        """Name of a node for messages."""
         bodies = len(self.scene.body)
         return self.scene.body[node].name if node < bodies else self.scene.chain[node - bodies].name
 
     def edge_name(self, edge: int) -> str:
-        """What a message calls an edge."""
+        """Name of an edge for messages."""
         table, number = self.place(edge)
         name: str = getattr(self.scene, table)[number].name
         return f"{name}[0].hinge" if table == "chain" else name
 
     @property
     def by_nodes(self) -> Mechanism:
-        """The nodes and edges; enough to see whether there is a tree."""
+        """Mechanism of nodes and edges, sufficient to find out whether there is a tree."""
         cuts = [hinge.cut for hinge in self.scene.hinge]
         return Mechanism(self.nodes, tuple(
             Edge(self.holder(edge)[0], node, 0, cuts[edge] if edge < len(cuts) else None)
@@ -60,7 +63,7 @@ class Joints:
         ))  # fmt: skip
 
     def by_bodies(self) -> Mechanism:
-        """Every body and hinge by its number in the scene, with the rows of all closures."""
+        """Mechanism of all bodies and hinges by scene number, with the rows of all closures."""
         return Mechanism(
             len(self.scene.bodies), tuple(self._edges()), tuple(rows_of_closures(self.scene))
         )
@@ -76,7 +79,7 @@ class Joints:
                 yield Edge(inboard, first + k, 0, cut=False)
 
     def body(self, edge: int) -> int:
-        """Number of the body on which an edge hangs, -1 for the ground."""
+        """Scene number of the inboard body of an edge, -1 for the ground."""
         node, member = self.holder(edge)
         bodies = len(self.scene.body)
         return node if node < bodies else self.scene.bodies.starts[node - bodies] + member

@@ -1,4 +1,4 @@
-"""What a name in an expression refers to."""
+"""Checks of names in expressions against the elements of a scene."""
 
 from __future__ import annotations
 
@@ -16,30 +16,29 @@ if TYPE_CHECKING:
     from ..tables.members import Bodies, Hinges
 
 
-#: Names of the modal coordinates of a flexible body; None where they are not known before it is
-#: compiled.
+#: Names of the modal coordinates of a flexible body; None where only compilation determines them.
 Modal = tuple[str, ...] | None
 
 
 def flexible(scene: SceneTables) -> dict[str, Modal]:
-    """The modal coordinates of every flexible body by its name."""
+    """Names of the modal coordinates of every flexible body, by its name."""
     beams: dict[str, Modal] = {beam.name: beam.mode_names for beam in scene.beam}
     return beams | {elastic.name: None for elastic in scene.elastic}
 
 
-#: Of a point on a curve: where along it, and how fast.
+#: Quantities of a point on a curve: curve parameter and its rate.
 ALONG = ("s", "s_rate")
 POSITIONS = ("x", "y", "z", "vx", "vy", "vz")
 
 
 @dataclass(frozen=True)
 class Scope:
-    """Names an expression may use.
+    """Names that an expression may use.
 
-    `own` is the hinge whose `q`, `u` and parameters need no prefix, `spring` means that `q` and
-    `u` are a length and its rate, `positions` allows x, y, z, vx, vy, vz of bodies and ends.
-    `flexible` are the flexible bodies by name, whose q and u are the modal coordinates; `inputs`
-    are the names of inputs and signals, `curves` of constraints to a curve.
+    `own` is the hinge whose `q`, `u` and parameters need no prefix.  With `spring`, `q` and `u` are
+    a length and its rate.  `positions` allows x, y, z, vx, vy, vz of bodies and ends.  `flexible`
+    are the flexible bodies by name, whose q and u are the modal coordinates.  `inputs` are the
+    names of inputs and signals, `curves` those of point-on-curve constraints.
     """
 
     hinges: Hinges
@@ -53,7 +52,7 @@ class Scope:
 
 
 def problem_with(name: Name, scope: Scope) -> str | None:
-    """Why the name means nothing in this scope; None where it means something."""
+    """Message about a name that is undefined in this scope; None for defined names."""
     if len(name.parts) == 1:
         return _bare(name, scope)
     if name.owner in scope.curves:
@@ -68,9 +67,9 @@ def problem_with(name: Name, scope: Scope) -> str | None:
     if name.quantity in POSITIONS:
         return _position(name, scope)
     if scope.hinges.find(name.hinge) is not None:
-        return f"{name.text!r} is unknown; of a hinge there is {name.hinge}.q and {name.hinge}.u"
+        return f"{name.text!r} is unknown; a hinge has {name.hinge}.q and {name.hinge}.u"
     if scope.positions and scope.bodies.find(name.owner) is not None:
-        return f"{name.text!r} is unknown; of a body or end there is x, y, z, vx, vy, vz"
+        return f"{name.text!r} is unknown; a body or end has x, y, z, vx, vy, vz"
     return f"{name.text!r} is unknown; write the name of a hinge and .q or .u"
 
 
@@ -78,45 +77,45 @@ def _bare(name: Name, scope: Scope) -> str | None:
     word = name.parts[0]
     parameters: Collection[str] = scope.own.parameters if scope.own is not None else ()
     if word == "t" or word in parameters or word in scope.inputs:
-        return None if name.index is None else f"{word!r} is one number; leave out [{name.index}]"
+        return None if name.index is None else f"{word!r} is a scalar; leave out [{name.index}]"
     if word in ("q", "u"):
         if scope.own is not None:
             return _indexed(name, scope.own, scope.own.name)
         if scope.spring:
             return None if name.index in (None, 0) else f"{name.text!r}: a spring has one length"
-        return f"{name.text!r} needs the name of a hinge here, as in shoulder.{word}"
+        return f"{name.text!r} needs the name of a hinge, as in shoulder.{word}"
     own = ["q", "u"] if scope.own is not None or scope.spring else []
     there = ["t", *own, "pi", *parameters, *scope.inputs, *constants()]
     return f"{word!r} is unknown{near(word, there)}"
 
 
 def _modal(name: Name, modes: Modal) -> str | None:
-    """A modal coordinate or its rate: blade.q[0], blade.u[0]."""
+    """Message about an undefined modal coordinate or rate; defined are blade.q[0], blade.u[0]."""
     if len(name.parts) == 2 and name.quantity in ("q", "u"):
         if modes is None:
             if name.index is not None:
                 return None
-            return f"{name.text!r}: say which shape, as in {name.text}[0]"
+            return f"{name.text!r}: give the index of the shape, as in {name.text}[0]"
         return index_problem(name, name.owner, len(modes), "flexible body")
     if len(name.parts) == 2 and name.quantity in (modes or ()):
         place = (modes or ()).index(name.quantity)
         return f"{name.text!r} is unknown; write {name.owner}.q[{place}]"
     return (
-        f"{name.text!r} is unknown; of a flexible body there is {name.owner}.q[0], "
+        f"{name.text!r} is unknown; a flexible body has {name.owner}.q[0], "
         f"{name.owner}.u[0], and in events x, y, z, vx, vy, vz of it and its ends"
     )
 
 
 def _along(name: Name) -> str | None:
-    """A point's way along a curve: wire.s, wire.s_rate."""
+    """Message about an undefined quantity of a point on a curve, other than wire.s, wire.s_rate."""
     if len(name.parts) == 2 and name.quantity in ALONG and name.index is None:
         return None
     own = " and ".join(f"{name.owner}.{one}" for one in ALONG)
-    return f"{name.text!r} is unknown; of a point on a curve there is {own}"
+    return f"{name.text!r} is unknown; a point on a curve has {own}"
 
 
 def _indexed(name: Name, hinge: Hinge, called: str) -> str | None:
-    """Does the hinge have this coordinate?  User types are checked with their definition."""
+    """Message about a missing coordinate of a built-in hinge; others are checked by definition."""
     kind = hinge.builtin
     if kind is None:
         return None
@@ -125,7 +124,7 @@ def _indexed(name: Name, hinge: Hinge, called: str) -> str | None:
 
 
 def index_problem(name: Name, hinge: str, count: int, word: str = "hinge") -> str | None:
-    """Message if a hinge with `count` coordinates has no entry of this index."""
+    """Message about an index that a hinge with `count` coordinates does not have, or None."""
     if count == 0:
         return f'{name.text!r}: {word} "{hinge}" is fixed and has no coordinates'
     if name.index is None and count > 1:
@@ -141,11 +140,11 @@ def index_problem(name: Name, hinge: str, count: int, word: str = "hinge") -> st
 def _position(name: Name, scope: Scope) -> str | None:
     if not scope.positions:
         return (
-            f"{name.text!r}: positions and velocities of bodies are known to events and release "
-            "only; use the q and u of hinges"
+            f"{name.text!r}: positions and velocities of bodies are available only in events and "
+            "release; use q and u of hinges"
         )
     if name.index is not None:
-        return f"{name.text!r} is one number; leave out [{name.index}]"
+        return f"{name.text!r} is a scalar; leave out [{name.index}]"
     ends = scope.bodies.ends(name.owner)
     if ends is None:
         return scope.bodies.missing(name.owner, repr(name.owner))

@@ -1,4 +1,4 @@
-"""What others call the parts of a scene: is there such a part, and no other of this name?"""
+"""Checks of [names], the names of other programs: existing elements, and no ambiguity."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def problems(scene: SceneTables) -> Iterator[Problem]:
-    """Names for what is not there, and names that something else has in the scene."""
+    """Problems of names for missing elements, and of names that another element has."""
     bodies, hinges, modal = scene.skeleton.bodies, scene.hinges, flexible(scene)
     for name, one in scene.names.body.items():
         if one.endswith(".") or not _is_there(one, bodies):
@@ -33,7 +33,7 @@ def problems(scene: SceneTables) -> Iterator[Problem]:
 
 
 def _taken(name: str, what: str) -> str:
-    return f'"{name}" is the name of {what} of the scene itself; leave it out'
+    return f'"{name}" is already the name of {what} of the scene; leave it out'
 
 
 def _is_there(reference: str, bodies: Bodies) -> bool:

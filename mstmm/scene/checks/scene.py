@@ -1,4 +1,4 @@
-"""Checks across the elements of a scene: references, names in expressions, types, physics."""
+"""Consistency checks across the elements of a scene: references, names, types, physics."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def problems(scene: SceneTables) -> list[Problem]:
-    """Everything in which the elements of a scene do not fit each other."""
+    """Problems of consistency between the elements of a scene."""
     if not (scene.body or scene.chain or scene.beam or scene.elastic):
         return [(("body",), "a scene needs at least one body; add a [[body]]")]
     found = _first(_duplicates(scene), _references(scene), _inertias(scene),
@@ -40,7 +40,7 @@ def problems(scene: SceneTables) -> list[Problem]:
 
 
 def _tree(scene: SceneTables) -> Iterator[Problem]:
-    """What keeps the hinges from being a tree, each body in the table it comes from."""
+    """Problems of the spanning tree, each at the table that the body comes from."""
     firsts = (("body", 0), ("beam", len(scene.body)),
               ("elastic", len(scene.body) + len(scene.beam)))  # fmt: skip
     for (table, index, *inside), message in topology.problems(scene.skeleton):
@@ -76,9 +76,9 @@ def _duplicates(scene: SceneTables) -> Iterator[Problem]:
                 )
 
 
-#: What a message calls an element of a table.
+#: Name of an element of a table in messages.
 _WORDS = {"elastic": "an elastic body"}
-#: A body and a hinge may have the same name: what is meant is always clear.
+#: A body and a hinge may have the same name: references to them are never ambiguous.
 _APART = ({"hinge", "a body"},)
 
 
@@ -90,8 +90,8 @@ def _references(scene: SceneTables) -> Iterator[Problem]:
         if bodies.place(hinge.outboard_body) is not None:
             yield (
                 ("hinge", i, "outboard"),
-                f'"{hinge.outboard_body}" is held by the hinge of its chain; '
-                "hang other bodies on it as inboard",
+                f'"{hinge.outboard_body}" already has an inboard hinge in its chain; '
+                "use it as inboard body of this hinge",
             )
     for i, chain in enumerate(scene.chain):
         yield from _end(chain.inboard, scene, ("chain", i, "inboard"))
@@ -114,11 +114,11 @@ def _references(scene: SceneTables) -> Iterator[Problem]:
         if event.hinge not in hinges:
             yield place, f'there is no hinge "{event.hinge}"{near(event.hinge, hinges)}'
         elif not hinges[event.hinge].is_weld and hinges[event.hinge].drive is None:
-            yield place, f'"{event.hinge}" is neither driven nor fixed, so it cannot be released'
+            yield place, f'"{event.hinge}" cannot be released: it is neither driven nor fixed'
 
 
 def _end(reference: str, scene: SceneTables, place: Location) -> Iterator[Problem]:
-    """Is there such a body, and has it such an end?"""
+    """Problems of a reference: no such body, or no such end."""
     body, at = split(reference)
     if body == GROUND:
         return
@@ -131,16 +131,16 @@ def _end(reference: str, scene: SceneTables, place: Location) -> Iterator[Proble
         yield place, f'body "{body}" has no end "{at}"{way_out}'
     elif not at and body in {elastic.name for elastic in scene.elastic}:
         way_out = f'write "{body}.{next(iter(ends))}"' if ends else "give it ends"
-        yield place, f'"{body}" is an elastic body, which is met at its ends alone; {way_out}'
+        yield place, f'"{body}" is an elastic body, which connects only at its ends; {way_out}'
 
 
 def _mass_center(body: str, scene: SceneTables, place: Location) -> Iterator[Problem]:
-    """A load at the mass centre of what is no rigid body."""
+    """Problems of a load at the mass centre of a body that is not rigid."""
     flexible_ones = {one.name for one in (*scene.beam, *scene.elastic)}
     bodies = scene.skeleton.bodies
     number = bodies.find(body)
     if body in flexible_ones or (number is not None and bodies[number].type != "rigid"):
-        yield place, f'"{body}" is no rigid body, and has no mass centre of its own; name an end'
+        yield place, f'"{body}" is not rigid and has no fixed mass centre; give an end'
 
 
 def _axes(scene: SceneTables, i: int) -> Iterator[Problem]:
@@ -151,7 +151,7 @@ def _axes(scene: SceneTables, i: int) -> Iterator[Problem]:
         if known and not (load.axes == "body" == split(load.on)[0]):
             yield (
                 ("load", i, "axes"),
-                f'"{load.axes}" could also mean the body of this name; rename that body',
+                f'"{load.axes}" is ambiguous: a body has this name; rename the body',
             )
     elif not known:
         options = ["inertial", "body", *(body.name for body in scene.skeleton.body)]
@@ -159,7 +159,7 @@ def _axes(scene: SceneTables, i: int) -> Iterator[Problem]:
 
 
 def _tables(scene: SceneTables) -> Iterator[tuple[Location, str, BodyTable]]:
-    """(place, name for a message, table) of every body table, those of chains among them."""
+    """Yield (location, name for messages, table) of every body table, chain patterns included."""
     for i, body in enumerate(scene.body):
         yield ("body", i), f'body "{body.name}"', body
     for i, chain in enumerate(scene.chain):
@@ -186,23 +186,26 @@ _ACCEPTED = "allow_unphysical_inertia = true"
 
 
 def risks(scene: SceneTables) -> tuple[Risk, ...]:
-    """What is accepted but worth knowing: inertias that no body can have, angles that look like
-    degrees, beams that are asked for what they cannot do well, loads that move nothing."""
+    """Warnings about accepted but doubtful input.
+
+    They concern impossible inertias, angles that look like degrees, beams outside their theory,
+    unused inputs, and loads without effect.
+    """
     found, dusty = [], []
     for _, name, body in _tables(scene):
         excess = triangle_excess(body.inertia_matrix)
         if excess is not None:
-            means = f"{name}: inertia: {excess}; accepted as asked"
-            remedy = "correct it unless it stands for something else than a body"
+            means = f"{name}: inertia: {excess}; accepted because of allow_unphysical_inertia"
+            remedy = "correct it unless it does not describe a real body"
             found.append(Risk("inertia", name, means, remedy, doubt=False, before=True))
         dusty += [(name, x) for k, x in enumerate(body.inertia[:3])
                   if x < 0 and body.inertia_matrix[k][k] == 0]  # fmt: skip
     if dusty:
         name, entry = dusty[0]
-        more = f" (and {len(dusty) - 1} more likewise)" if len(dusty) > 1 else ""
-        means = f"{name}: inertia: {entry:.3g} kg m^2 is rounding and counts as zero{more}"
+        more = f" (and {len(dusty) - 1} more)" if len(dusty) > 1 else ""
+        means = f"{name}: inertia: {entry:.3g} kg m^2 is rounding and is treated as zero{more}"
         found.append(Risk(
-            "inertia", name, means, "write 0 for it", entry, 0.0, "kg*m2", doubt=False, before=True,
+            "inertia", name, means, "write 0", entry, 0.0, "kg*m2", doubt=False, before=True,
         ))  # fmt: skip
     return (
         *found, *_proportions(scene), *notes(scene), *flexible_bodies.risks(scene),
@@ -210,20 +213,20 @@ def risks(scene: SceneTables) -> tuple[Risk, ...]:
     )  # fmt: skip
 
 
-#: Extent in m from which a rigid body lighter than this in kg per m is a slip of units.
+#: Extent in m above which a rigid body below this mass per extent in kg/m suggests wrong units.
 _LONG, _THIN = 20.0, 2e-3
 
 
 def _proportions(scene: SceneTables) -> Iterator[Risk]:
-    """Rigid bodies so long and light that their lengths are in mm more often than not."""
+    """Warnings about rigid bodies so long and light that their lengths are probably in mm."""
     for _, name, body in _tables(scene):
         places = [body.center_of_mass, *(end.position for end in body.ends.values())]
         extent = max(math.dist((0.0, 0.0, 0.0), place) for place in places)
         if body.type == "rigid" and extent >= _LONG and 0 < body.mass <= _THIN * extent:
             yield Risk(
                 "proportions", name,
-                f"{name}: it reaches over {extent:g} m with a mass of {body.mass:g} kg",
-                "lengths are in m and masses in kg; convert them if they are not",
+                f"{name}: it extends over {extent:g} m with a mass of {body.mass:g} kg",
+                "lengths are in m and masses in kg; convert other units",
                 body.mass / extent, _THIN, "kg/m", doubt=False, before=True,
             )  # fmt: skip
 

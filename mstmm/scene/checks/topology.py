@@ -1,7 +1,7 @@
-"""The tree of a scene: which body hangs on which, in the order in which the sweeps visit them.
+"""Spanning tree of a scene, in the order in which the sweeps visit its bodies.
 
 A chain is one node of the tree, whatever its length: its members follow one another.  Where hinges
-close loops, each body hangs on one of those that hold it, and the others are cut.
+close loops, each body keeps one of its inboard hinges in the tree, and the others are cut.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """One body in its place in the tree.
+    """Body at its position in the tree.
 
-    `body` and `hinge` are indices into the scene's `bodies` and `hinges`, `parent` and `children`
+    `body` and `hinge` are indices into `bodies` and `hinges` of the scene; `parent` and `children`
     are positions in `Topology.links` (parent -1: the ground).  `inboard_end` is the end of the
-    parent that holds the hinge, `outboard_end` the end by which this body is held; "" is a body's
-    own origin.
+    parent at the hinge, `outboard_end` the end of this body at the hinge; "" is the origin of the
+    body.
     """
 
     body: int
@@ -44,11 +44,11 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """`count` bodies in a row, each the child of the one before: a body of its own, or a chain.
+    """Row of `count` bodies, each the child of the one before: a single body, or a chain.
 
-    `body`, `hinge` and `place` are those of the first, the others follow it.  The first hangs on
-    the `inboard_end` of the scene's body `on` (-1: the ground), at the place `parent`; the others
-    hang on `ends`, repeated.
+    `body`, `hinge` and `place` are those of the first body; the others follow it.  The first is
+    connected to `inboard_end` of the scene's body `on` (-1: the ground) at the position `parent`.
+    The others are connected to `ends`, repeated.
     """
 
     body: int
@@ -64,15 +64,15 @@ class Run:
 
 @dataclass(frozen=True)
 class Topology:
-    """Bodies depth first: parents before children, branch by branch, children in scene order.
+    """Tree of a scene, depth first: parents before children, children in scene order.
 
-    The next member of a chain comes before what else hangs on a member.  `runs` are the tree in
-    that order; `links` and what follows from it are made when first asked for, an object per body.
+    The next member of a chain comes before other children of a member.  `runs` are the tree in
+    that order; `links`, one object per body, is created at first use.
 
-    `plan` says how loops, constraints and couplings close, None where there is nothing to close:
-    bodies and hinges by their numbers in the scene; its rows are those of the cut hinges, of the
-    constraints and of the couplings, in this order.  `carried` are bodies that are part of another
-    one: each has the place of that, and its hinge has none.
+    `plan` is the closure plan of loops, constraints and couplings, None where nothing closes.  It
+    refers to bodies and hinges by scene number.  Its rows are those of the cut hinges, of the
+    constraints and of the couplings, in this order.  `carried` maps bodies that are part of another
+    one to that body: they share its position, and their hinge has none.
     """
 
     runs: tuple[Run, ...]
@@ -81,17 +81,17 @@ class Topology:
 
     @property
     def cut(self) -> tuple[int, ...]:
-        """The scene's hinges that are not part of the tree."""
+        """Indices of the scene's hinges that are not part of the tree."""
         return () if self.plan is None else self.plan.cut
 
     @property
     def count(self) -> int:
-        """How many bodies there are."""
+        """Number of bodies in the tree."""
         return self.runs[-1].place + self.runs[-1].count if self.runs else 0
 
     @cached_property
     def links(self) -> tuple[Link, ...]:
-        """Every body in its place."""
+        """All bodies in tree order."""
         parents = self.parents
         children: list[list[int]] = [[] for _ in parents]
         for place, parent in enumerate(parents):
@@ -109,7 +109,7 @@ class Topology:
 
     @cached_property
     def order(self) -> tuple[int, ...]:
-        """Scene indices of the bodies, parents first; without those that others carry."""
+        """Scene indices of the bodies in tree order, parents first; without carried bodies."""
         return tuple(run.body + k for run in self.runs for k in range(run.count))
 
     @cached_property
@@ -123,7 +123,7 @@ class Topology:
 
     @cached_property
     def position(self) -> tuple[int, ...]:
-        """Place in `links` of every body of the scene."""
+        """Position in `links` of every body of the scene."""
         return tuple(map(self.place_of_body, range(self.count + len(self.carried))))
 
     @cached_property
@@ -141,16 +141,16 @@ class Topology:
         return [run.place for run in self.runs]
 
     def place_of_body(self, body: int) -> int:
-        """Place of the scene's body."""
+        """Position in the tree of a body of the scene."""
         body = self.carried.get(body, body)
         firsts, runs = self._by_body
         run = runs[bisect_right(firsts, body) - 1]
         return run.place + body - run.body
 
     def place_of_hinge(self, hinge: int) -> int:
-        """Place of the body whose inboard hinge is the scene's hinge, which must not be cut.
+        """Position in the tree of the body outboard of a hinge, which must not be cut.
 
-        KeyError for that of a body that another one carries.
+        Raises KeyError for the hinge of a carried body.
         """
         firsts, runs = self._by_hinge
         run = runs[bisect_right(firsts, hinge) - 1]
@@ -159,22 +159,22 @@ class Topology:
         return run.place + hinge - run.hinge
 
     def at(self, place: int) -> tuple[int, int]:
-        """(body, hinge) of the scene at a place."""
+        """Scene indices (body, hinge) at a position in the tree."""
         run = self.runs[bisect_right(self._places, place) - 1]
         k = place - run.place
         return run.body + k, run.hinge + k
 
     @property
     def roots(self) -> tuple[int, ...]:
-        """Positions of the bodies hinged to the ground."""
+        """Positions of the bodies connected to the ground by a hinge."""
         return tuple(run.place for run in self.runs if run.parent == GROUND)
 
 
 def build(scene: SceneTables) -> Topology:
-    """The tree of a scene.  O(tables) without loops, no recursion.
+    """Build the spanning tree of a scene: O(tables) without loops, no recursion.
 
-    Raises SceneError, one line per problem, for hinges written the wrong way round, wishes of what
-    to cut that leave no tree, and bodies that no hinge connects to the ground.
+    Raises SceneError, one line per problem, for hinges in the wrong direction, cut keys that leave
+    no tree, and bodies that no hinge connects to the ground.
     """
     joints = Joints(scene)
     found = _tree(joints)
@@ -185,20 +185,20 @@ def build(scene: SceneTables) -> Topology:
 
 
 def holders(scene: SceneTables) -> dict[str, Hinge]:
-    """Per name of a body the hinge of the tree that holds it; of a scene whose tree there is."""
+    """Inboard hinge in the tree by body name, of a scene that has a tree."""
     skeleton = scene.skeleton
-    loops = len(skeleton.hinge) > len(skeleton.body)  # every body is held
+    loops = len(skeleton.hinge) > len(skeleton.body)  # every body has at least one
     cut = set(build(skeleton).cut) if loops else set()
     return {h.outboard_body: h for number, h in enumerate(scene.hinge) if number not in cut}
 
 
 def problems(scene: SceneTables) -> Iterator[Problem]:
-    """Places and messages of everything that keeps the hinges from holding every body."""
+    """Locations and messages of all reasons why there is no spanning tree."""
     yield from tree.problems(Joints(scene))
 
 
 def _tree(joints: Joints) -> Topology | None:
-    """The tree, or None where there is none."""
+    """Topology of a scene, or None where there is no tree."""
     scene, plan = joints.scene, None
     held = _only(joints)
     if held is None or scene.constraint or scene.coupling:
@@ -213,7 +213,7 @@ def _tree(joints: Joints) -> Topology | None:
 
 
 def _only(joints: Joints) -> list[int] | None:
-    """Per node the edge that holds it; None where one has none or several, or must not have it."""
+    """Inboard edge of each node; None where a node has none or several, or an edge is cut."""
     held = [-1] * joints.nodes
     for edge, node in enumerate(joints.outboard):
         held[node] = edge
@@ -222,14 +222,14 @@ def _only(joints: Joints) -> list[int] | None:
 
 
 def _runs(joints: Joints, held: Sequence[int]) -> tuple[Run, ...]:
-    """The runs of the tree in which `held` is the edge of every node."""
-    # Per node (last: the ground) its children, as (member that holds it, child).
+    """Rows of bodies of the tree in which `held` is the inboard edge of each node."""
+    # For each node (last: the ground) its children, as (member they are connected to, child).
     children: list[list[tuple[int, int]]] = [[] for _ in range(joints.nodes + 1)]
     holder_of = [joints.holder(edge) for edge in held]
     for child, (parent, member) in enumerate(holder_of):
         children[parent].append((member, child))
     for siblings in children:
-        # Popped from the end: what hangs farthest out on a chain comes first.
+        # Popped from the end: children of the outermost member of a chain come first.
         siblings.sort(key=lambda one: (one[0], -one[1]))
     runs: list[Run] = []
     first = [0] * (joints.nodes + 1)

@@ -1,4 +1,4 @@
-"""What keeps the hinges of a scene from holding every body, and the way out."""
+"""Messages about hinges that form no spanning tree, with remedies."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .joints import Joints
 
 
 def problems(joints: Joints) -> Iterator[Problem]:
-    """Places and messages of everything for which there is no tree."""
+    """Locations and messages of all reasons why there is no spanning tree."""
     for one in obstacles(joints.by_nodes):
         yield _problem(joints, one)
 
@@ -20,28 +20,28 @@ def _problem(joints: Joints, one: Obstacle) -> Problem:
         case Turned(body, hinge):
             return (
                 ("body", body),
-                f'held by no hinge; turn hinge "{joints.edge_name(hinge)}" round: swap its '
-                "inboard and outboard",
+                f"it has no inboard hinge; swap inboard and outboard of hinge "
+                f'"{joints.edge_name(hinge)}"',
             )
         case Loose():
             return _loose(joints, one)
         case KeptTwice(body, (first, second, *_)):
             return (
                 (*joints.place(second), "cut"),
-                f'a body hangs on one hinge, and "{joints.edge_name(first)}" is not to be cut '
-                f'either, which holds "{joints.name(body)}" too; leave cut out of one of them',
+                f'"{joints.name(body)}" already has the inboard hinge "{joints.edge_name(first)}" '
+                "with cut = false; leave cut out of one of them",
             )
         case OnlyCut(body, (hinge,)):
             return (
                 (*joints.place(hinge), "cut"),
-                f'it is the only hinge that holds "{joints.name(body)}", so it cannot be cut; '
+                f'cannot be cut: it is the only inboard hinge of "{joints.name(body)}"; '
                 "leave cut out",
             )
         case OnlyCut(body, hinges) | Cyclic(body, hinges):
             names = " or ".join(f'"{joints.edge_name(hinge)}"' for hinge in hinges[:4])
             return (
                 (*joints.place(hinges[0]), "cut"),
-                f'with what is to be cut, and what not, nothing holds "{joints.name(body)}"; '
+                f'with these cut keys no tree of hinges reaches "{joints.name(body)}"; '
                 f"leave cut out of {names}",
             )
     raise AssertionError(one)
@@ -55,7 +55,7 @@ def _loose(joints: Joints, one: Loose) -> Problem:
     if one.bodies[0] >= bodies:
         return (
             ("chain", one.bodies[0] - bodies),
-            f'no hinge connects it{more} to the ground; hang it on the ground, inboard = "ground"',
+            f'no hinge connects it{more} to the ground; set inboard = "ground"',
         )
     return (
         ("body", one.bodies[0]),

@@ -1,4 +1,4 @@
-"""Elements of users' own types against their definitions."""
+"""Checks of elements with user-defined types against the definitions of these types."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _KINDS = {
 
 
 def tables(scene: SceneTables) -> Iterator[tuple[str, Location, Any]]:
-    """(kind of definition, place, table) of everything that has a type, patterns of chains too."""
+    """Yield (kind, location, table) of every element with a type, chain patterns included."""
     for table, (kind, _) in _KINDS.items():
         for i, element in enumerate(getattr(scene, table)):
             yield kind, (table, i), element
@@ -38,12 +38,12 @@ def tables(scene: SceneTables) -> Iterator[tuple[str, Location, Any]]:
 
 
 def types(scene: SceneTables) -> set[tuple[str, str]]:
-    """(kind, type) of everything in a scene."""
+    """Set of (kind, type) of all elements of a scene."""
     return {(kind, element.type) for kind, _, element in tables(scene)}
 
 
 def problems(scene: SceneTables, known: Mapping[tuple[str, str], ElementSpec]) -> list[Problem]:
-    """Unknown types, and elements that do not fit the definition of their type."""
+    """Problems of unknown types, and of elements that do not fit their definition."""
     found: list[Problem] = []
     builtin = dict(_KINDS.values())
     for kind, place, element in tables(scene):
@@ -54,15 +54,18 @@ def problems(scene: SceneTables, known: Mapping[tuple[str, str], ElementSpec]) -
             mine = [name for k, name in known if k == kind]
             called = ours(element.type) if kind == "hinge" else None
             hint = near(element.type, [*builtin[kind], *mine])
-            hint = f'; it is called "{called}" here' if called else hint
-            found.append(((*place, "type"), f'there is no {kind} type "{element.type}"{hint}'))
+            hint = f'; use "{called}"' if called else hint
+            found.append(((*place, "type"), f'unknown {kind} type "{element.type}"{hint}'))
         else:
             found += _element(scene, place, element, spec)
     return found
 
 
 def learn(scene: SceneTables, known: Mapping[tuple[str, str], ElementSpec]) -> list[Problem]:
-    """Tell every hinge of a user's type what its definition says of it, and settle it."""
+    """Store the facts of user-defined types in their hinges, and resolve their defaults.
+
+    Returns the problems found.
+    """
     found: list[Problem] = []
     for kind, place, element in tables(scene):
         spec = known.get((kind, element.type))
@@ -76,14 +79,14 @@ def learn(scene: SceneTables, known: Mapping[tuple[str, str], ElementSpec]) -> l
 
 
 def inherit(scene: SceneTables, other: SceneTables) -> None:
-    """Tell hinges of users' types what those in the same scene with other numbers know."""
+    """Copy the facts of user-defined hinge types from a scene with the same elements."""
     for (_, _, mine), (_, _, known) in zip(tables(scene), tables(other), strict=True):
         if getattr(known, "builtin", known) is None and known.facts is not None:
             vars(mine)["facts"] = known.facts
 
 
 def problems_with(scene: SceneTables, spec: ElementSpec) -> list[Problem]:
-    """What does not fit in the elements of this one type."""
+    """Problems of the elements of one user-defined type."""
     return [
         problem
         for kind, place, element in tables(scene)
@@ -126,7 +129,7 @@ def _parameters(
 
 
 def _counts(place: Location, hinge: HingeTable, spec: ElementSpec) -> Iterator[Problem]:
-    """Lengths of start values, drive and law."""
+    """Problems of the lengths of initial values, drive and law."""
     lists: list[tuple[Location, Any, int]] = []
     if hinge.initial is not None:
         lists.append((("initial", "q"), hinge.initial.q, len(spec.coordinates)))
@@ -134,7 +137,11 @@ def _counts(place: Location, hinge: HingeTable, spec: ElementSpec) -> Iterator[P
     if hinge.drive is not None:
         lists.append((("drive",), hinge.drive, len(spec.coordinates)))
         if len(spec.coordinates) != len(spec.speeds):
-            yield (*place, "drive"), f"{spec.name} has speeds of its own and cannot be driven"
+            yield (
+                (*place, "drive"),
+                f"{spec.name} cannot be driven: it has {len(spec.coordinates)} coordinates and "
+                f"{len(spec.speeds)} speeds",
+            )
     for key in type(hinge.law).model_fields:
         values = getattr(hinge.law, key)
         if len(values) > 1 or (values and not spec.speeds):
@@ -143,16 +150,16 @@ def _counts(place: Location, hinge: HingeTable, spec: ElementSpec) -> Iterator[P
             units = ", ".join(effort_unit(s.unit) for s in spec.speeds)
             yield (
                 (*place, "law", key),
-                f"one number cannot stand for efforts in {units}; "
+                f"one number cannot be used for efforts in {units}; "
                 f"give a list with {len(spec.speeds)} entries",
             )
     for at, values, count in lists:
         if values is not None and len(values) != count:
-            yield (*place, *at), f"{spec.name} has {count} entries here, found {len(values)}"
+            yield (*place, *at), f"expected {count} entries for {spec.name}, found {len(values)}"
 
 
 def _indices(scene: SceneTables, hinge: HingeTable, spec: ElementSpec) -> Iterator[Problem]:
-    """Indices of this hinge's coordinates in all expressions of the scene."""
+    """Problems of indices of a hinge's coordinates in all expressions of the scene."""
     for place, expression, own in _all_expressions(scene):
         for name in expression.names:
             if name.quantity not in ("q", "u"):
@@ -167,14 +174,14 @@ def _indices(scene: SceneTables, hinge: HingeTable, spec: ElementSpec) -> Iterat
 
 
 def _called(scene: SceneTables, place: Location) -> str:
-    """Name of the hinge at a place: of a chain's pattern, the first member that has it."""
+    """Name of the hinge at a location; for a chain pattern, of the first member with it."""
     if place[0] == "chain":
         return scene.hinges.name(scene.hinges.starts[int(place[1])] + int(place[3]))
     return scene.hinge[int(place[1])].name
 
 
 def _table(scene: SceneTables, name: str) -> HingeTable | None:
-    """The table that describes the hinge of this name."""
+    """Table of the hinge with this name, or None."""
     index = scene.hinges.find(name)
     if index is None or index < len(scene.hinge):
         return None if index is None else scene.hinge[index]
@@ -185,7 +192,7 @@ def _table(scene: SceneTables, name: str) -> HingeTable | None:
 def _all_expressions(
     scene: SceneTables,
 ) -> Iterator[tuple[Location, Expression, HingeTable | None]]:
-    """(place, expression, hinge whose q and u need no prefix)."""
+    """Yield (location, expression, hinge whose q and u need no prefix) of all expressions."""
     for kind, place, table in tables(scene):
         if kind == "hinge":
             for k, effort in enumerate(table.law.effort):

@@ -1,4 +1,4 @@
-"""Beams welded in line: several that bend as one."""
+"""Straight lines of welded beams, which bend as one beam."""
 
 from __future__ import annotations
 
@@ -14,22 +14,21 @@ if TYPE_CHECKING:
 
 ROOT = "root"
 
-#: The axes of two beams in line agree to this cosine.
+#: Least cosine of the angle between the axes of two beams in line.
 _STRAIGHT = 0.999
 
 
 class Line(NamedTuple):
-    """A straight line of welded beams: the name of its first beam, and its length in m."""
+    """Straight line of welded beams: name of its first beam, and length in m."""
 
     first: str
     length: float
 
 
 def lines(scene: SceneTables) -> dict[str, Line]:
-    """Beam -> the straight line of welded beams that it is a part of; alone it is one itself.
+    """Straight line of welded beams of each beam; a single beam forms a line.
 
-    Two beams are in line where a fixed hinge joins an extreme end of one to one of the other and
-    their axes agree.
+    Two beams are in line where a fixed hinge connects their extreme ends and their axes agree.
     """
     beams = {beam.name: beam for beam in scene.beam}
     before = {name: name for name in beams}
@@ -53,7 +52,7 @@ def lines(scene: SceneTables) -> dict[str, Line]:
 
 
 def _in_line(hinge: Hinge, beams: dict[str, Beam]) -> tuple[str, str] | None:
-    """The beams that a fixed hinge makes one straight line of; None where it does not."""
+    """Beams that a fixed hinge joins in a straight line, (inboard, outboard); None for others."""
     (inner, at), (outer, end) = split(hinge.inboard), split(hinge.outboard)
     if inner not in beams or outer not in beams:
         return None
@@ -63,7 +62,7 @@ def _in_line(hinge: Hinge, beams: dict[str, Beam]) -> tuple[str, str] | None:
     back = tuple(zip(*_rotation(beams[outer], end), strict=True))
     held = [row[0] for row in back]  # the axis of the outer beam, in the axes of its end
     direction = apply(_rotation(beams[inner], at), apply(hinge.rotation, held))
-    goes_on = -1.0 if places[0] == places[1] else 1.0  # from tip to tip the axes are opposite
+    goes_on = -1.0 if places[0] == places[1] else 1.0  # axes are opposite where two tips meet
     return (inner, outer) if goes_on * direction[0] > _STRAIGHT else None
 
 
@@ -72,7 +71,7 @@ def _rotation(beam: Beam, end: str) -> Matrix:
 
 
 def _extreme(beam: Beam, end: str) -> int:
-    """-1 for the section at x = 0, 1 for that at the far end, 0 for one between."""
+    """Location of an end: -1 at x = 0, 1 at the tip, 0 between."""
     x = beam.end_x(end)
     slack = 1e-9 * beam.length
     return -1 if x <= slack else 1 if x >= beam.length - slack else 0

@@ -1,1 +1,1 @@
-"""Scenes as text: reading files, writing TOML."""
+"""Scene files: reading TOML and JSON, writing TOML."""

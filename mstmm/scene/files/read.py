@@ -1,4 +1,4 @@
-"""Reading scene files: TOML or JSON by suffix, a message for each kind of unreadable file."""
+"""Reading of scene files: TOML or JSON by suffix, with a message for each kind of failure."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from typing import Any
 from ...errors import SceneError
 from ..rules.messages import near
 
-#: Largest file in MB by ending: what is read and validated within about half a minute.
+#: Largest file in MB by suffix: read and validated within about half a minute.
 MAX_SIZE = {".toml": 8, ".json": 64}
-_IN_PYTHON = "; build large scenes in Python, repeated bodies with [[chain]]"
-#: What to do with a file that is too large, by ending.
+_IN_PYTHON = "; build large scenes in Python, or use [[chain]] for repeated bodies"
+#: Remedy for a file that is too large, by suffix.
 _LARGER = {
     ".toml": f"{_IN_PYTHON}, or write JSON, up to {MAX_SIZE['.json']} MB", ".json": _IN_PYTHON,
 }  # fmt: skip
-#: Most parts of a dotted key: tables nest four deep, and each part costs all before it once more.
+#: Most parts of a dotted key: tables nest four deep, and the cost of a key grows quadratically.
 MAX_PARTS = 64
 _LONG_KEY = re.compile(
     rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MAX_PARTS},}}+"""
@@ -29,7 +29,10 @@ _LONG_KEY = re.compile(
 
 
 def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
-    """(the path as messages show it, the tables of the file), not yet validated."""
+    """Read the tables of a scene file without validation: (path for messages, tables).
+
+    Raises SceneError.
+    """
     where, content = content_of(path, MAX_SIZE, "a scene file")
     text = _text(content, where)
     data = _json(text, where) if _ending(path) == ".json" else _toml(text, where)
@@ -39,8 +42,10 @@ def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
 def content_of(
     path: str | os.PathLike[str], limits: Mapping[str, int], what: str
 ) -> tuple[str, bytes]:
-    """(the path as messages show it, the bytes of the file).  `limits` has the endings that are
-    read, and the largest file of each in MB.  Raises SceneError."""
+    """Read a file: (path for messages, bytes).
+
+    `limits` maps accepted suffixes to the largest file size in MB.  Raises SceneError.
+    """
     try:
         shown = os.fsdecode(os.fspath(path))
     except TypeError:
@@ -59,9 +64,9 @@ def _ending(path: str | os.PathLike[str]) -> str:
 
 def _text(content: bytes, where: str) -> str:
     if not content.strip():
-        raise SceneError(f"{where}: the file is empty; a scene begins with gravity = [0, -9.81, 0]")
+        raise SceneError(f"{where}: the file is empty; begin with gravity = [0, -9.81, 0]")
     if b"\0" in content:
-        raise SceneError(f"{where}: this is a binary file; a scene is text (TOML or JSON)")
+        raise SceneError(f"{where}: expected text (TOML or JSON), found a binary file")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -75,9 +80,9 @@ def _content(path: Path, where: str, limits: Mapping[str, int]) -> bytes:
     try:
         status = path.stat()
         if stat.S_ISDIR(status.st_mode):
-            raise SceneError(f"{where}: this is a folder; name the file inside it")
+            raise SceneError(f"{where}: this is a folder; give the path of a file in it")
         if not stat.S_ISREG(status.st_mode):
-            raise SceneError(f"{where}: this is not a regular file; name one")
+            raise SceneError(f"{where}: this is not a regular file; give the path of one")
         ending = path.suffix.lower()
         limit = limits[ending]
         if status.st_size > limit * 2**20:
@@ -95,7 +100,7 @@ def _content(path: Path, where: str, limits: Mapping[str, int]) -> bytes:
 
 
 def _neighbour(path: Path, endings: Collection[str]) -> str:
-    """A file beside the missing one with a similar name."""
+    """Suggestion of a file with a similar name in the same folder."""
     try:
         names = [p.name for p in path.parent.iterdir() if p.suffix.lower() in endings]
     except OSError:
@@ -107,14 +112,14 @@ def _neighbour(path: Path, endings: Collection[str]) -> str:
 def _toml(text: str, where: str) -> dict[str, Any]:
     if long := _LONG_KEY.search(text):
         raise SceneError(
-            f"{where}: line {text.count(chr(10), 0, long.start()) + 1}: a key of more than "
+            f"{where}: line {text.count(chr(10), 0, long.start()) + 1}: a key has more than "
             f"{MAX_PARTS} parts, {long.group()[:20]}...; tables of a scene nest four deep at most"
         )
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         once = "Cannot overwrite a value" in str(error)
-        hint = "; tables that repeat take two brackets, as in [[hinge]]" if once else ""
+        hint = "; repeated tables need two brackets, as in [[hinge]]" if once else ""
         raise SceneError(f"{where}: not valid TOML: {error}{hint}") from None
     except RecursionError:
         raise SceneError(f"{where}: lists or tables are nested too deeply") from None

@@ -1,4 +1,4 @@
-"""A scene as TOML."""
+"""Conversion of scenes to TOML."""
 
 from __future__ import annotations
 
@@ -13,23 +13,25 @@ from ..rules.written import Written
 if TYPE_CHECKING:
     from ..tables.all import SceneTables
 
-#: The table of tables of names, with keys in quotes.
+#: The table of name tables, whose keys are written in quotes.
 _NAMES = "names"
 
 
 def to_toml(scene: SceneTables, evaluated: bool = False) -> str:
-    """TOML text that loads back to an equal scene; `evaluated`, numbers that are written as
-    expressions of named constants are numbers alone."""
+    """Convert a scene to TOML text that loads back to an equal scene.
+
+    With `evaluated`, expressions of named constants are written as numbers.
+    """
     data = scene.model_dump(by_alias=True)
     for hinge in data["hinge"]:
         facts = builtin_hinges().get(hinge["type"])
         if facts is not None and facts.frame == "plane":
-            hinge["axis"] = None  # it is the normal
+            hinge["axis"] = None  # written as `normal`
     return as_toml(data, evaluated)
 
 
 def as_toml(data: Mapping[str, Any], evaluated: bool = False) -> str:
-    """TOML text of the keys of a scene, without those that have no value."""
+    """Convert the keys of a scene to TOML text, without keys that have no value."""
     lines = [
         f"{key} = {_value(value, evaluated)}"
         for key, value in data.items()
@@ -70,11 +72,11 @@ def _value(value: Any, evaluated: bool) -> str:
 
 
 def _is_said(value: Any) -> bool:
-    """TOML has no word for nothing; an empty list is the default everywhere it may stand."""
+    """Whether a value is written: TOML has no null, and an empty list is always the default."""
     return value is not None and value != ()
 
 
 def _string(text: str) -> str:
-    """A basic string of TOML."""
+    """Text as a basic string of TOML."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'

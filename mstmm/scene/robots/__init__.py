@@ -1,1 +1,1 @@
-"""Robots described in the formats of others -> scenes."""
+"""Conversion of robots in other file formats to scenes, and back."""

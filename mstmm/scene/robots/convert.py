@@ -1,4 +1,4 @@
-"""A robot -> a scene, with a note for everything that a scene has not, or has otherwise."""
+"""Conversion of a robot to a scene, with a note for everything that differs or is left out."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ BASES = (FIXED, "free")
 COUPLED, HELD = MIMICS = ("coupled", "held")
 #: Types of joints with one coordinate.
 _OF_ONE = ("pin", "prismatic")
-#: So many names are told.
+#: Most names in a note.
 _NAMED = 6
-#: The owner of what stands on the ground: no link is called so, though one may be called "ground".
+#: Owner of links that are part of the ground; no link has this name, but one may be named "ground".
 _STILL = ""
 
 
 @dataclass(frozen=True)
 class Choices:
-    """How a robot becomes a scene.
+    """Options of the conversion of a robot to a scene.
 
-    base: "fixed" on the ground, or "free".  merge: links on fixed joints become part of the body
-    that holds them; their frames are ends of it.  stops: stiffness (N/m or N m/rad) of the stops at
-    the limits of joints, None: no stops.  mimics: joints that go with others are "coupled" to them,
-    or "held" where they start.
+    base: "fixed" on the ground, or "free".  merge: links on fixed joints become part of their
+    inboard body; their frames are ends of it.  stops: stiffness (N/m or N m/rad) of the stops at
+    the limits of joints, None: no stops.  mimics: joints that mimic others are "coupled" to them,
+    or "held" at their initial value.
     """
 
     base: str = FIXED
@@ -52,10 +52,10 @@ class Choices:
 
 @dataclass(frozen=True)
 class Imported:
-    """A scene, what became of the file's names, and notes.
+    """Scene of a robot file, with name mappings and notes.
 
-    `links` has for each link the body or end that it is ("ground" for what is part of it), and
-    `joints` for each joint that moves its hinge.
+    `links` gives for each link its body or end ("ground" for a part of the ground), and `joints`
+    for each moving joint its hinge.
     """
 
     scene: Scene
@@ -66,16 +66,16 @@ class Imported:
 
     @property
     def names(self) -> Mapping[str, str]:
-        """Links and joints alike; of a link and a joint of one name, the joint."""
+        """Mapping of links and joints together; a joint replaces a link of the same name."""
         return {**self.links, **self.joints}
 
     def to_toml(self) -> str:
-        """The scene as TOML, without what is as it is by default."""
+        """Convert to TOML text without default values."""
         return as_toml(self.tables)
 
 
 def converted(robot: Robot, choices: Choices, folder: Path | None = None) -> Imported:
-    """The scene of a robot; its meshes are beside it in `folder`.  Raises SceneError."""
+    """Convert a robot to a scene; its meshes are relative to `folder`.  Raises SceneError."""
     robot = without_dust(robot)
     tree = Tree(robot)
     robot = replace(robot, notes=(*robot.notes, *doubts(robot, tree)))
@@ -85,33 +85,33 @@ def converted(robot: Robot, choices: Choices, folder: Path | None = None) -> Imp
     if not writer.bodies():
         urdf = robot.where.lower().endswith(".urdf")
         way_out = 'try base = "free"' if urdf else "give a body a <freejoint>"
-        raise SceneError(f"{robot.where}: nothing in it moves or has mass; {way_out}")
+        raise SceneError(f"{robot.where}: no link moves or has mass; {way_out}")
     data = writer.tables(folder)
     scene, notes = Scene.from_data(data, robot.where), tuple(writer.notes)
     return Imported(scene, writer.links, writer.joints, notes, data)
 
 
 class _Writer:
-    """Tables of the scene of a robot."""
+    """Writer of the scene tables of a robot."""
 
     def __init__(self, robot: Robot, tree: Tree, choices: Choices) -> None:
         self.robot, self.tree, self.choices = robot, tree, choices
         self.notes = list(robot.notes)
         if len(tree.roots) > 1:
             some = ", ".join(map(repr, tree.roots[:4])) + (", ..." if len(tree.roots) > 4 else "")
-            text = f"{len(tree.roots)} of them: {some}; each is held on its own"
+            text = f"{len(tree.roots)} of them: {some}; each has its own base"
             self.notes.append(Note(robot.where, "trees", text))
         known = list(self._known_mimics())
         mimics = list({mimic.of: mimic for mimic in known}.values())
         for mimic in known:
             if mimic not in mimics:
-                what = f"of what it mimics the last one counts, not {mimic.other!r}"
+                what = f"several <mimic>: the last one applies, not {mimic.other!r}"
                 self._tell(tree.joints[mimic.of], f"joint {mimic.of!r}", what)
         self.held = {joint.name for joint in tree.weightless()}
         for name in sorted(self.held, key=list(tree.joints).index):
-            what = "nothing that it carries has mass, so it is held fixed"
+            what = "fixed, because no link outboard of it has mass"
             self._tell(tree.joints[name], f"joint {name!r}", what)
-        #: Link -> the link whose body it is part of, or _STILL, and its frame there.
+        #: Link -> the link whose body it is part of, or _STILL, and its frame in that body.
         self.place = dict[str, tuple[str, Pose]]()
         for link in tree.outward:
             self.place[link.name] = self._placed(link)
@@ -120,10 +120,10 @@ class _Writer:
         hinges = Names()
         moving = [one.name for one in robot.joints if self.place[one.child][0] == one.child]
         self.joints = hinges.take_all(moving, "joint")
-        #: Place of the notes on names, which are known when all ends are.
+        #: Position of the notes on names, which are written when all ends are defined.
         self._told = len(self.notes)
         self._tell_links()
-        #: What the joints that move go with.
+        #: Mimic relations of the moving joints by name.
         self.mimics = {mimic.of: mimic for mimic in mimics if self._moves(mimic.of)}
         self._roots = {name: hinges.take(f"{name}_base", "link")
                        for name in tree.roots if name in self._bodies}  # fmt: skip
@@ -131,8 +131,10 @@ class _Writer:
         self.links = {link.name: self._frame(link) for link in robot.links}
 
     def _tell_names(self, names: Mapping[str, Mapping[str, str]]) -> None:
-        """Links and joints that have other names in the scene, the first by name; `names` are
-        those that it keeps."""
+        """Add notes about links and joints that are renamed in the scene.
+
+        `names` are the original names that its [names] keeps.
+        """
         kept_, rest = list[str](), list[str]()
         for table, named in (("body", self._bodies), ("hinge", self.joints)):
             for old, new in named.items():
@@ -140,8 +142,8 @@ class _Writer:
                     known = names.get(table, {}).get(old) == new
                     (kept_ if known else rest).append(f"{short(old)} is {new}")
         told = (
-            (kept_, "that a scene does not take, kept in its [names]"),
-            (rest, "that neither a scene nor its [names] take"),
+            (kept_, "not allowed in a scene, kept in its [names]"),
+            (rest, "allowed neither in a scene nor in its [names]"),
         )
         for others, what in reversed(told):
             if others:
@@ -150,7 +152,7 @@ class _Writer:
                 self.notes.insert(self._told, Note(self.robot.where, "names", text))
 
     def _tell_links(self) -> None:
-        """Links that are no bodies of their own, and those that move without mass."""
+        """Add notes about links that are no separate bodies, and about moving massless links."""
         for link in self.robot.links:
             joint, (owner, _) = self.tree.holder.get(link.name), self.place[link.name]
             if joint is None:
@@ -158,17 +160,17 @@ class _Writer:
             if owner == _STILL:
                 self._tell(joint, f"link {link.name!r}", "part of the ground")
             elif owner != link.name:
-                what = "part of the body that holds it, in which its name finds its frame"
+                what = "part of its inboard body; its name refers to its frame there"
                 self._tell(joint, f"link {link.name!r}", what)
             elif joint.type != FIXED and not link.mass and link.inertia == NOTHING:
-                self._tell(link, f"link {link.name!r}", "moves without mass of its own")
+                self._tell(link, f"link {link.name!r}", "moves without mass")
 
     def bodies(self) -> list[str]:
-        """Links that are bodies, in the order of the file."""
+        """Names of links that are separate bodies, in the order of the file."""
         return [link.name for link in self.robot.links if self.place[link.name][0] == link.name]
 
     def tables(self, folder: Path | None) -> dict[str, Any]:
-        """The keys of the scene."""
+        """Keys of the scene."""
         found: dict[str, Any] = {"gravity": self.robot.gravity}
         found["hinge"] = [*map(self._root, self._roots), *self._joints()]
         parts: defaultdict[str, list[tuple[Link, Pose]]] = defaultdict(list)
@@ -189,8 +191,7 @@ class _Writer:
         return found
 
     def _named_links(self) -> dict[str, str]:
-        """Links by the bodies and ends that they are, bodies first; of those that stand on the
-        ground the ones at its origin."""
+        """Bodies and ends by link name, bodies first; on the ground only links at its origin."""
         bodies = dict.fromkeys((*self._bodies, *self.links))
         return {
             name: self.links[name] for name in bodies
@@ -212,14 +213,14 @@ class _Writer:
         return link.name, IN_PLACE
 
     def _frame(self, link: Link) -> str:
-        """The body or the end that a link is."""
+        """Reference of the body or end of a link."""
         owner, pose = self.place[link.name]
         if owner == _STILL:
             return GROUND
         return self._end(owner, pose, link.name)
 
     def _end(self, owner: str, pose: Pose, name: str) -> str:
-        """The reference of a frame of a body: the body, an end that is there, or a new one."""
+        """Reference of a frame of a body: the body, an existing end, or a new one."""
         body, ends = self._bodies[owner], self._ends[owner]
         if pose == IN_PLACE:
             return body
@@ -243,7 +244,7 @@ class _Writer:
             table["inertia"] = (m[0][0], m[1][1], m[2][2], m[0][1], m[0][2], m[1][2])
             if why := triangle_excess(m):
                 table["allow_unphysical_inertia"] = True
-                self._tell(parts[0][0], f"link {name!r}", f"taken as it is: {why}")
+                self._tell(parts[0][0], f"link {name!r}", f"accepted unchanged: {why}")
         if self._ends[name]:
             table["ends"] = self._ends[name]
         return table
@@ -278,7 +279,7 @@ class _Writer:
                 self._tell(
                     joint,
                     f"joint {joint.name!r}",
-                    "its limits are no stops here; they are kept as rated",
+                    "its limits are not stops; they are kept as rated",
                 )
             else:
                 law["limits"] = {**limits, "stiffness": self.choices.stops}
@@ -300,9 +301,9 @@ class _Writer:
                 continue
             what = f"left free: it mimics {mimic.other!r}, which "
             if other is None:
-                what += f"is not there{near(mimic.other, self.tree.joints)}"
+                what += f"does not exist{near(mimic.other, self.tree.joints)}"
             else:
-                what += "has more coordinates than one"
+                what += "has more than one coordinate"
             self._tell(self.tree.joints[mimic.of], f"joint {mimic.of!r}", what)
 
     def _couplings(self) -> Iterator[dict[str, Any]]:
@@ -312,7 +313,7 @@ class _Writer:
             own, other = self.joints[name], self.joints[mimic.other]
             row = f"{own}.q - {mimic.multiplier!r}*{other}.q".replace("- -", "+ ")
             yield {"name": f"{own}_mimics", "expression": row, "equals": mimic.offset}
-            what = f"goes with {mimic.other!r}, by a coupling"
+            what = f"mimics {mimic.other!r}, by a coupling"
             self._tell(self.tree.joints[name], f"joint {name!r}", what)
 
     def _moves(self, name: str) -> bool:
@@ -320,20 +321,23 @@ class _Writer:
         return not fixed and name in self.joints and name not in self.held
 
     def _is_coupled(self, name: str) -> bool:
-        """Whether a joint that mimics another one goes with it; else it is held."""
+        """Whether a joint that mimics another one is coupled to it; else it is held."""
         mimic = self.mimics[name]
         follows = mimic.multiplier != 0 and self._moves(mimic.other)
         return self.choices.mimics == COUPLED and follows
 
     def _starts(self) -> dict[str, float]:
-        """Start values of the joints that go with others."""
+        """Initial values of the joints that mimic others.  Raises SceneError for cycles."""
         mimics, found = self.mimics, dict[str, float]()
         for name in mimics:
             way = dict[str, Mimic]()
             while name in mimics and name not in found:
                 if name in way:
                     joint = self.tree.joints[name]
-                    raise SceneError(f"{joint.where}: joint {name!r} mimics itself in the end")
+                    raise SceneError(
+                        f"{joint.where}: joint {name!r} mimics itself through other joints; "
+                        "remove one <mimic> of the cycle"
+                    )
                 way[name] = mimics[name]
                 name = mimics[name].other
             at = found[name] if name in found else self._start(name)
@@ -342,7 +346,7 @@ class _Writer:
         return found
 
     def _start(self, name: str) -> float:
-        """Where a joint starts that goes with none."""
+        """Initial value of a joint that mimics no other."""
         given = self.tree.joints[name].keys.get("initial") if self._moves(name) else None
         return float(given["q"][0]) if given else 0.0
 
@@ -355,7 +359,7 @@ class _Writer:
                 found = None if meshes is None else meshes.path(file)
                 if found is None:
                     link = self.tree.links[look.link]
-                    self._tell(link, f"link {look.link!r}", f"no mesh {file!r} to draw it with")
+                    self._tell(link, f"link {look.link!r}", f"not drawn: there is no mesh {file!r}")
                     continue
                 keys["file"] = found
             on = GROUND if owner == _STILL else self._bodies[owner]
@@ -363,15 +367,17 @@ class _Writer:
 
 
 def _turning_with_body(hinge: str, mass: float) -> list[str | float]:
-    """Efforts of a free hinge whose `mass` (kg) beside the body's accelerates along inertial axes:
-    `inertia` of a law goes by udot, in axes that turn with the body, and lacks -m w x v."""
+    """Efforts of a free hinge with an additional `mass` (kg) that accelerates in inertial axes.
+
+    The `inertia` of a law multiplies udot in axes that rotate with the body and lacks -m w x v.
+    """
     v, w = ([f"{hinge}.u[{k}]" for k in range(*of)] for of in ((0, 3), (3, 6)))
     cross = [((k + 1) % 3, (k + 2) % 3) for k in range(3)]
     return [*(f"{mass!r}*({w[j]}*{v[i]} - {w[i]}*{v[j]})" for i, j in cross), 0.0, 0.0, 0.0]
 
 
 def _keys(pose: Pose) -> dict[str, Any]:
-    """A place, and axes where they are turned."""
+    """Keys of a pose: position, and orientation if it is rotated."""
     turned = pose.rotation != IDENTITY
     return {"position": pose.position} | (
         {"orientation": to_quaternion(pose.rotation)} if turned else {}

@@ -1,4 +1,4 @@
-"""A scene -> a robot's file, with a note for everything of the scene that the file does not say."""
+"""Export of a scene to a robot file, with a note for everything that is left out."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ if TYPE_CHECKING:
     from ..tables.hinge import Hinge
     from ..tables.outside.shape import Shape
 
-#: Tables of a scene of which a robot's file has nothing.
+#: Tables of a scene without counterpart in a robot file.
 _LEFT_OUT = (
     "load", "spring", "bushing", "event", "input", "signal", "output", "controller",
 )  # fmt: skip
-#: What a range has.
+#: Keys of a range.
 _ENDS = ("lower", "upper")
-#: Types of shapes that URDF draws.
+#: Types of shapes that URDF supports.
 _DRAWN = ("box", "sphere", "cylinder", "mesh")
-#: What importers of URDF take for granted, m/s^2.
+#: Gravity that importers of URDF assume, m/s^2.
 _GRAVITY = (0.0, 0.0, -9.81)
 
 
 @dataclass(frozen=True)
 class Exported:
-    """A robot's file as text, and notes on what it does not say of the scene."""
+    """Robot file as text, with notes on what is left out."""
 
     text: str
     notes: tuple[Note, ...]
@@ -48,46 +48,46 @@ class Exported:
 
     @property
     def summary(self) -> str:
-        """How much there is of what: 3 links, 2 joints."""
+        """Number of links and joints as text: "3 links, 2 joints"."""
         return f"{self.links} links, {self.joints} joints"
 
 
 def export_robot(scene: Scene, name: str = "robot") -> Exported:
-    """The URDF of a scene: a tree of rigid bodies on the joints that URDF has.
+    """Export a scene as URDF: a tree of rigid bodies with the joints that URDF supports.
 
-    Each body is a link whose axes are those of the end that holds it, each further end a link on a
-    fixed joint; damping, Coulomb's friction, stops (without their stiffness), couplings of two
-    joints and shapes go along.  What else acts in the scene is left out, with a note.
+    Each body is a link with the axes of its outboard end at the hinge; each further end is a link
+    on a fixed joint.  Damping, Coulomb friction, stops (without their stiffness), couplings of two
+    joints and shapes are exported.  Everything else is left out, with a note.
 
-    `name` is that of the robot in its file.
+    `name` is the name of the robot in the file.
 
-    Raises SceneError for closed loops, flexible bodies, bodies of users' types and hinges that URDF
-    does not have.
+    Raises SceneError for closed loops, flexible bodies, bodies of user-defined types and hinges
+    that URDF does not support.
     """
     if not isinstance(scene, Scene):
         raise SceneError(f"{short(scene)}: expected a Scene; mstmm.load_scene reads a file")
     if not isinstance(name, str) or not name.isprintable():
-        raise SceneError(f"name = {short(name)}: expected a name of letters and signs")
+        raise SceneError(f"name = {short(name)}: expected printable text")
     found = _Reader(scene).robot(name)
     return Exported(as_urdf(found), found.notes, len(found.links), len(found.joints))
 
 
 class _Reader:
-    """Links and joints of a scene."""
+    """Reader of the links and joints of a scene."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.notes = scene, list[Note]()
         _refuse(scene)
         self.bodies = {body.name: body for body in scene.bodies}
-        #: Bodies, ends and the ground by the names that a robot's file has for them, if any.
+        #: Names of a robot file by body, end or ground of the scene.
         self.named = _others(scene.names.body)
         self.joints = {one: names[0] for one, names in _others(scene.names.hinge).items()}
         links = [*map(self._link_name, self.bodies), *scene.names.body]
         self.world = self.named.get(GROUND, [GROUND if "world" in links else "world"])[0]
         held = {hinge.outboard_body: hinge.outboard_end for hinge in scene.hinges}
-        #: Axes of a body's link in those of the body.
+        #: Frame of the link of each body in the axes of the body.
         self.frames = {name: _end(body, held.get(name, "")) for name, body in self.bodies.items()}
-        #: Ends that are not the place of a joint alone.
+        #: Ends that are not only the position of a joint.
         self.ends = [
             (body.name, end) for body in scene.bodies for end in body.ends
             if f"{body.name}.{end}" in self.named
@@ -112,7 +112,7 @@ class _Reader:
         return self.joints.get(hinge, hinge)
 
     def _fixed(self) -> Iterator[tuple[str, str, str]]:
-        """Body, end and name of the links that are fixed on others."""
+        """Body, end and name of the links on fixed joints."""
         for body, end in self.ends:
             names = self.named.get(f"{body}.{end}") or [self._end_name(body, end)]
             yield from ((body, end, name) for name in names)
@@ -132,11 +132,11 @@ class _Reader:
         self.notes.append(Note("scene", element, text))
 
     def _is_of_joint(self, body: str, end: str) -> bool:
-        """Whether an end has the name of the hinge that it is the place of, as importing leaves."""
+        """Whether an end has the name of its hinge, as imported scenes have."""
         return any(h.name == end and h.inboard == f"{body}.{end}" for h in self.scene.hinges)
 
     def _in_link(self, body: str, pose: Pose) -> Pose:
-        """A frame of a body in the axes of its link."""
+        """Convert a frame of a body to the axes of its link."""
         frame = self.frames[body]
         return pose if frame == IN_PLACE else frame.inverse.then(pose)
 
@@ -155,7 +155,7 @@ class _Reader:
         return Link(name), Joint(joint, FIXED, holder, name, at)
 
     def _free_name(self, name: str) -> str:
-        """One that no hinge has."""
+        """Make a joint name unique by appending _."""
         taken = {self._joint_name(hinge.name) for hinge in self.scene.hinges}
         while name in taken:
             name += "_"
@@ -199,10 +199,10 @@ class _Reader:
             self._note(element, f"left out: {', '.join(names)}")
 
     def _mimic(self, coupling: Coupling) -> Mimic | None:
-        """One joint that goes with another; None, with a note, for other couplings."""
+        """Mimic relation of a coupling; None, with a note, for other couplings."""
         found = _line(coupling)
         if found is None:
-            self._note(f"coupling {coupling.name!r}", "left out: no joint that goes with another")
+            self._note(f"coupling {coupling.name!r}", "left out: not a linear mimic of two joints")
             return None
         own, other = self._joint_name(found.of), self._joint_name(found.other)
         return replace(found, of=own, other=other)
@@ -231,11 +231,11 @@ class _Reader:
                     f"[[{table}]]", f"left out, {count} of them" if count > 1 else "left out"
                 )
         if self.scene.gravity != _GRAVITY:
-            self._note("gravity", "left out; readers of URDF take 9.81 m/s^2 against z")
+            self._note("gravity", "left out; readers of URDF assume 9.81 m/s^2 along -z")
 
 
 def _others(names: Mapping[str, str]) -> dict[str, list[str]]:
-    """What others call something, by its name in the scene."""
+    """Names in other programs by name in the scene."""
     found: dict[str, list[str]] = {}
     for name, one in names.items():
         found.setdefault(one, []).append(name)
@@ -243,31 +243,31 @@ def _others(names: Mapping[str, str]) -> dict[str, list[str]]:
 
 
 def _refuse(scene: Scene) -> None:
-    """SceneError for what no note could make good."""
+    """Reject scenes that URDF cannot describe.  Raises SceneError."""
     if scene.beam or scene.elastic:
         one = (*scene.beam, *scene.elastic)[0]
         raise SceneError(
-            f'"{one.name}": URDF has rigid bodies alone; export the scene with rigid ones'
+            f'"{one.name}": URDF supports only rigid bodies; replace flexible bodies by rigid ones'
         )
     for body in scene.bodies:
         if body.type != "rigid":
             raise SceneError(
-                f'body "{body.name}": URDF has no body of type {body.type}; make it rigid'
+                f'body "{body.name}": URDF has no body of type {body.type}; use a rigid body'
             )
     if scene.constraint:
-        raise SceneError("[[constraint]]: URDF has no loops; leave the constraints out first")
+        raise SceneError("[[constraint]]: URDF has no closed loops; remove the constraints")
     for hinge in scene.hinges:
         if hinge.type not in BY_HINGE:
             raise SceneError(
-                f'hinge "{hinge.name}": URDF has no joint like a {hinge.type} hinge; write pins '
-                "and slides in a row, with bodies without mass between them"
+                f'hinge "{hinge.name}": URDF has no joint like a {hinge.type} hinge; use pins '
+                "and slides in series, with massless bodies between them"
             )
     if cut := [scene.hinge[number] for number in build(scene).cut]:
         raise SceneError(_refusal_of_loops(scene, cut))
 
 
 def _refusal_of_loops(scene: Scene, cut: Sequence[Hinge]) -> str:
-    """Message that names the cut hinges and, for each body they hold, all hinges that do."""
+    """Message with the cut hinges and all inboard hinges of each of their outboard bodies."""
     names = ", ".join(f'"{hinge.name}"' for hinge in cut)
     closing = f"hinge {names} closes a loop" if len(cut) == 1 else f"hinges {names} close loops"
     holders: dict[str, list[str]] = {hinge.outboard_body: [] for hinge in cut}
@@ -275,12 +275,12 @@ def _refusal_of_loops(scene: Scene, cut: Sequence[Hinge]) -> str:
         if hinge.outboard_body in holders:
             holders[hinge.outboard_body].append(f'"{hinge.name}"')
     held = "; ".join(
-        f'body "{body}" is held by hinges {" and ".join(hinges)}'
+        f'body "{body}" has the inboard hinges {" and ".join(hinges)}'
         for body, hinges in holders.items()
     )
     return (
-        f"{closing}, which URDF does not have: {held}; leave out hinges until one holds each "
-        "body, and keep the bodies"
+        f"{closing}, which URDF does not support: {held}; leave out hinges until each body has "
+        "one inboard hinge, and keep the bodies"
     )
 
 
@@ -289,7 +289,7 @@ def _end(body: Body, end: str) -> Pose:
 
 
 def _keys(hinge: Hinge) -> dict[str, Any]:
-    """The axis, and of the law what URDF has."""
+    """Joint keys of a hinge: axis, and the parts of the law that URDF supports."""
     kind, facts = BY_HINGE[hinge.type], hinge.facts
     keys: dict[str, Any] = {kind.axis: hinge.unit_axis} if kind.axis else {}
     if facts is None or len(facts.speeds) != 1:
@@ -302,8 +302,10 @@ def _keys(hinge: Hinge) -> dict[str, Any]:
 
 
 def _range(hinge: Hinge) -> dict[str, float]:
-    """Where a hinge of one coordinate ends (m or rad): at its stops, where there is none as rated.
-    Where these contradict each other, what has both ends; nothing where none has."""
+    """Range of a hinge with one coordinate (m or rad): its stops, else its rated range.
+
+    Where these contradict each other, the one with both limits is used; none if neither has both.
+    """
     stops, rated = (_said(one, *_ENDS) for one in (hinge.law.entry(0).limits, hinge.rated))
     both = {**rated, **stops}
     if both.get("lower", -math.inf) < both.get("upper", math.inf):
@@ -312,13 +314,13 @@ def _range(hinge: Hinge) -> dict[str, float]:
 
 
 def _said(table: Any, *keys: str) -> dict[str, float]:
-    """What a table says of these keys."""
+    """Values that a table gives for these keys."""
     values = {key: getattr(table, key, None) for key in keys}
     return {key: value for key, value in values.items() if value is not None}
 
 
 def _line(coupling: Coupling) -> Mimic | None:
-    """q_1 = m q_2 + b of a row that is linear in two coordinates; None for others."""
+    """Mimic q_1 = m q_2 + b of a row that is linear in two coordinates; None for others."""
     names, equals = list(_coordinates(coupling)), coupling.equals
     if coupling.expression is None or len(names) != 2 or (equals is not None and equals.names):
         return None
@@ -342,7 +344,7 @@ def _line(coupling: Coupling) -> Mimic | None:
 
 
 def _coordinates(coupling: Coupling) -> Iterator[str]:
-    """Hinges of one coordinate that a row names."""
+    """Names of hinges whose q is in a row."""
     for name in coupling.row.names:
         hinge, _, what = name.text.partition(".")
         if what == "q":

@@ -1,4 +1,4 @@
-"""Files of robots: which endings are read, and by whom."""
+"""Import of robot files, by the reader for their suffix."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .mjcf_files import looked_through
 from .units import Units, scaled
 from .urdf import read_urdf
 
-#: Endings, and the largest file of each in MB.
+#: Largest file in MB by suffix.
 ENDINGS = {".urdf": 16, ".xml": 16, ".mjcf": 16}
 
 
 def is_robot(path: str | os.PathLike[str]) -> bool:
-    """Whether the name of a file ends as that of a robot."""
+    """Whether a file name has the suffix of a robot file."""
     return os.path.splitext(os.fsdecode(path))[1].lower() in ENDINGS
 
 
@@ -30,16 +30,17 @@ def import_robot(
     stops: float | None = None, mimics: str = COUPLED,
     units: Mapping[str, str] | None = None,
 ) -> Imported:  # fmt: skip
-    """The scene of a robot's file, what became of its names, and notes on what differs.
+    """Import a robot file: its scene, a mapping of its names, and notes on differences.
 
-    URDF is read as it is; MJCF (.xml, .mjcf) by MuJoCo, extra `robot`.
+    URDF is read directly; MJCF (.xml, .mjcf) is read by MuJoCo, extra `robot`.
 
-    base: "fixed" on the ground, or "free".  merge: links on fixed joints become part of the body
-    that holds them, and their frames ends of it.  stops: stiffness (N/m or N m/rad) of stops at the
-    limits of joints; without it there are none.  mimics: joints that go with others are "coupled"
-    to them, or "held" where they start, which leaves no loop.  units: those of
-    the file where they are not m and kg, as {"length": "mm", "mass": "g"}; times are in s.  Raises
-    SceneError, and EnvironmentFailure where MuJoCo is needed and not there.
+    base: "fixed" on the ground, or "free".  merge: links on fixed joints become part of their
+    inboard body, and their frames ends of it.  stops: stiffness (N/m or N m/rad) of stops at the
+    limits of joints; without it there are no stops.  mimics: joints that mimic others are "coupled"
+    to them, or "held" at their initial value, which avoids closed loops.  units: units of a file
+    that is not in m and kg, as {"length": "mm", "mass": "g"}; times are in s.
+
+    Raises SceneError, and EnvironmentFailure where MuJoCo is needed but not installed.
     """
     if not (isinstance(base, str) and base in BASES):
         raise SceneError(f'base: expected "fixed" or "free", found {short(base)}')
@@ -53,7 +54,7 @@ def import_robot(
     if full.suffix.lower() == ".urdf":
         robot = read_urdf(content, where)
     elif base == "free":
-        raise SceneError(f'{where}: base = "free" is for URDF; in MJCF a <freejoint> says so')
+        raise SceneError(f'{where}: base = "free" is for URDF only; in MJCF use a <freejoint>')
     else:
         robot = read_mjcf(str(full), where, looked_through(content, full, where))
     robot = scaled(robot, factors, gravity=full.suffix.lower() != ".urdf")

@@ -1,4 +1,4 @@
-"""XML with the line of every element, without entities, document types or anything from outside."""
+"""Safe XML reader: elements with line numbers, no entities, document types or external data."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from xml.parsers import expat
 from ...arguments import number_in
 from ...errors import SceneError
 
-#: Elements inside each other; robots nest ten deep.
+#: Most nested elements; robots nest ten deep.
 _DEEPEST = 100
 
 
 @dataclass(slots=True)
 class Element:
-    """An element: its tag, attributes, what is inside, and where it begins."""
+    """XML element: tag, attributes, children, and its file and line for messages."""
 
     tag: str
     attributes: dict[str, str]
@@ -23,26 +23,26 @@ class Element:
     children: list[Element] = field(default_factory=list)
 
     def all(self, tag: str) -> Iterator[Element]:
-        """What is inside and has this tag, in the order of the file."""
+        """Children with this tag, in the order of the file."""
         return (child for child in self.children if child.tag == tag)
 
     def first(self, tag: str) -> Element | None:
-        """The first of them, None where there is none."""
+        """First child with this tag, or None."""
         return next(self.all(tag), None)
 
     def text(self, key: str) -> str:
-        """An attribute that must be there.  Raises SceneError."""
+        """Value of a required attribute.  Raises SceneError."""
         value = self.attributes.get(key, "").strip()
         if not value:
-            raise SceneError(f"{self.where}: <{self.tag}> has no {key}; write {key}=...")
+            raise SceneError(f"{self.where}: <{self.tag}> has no {key}; add {key}=...")
         return value
 
     def number(self, key: str, default: float, unit: str) -> float:
-        """An attribute that is a finite number.  Raises SceneError."""
+        """Value of an attribute as a finite number.  Raises SceneError."""
         return self.numbers(key, (default,), unit)[0]
 
     def numbers(self, key: str, default: tuple[float, ...], unit: str) -> tuple[float, ...]:
-        """As many finite numbers as `default` has, with blanks between.  Raises SceneError."""
+        """Value of an attribute as len(default) finite numbers.  Raises SceneError."""
         text = self.attributes.get(key)
         if text is None:
             return default
@@ -59,8 +59,10 @@ class Element:
 
 
 def parsed(content: bytes, where: str, deepest: int = _DEEPEST) -> Element:
-    """The outermost element of a file whose name is `where`, with at most `deepest` inside each
-    other.  Raises SceneError."""
+    """Parse an XML file: its outermost element.  Raises SceneError.
+
+    `where` is the name of the file in messages, `deepest` the most nested elements.
+    """
     text = content.lstrip()
     above = content[: len(content) - len(text)].count(b"\n")
     parser = expat.ParserCreate()
@@ -81,7 +83,7 @@ def parsed(content: bytes, where: str, deepest: int = _DEEPEST) -> Element:
 
     def refused(*_: object) -> None:
         raise SceneError(
-            f"{line()}: a document type or an entity is not read; take it out of the file"
+            f"{line()}: document types and entities are not supported; remove them from the file"
         )
 
     parser.StartElementHandler = start
@@ -93,6 +95,6 @@ def parsed(content: bytes, where: str, deepest: int = _DEEPEST) -> Element:
     except expat.ExpatError as error:
         what = expat.ErrorString(error.code)
         raise SceneError(f"{where}: line {above + error.lineno}: not valid XML: {what}") from None
-    except (ValueError, LookupError) as error:  # of an encoding that nobody knows, too
+    except (ValueError, LookupError) as error:  # includes unknown encodings
         raise SceneError(f"{where}: not valid XML: {error}") from None
     return outside.children[0]

@@ -1,4 +1,4 @@
-"""Links welded into one body: its mass, mass centre and inertia."""
+"""Merged mass, mass centre and inertia of links welded into one body."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from .robot import NOTHING, Link, Note, Robot
 
 
 def joined(parts: Sequence[tuple[Link, Pose]]) -> tuple[float, Vector, Matrix]:
-    """Mass (kg), mass centre (m) and inertia about it (kg m^2) of links, each with its frame in
-    the axes of the body, in these axes."""
+    """Merge links to one body: mass (kg), mass centre (m) and inertia about it (kg m^2).
+
+    Each link is given with its frame in the axes of the body; the results are in these axes.
+    """
     if len(parts) == 1 and parts[0][1] == IN_PLACE:
         link = parts[0][0]
         return link.mass, link.center, link.inertia
@@ -35,7 +37,7 @@ def joined(parts: Sequence[tuple[Link, Pose]]) -> tuple[float, Vector, Matrix]:
 
 
 def without_dust(robot: Robot) -> Robot:
-    """A robot whose links without mass have no inertia that is rounding beside the others'."""
+    """Remove inertia of massless links that is rounding compared with the other links."""
     entries = {link.name: max(abs(x) for row in link.inertia for x in row) for link in robot.links}
     largest, mass = max(entries.values(), default=0.0), sum(link.mass for link in robot.links)
     dust = [
@@ -44,7 +46,7 @@ def without_dust(robot: Robot) -> Robot:
     ]  # fmt: skip
     if not dust:
         return robot
-    what = "its inertia is rounding and it has no mass, so it counts as having neither"
+    what = "no mass, and an inertia that is rounding; both are treated as zero"
     notes = (Note(link.where, f"link {link.name!r}", what) for link in dust)
     names = {link.name for link in dust}
     links = tuple(
@@ -54,7 +56,7 @@ def without_dust(robot: Robot) -> Robot:
 
 
 def _plus(total: Matrix, inertia: Matrix, mass: float, arm: Sequence[float]) -> Matrix:
-    """Steiner: J + m (a.a 1 - a a^T)."""
+    """Add an inertia by the parallel axis theorem: J + m (a.a 1 - a a^T)."""
     square = sum(a * a for a in arm)
     rows = [
         tuple(

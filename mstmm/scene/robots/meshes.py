@@ -1,4 +1,4 @@
-"""Where the meshes of a robot lie."""
+"""Paths of the mesh files of a robot."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _PACKAGE, _FILE = "package://", "file://"
 
 
 class Meshes:
-    """The meshes around a robot's file in `folder`.
+    """Finder of the mesh files of a robot file in `folder`.
 
-    Packages are not looked up: "package://NAME/PLACE" is in the nearest folder NAME that `folder`
-    is in, or that lies beside one that it is in.
+    ROS packages are not resolved: "package://NAME/PATH" is searched in the nearest folder NAME that
+    is in `folder` or in one of its parent folders.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -21,7 +21,7 @@ class Meshes:
         self._packages = dict[str, str | None]()
 
     def path(self, name: str) -> str | None:
-        """The mesh of this name in the robot's file; None where it is not there."""
+        """Path of a mesh by its name in the robot file; None where there is no such file."""
         if name.startswith(_FILE):
             place: str | None = unquote(name.removeprefix(_FILE))
         elif name.startswith(_PACKAGE):

@@ -1,8 +1,8 @@
-"""MJCF -> a robot, by the model that MuJoCo compiles from it (extra `robot`).
+"""Reader of MJCF files, by the model that MuJoCo compiles from them (extra `robot`).
 
-A body's frame is placed in its parent's; its joints, each about an anchor of its own, move it one
-after the other.  The link of a body has its origin at the anchor of the last one; the joints before
-it move links without mass.  Values of joints are MuJoCo's qpos.
+The frame of a body is given in its parent.  Its joints, each about its own anchor, move it in
+series.  The link of a body has its origin at the anchor of the last joint; the joints before it
+move massless links.  Values of joints are MuJoCo's qpos.
 """
 
 from __future__ import annotations
@@ -36,29 +36,30 @@ from .robot import (
 
 _FREE, _BALL, _SLIDE = 0, 1, 2
 _HINGES = ("free", "ball", "prismatic", "pin")
-#: What of a model moves something and is left out, by the name of its count.
+#: Dynamic parts of a model that are left out, by the name of their count.
 _LEFT = {
     "nu": "actuators", "nsensor": "sensors", "nplugin": "plugins", "nflex": "flexible parts",
     "nkey": "keyframes",
 }  # fmt: skip
-#: Likewise, each by its name: its count, its section of the file.
+#: Parts that are left out one by one: their count, and their section of the file.
 _NAMED = {
     "tendon": ("ntendon", "tendon"), "pair": ("npair", "contact"),
     "exclude": ("nexclude", "contact"),
 }  # fmt: skip
 _JOINT_EQUALITY = 2
-#: What the flag "constraint" switches off too.
+#: Flags that are also switched off by "constraint".
 _CONSTRAINTS = ("limit", "frictionloss", "equality")
-#: So much of what MuJoCo says is told, in characters.
+#: Most characters quoted from a message of MuJoCo.
 _LONGEST = 400
-#: Groups of shapes that are there to be seen.
+#: Number of geom groups that are drawn.
 _SEEN = 3
 
 
 def read_mjcf(path: str, where: str, places: Places | None = None) -> Robot:
-    """The robot of a file, `where` as messages show its name; `places` are those of what has one.
+    """Read a robot from an MJCF file.
 
-    Raises SceneError for what MuJoCo does not compile, EnvironmentFailure without MuJoCo.
+    `where` is the name of the file in messages, `places` the locations of named elements.  Raises
+    SceneError for files that MuJoCo does not compile, EnvironmentFailure without MuJoCo.
     """
     try:
         import mujoco
@@ -69,21 +70,21 @@ def read_mjcf(path: str, where: str, places: Places | None = None) -> Robot:
     except (ValueError, OSError, RuntimeError, MemoryError) as error:
         why = " ".join(str(error).split())
         why = why if len(why) <= _LONGEST else f"{why[:_LONGEST]}..."
-        raise SceneError(f"{where}: MuJoCo does not read it: {why}") from None
+        raise SceneError(f"{where}: MuJoCo cannot read the file: {why}") from None
     return _Reader(mujoco, model, where, places or {}).robot()
 
 
 class _Reader:
-    """Reads a compiled model."""
+    """Reader of a compiled MuJoCo model."""
 
     def __init__(self, mujoco: Any, model: Any, where: str, places: Places) -> None:
         self._mujoco, self._m, self._where, self._places = mujoco, model, where, places
         self._notes = list[Note]()
-        #: Body -> where its frame is in its link.
+        #: Body -> pose of its frame in its link.
         self._frame = {0: IN_PLACE}
 
     def robot(self) -> Robot:
-        """The robot of the model."""
+        """Read the robot of the model."""
         links, joints = [Link("world", where=self._where)], list[Joint]()
         for body in range(1, self._m.nbody):
             for link, joint in self._body(body):
@@ -98,7 +99,7 @@ class _Reader:
         )  # fmt: skip
 
     def _off(self, what: str) -> bool:
-        """Whether a <flag> of the file switches it off."""
+        """Whether a <flag> of the file switches a feature off."""
         flags = (what, "constraint") if what in _CONSTRAINTS else (what,)
         bits = (getattr(self._mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}") for flag in flags)
         return any(self._m.opt.disableflags & int(bit) for bit in bits)
@@ -107,8 +108,7 @@ class _Reader:
         self._notes.append(Note(where or self._where, element, text))
 
     def _at(self, tag: str, name: str, other: str = "") -> str:
-        """Where an element of the file is, of this or another tag; the file where it has no name
-        of its own."""
+        """File and line of a named element with one of two tags; else the file."""
         return self._places.get((tag, name)) or self._places.get((other, name), self._where)
 
     def _name(self, kind: str, number: int) -> str:
@@ -121,7 +121,7 @@ class _Reader:
         return "world" if body == 0 else self._name("body", body)
 
     def _body(self, body: int) -> Iterator[tuple[Link, Joint]]:
-        """The links of a body and the joints that hold them, outward."""
+        """Links of a body with their inboard joints, from inboard to outboard."""
         m, name = self._m, self._link_of(body)
         first, count = int(m.body_jntadr[body]), int(m.body_jntnum[body])
         parent = int(m.body_parentid[body])
@@ -134,7 +134,7 @@ class _Reader:
             yield self._mass(body, name), weld
             return
         if count > 1:
-            what = f"{count} joints of it are hinges in a row, with bodies without mass between"
+            what = f"its {count} joints are hinges in series, with massless bodies between them"
             self._tell(f"body {name!r}", what, self._at("body", name))
         for number in range(first, first + count):
             kind, last = int(m.jnt_type[number]), number == first + count - 1
@@ -152,13 +152,13 @@ class _Reader:
             holder, pose, anchor = held, IN_PLACE, place
         if any(anchor):
             frame, at_body = f"{name}/frame", self._at("body", name)
-            what = "its origin is where its joint is; its own frame is an end"
+            what = "its origin is at its joint; its original frame is an end"
             self._tell(f"body {name!r}", what, at_body)
             weld = Joint(frame, FIXED, name, frame, self._frame[body], where=at_body)
             yield Link(frame, where=at_body), weld
 
     def _mass(self, body: int, name: str) -> Link:
-        """The link with the body's mass, seen from the link's frame."""
+        """Link with the mass of a body, in the frame of the link."""
         m, frame = self._m, self._frame[body]
         mass = float(m.body_mass[body])
         where = self._at("body", name)
@@ -172,7 +172,7 @@ class _Reader:
         return Link(name, mass, center, inertia if any((a, b, c)) else NOTHING, where)
 
     def _back(self, number: int, kind: int) -> Pose:
-        """From where a joint is at its reference to where it is at 0."""
+        """Pose of a joint at 0 relative to its reference value."""
         if kind in (_FREE, _BALL):
             return IN_PLACE
         reference = float(self._m.qpos0[self._m.jnt_qposadr[number]])
@@ -198,11 +198,11 @@ class _Reader:
         if any(losses) and not self._off("frictionloss"):
             law["friction"] = [{"coulomb": x} for x in losses]
             if kind == _FREE:
-                text = "its friction acts along the axes of the body, of MuJoCo along the world's"
+                text = "its friction acts along the axes of the body, in MuJoCo along world axes"
                 self._tell(f"joint {joint!r}", text, where)
         stiffness = 0.0 if self._off("spring") else float(m.jnt_stiffness[number].flat[0])
         if stiffness and kind in (_FREE, _BALL):
-            text = "its spring is left out; give its hinge a law"
+            text = "its spring is left out; define it in the law of the hinge"
             self._tell(f"joint {joint!r}", text, where)
         elif stiffness:
             law |= {"stiffness": stiffness, "rest": float(m.qpos_spring[at])}
@@ -227,22 +227,22 @@ class _Reader:
         return keys | ({"initial": {"q": start}} if any(start) else {})
 
     def _tell_of_curves(self, number: int, dof: int, joint: str, where: str) -> None:
-        """What springs and dampers have besides the straight line, where MuJoCo knows it."""
+        """Add notes about nonlinear terms of springs and dampers, where MuJoCo has them."""
         for what, key, place in (
             ("spring", "jnt_stiffness", number),
             ("damper", "dof_damping", dof),
         ):
             terms = getattr(self._m, f"{key}poly", None)
             if terms is not None and terms[place].any() and not self._off(what):
-                text = f"of its {what} the terms beyond the first are left out"
+                text = f"the nonlinear terms of its {what} are left out"
                 self._tell(f"joint {joint!r}", text, where)
 
     def _mimics(self) -> Iterator[Mimic]:
-        """Equalities of joints that are straight lines, but for those that are off."""
+        """Active joint equalities that are linear."""
         m, off = self._m, self._off("equality")
         for number in range(m.neq):
             if off or not m.eq_active0[number]:
-                self._leave_equality(number, "left out, as it is off")
+                self._leave_equality(number, "left out: switched off")
                 continue
             line = [float(x) for x in m.eq_data[number][:5]]
             one, other = int(m.eq_obj1id[number]), int(m.eq_obj2id[number])
@@ -284,15 +284,15 @@ class _Reader:
                 name = self._name(what, number)
                 self._tell(f"{what} {name!r}", "left out", self._at(section, name))
         if m.ngeom and (m.geom_contype.any() or m.geom_conaffinity.any()):
-            self._tell("contacts", "left out: bodies go through each other and the ground")
+            self._tell("contacts", "left out: bodies pass through each other and the ground")
         if m.body_gravcomp.any():
             self._tell("gravcomp", "left out")
         if m.opt.density > 0 or m.opt.viscosity > 0:
-            self._tell("fluid", "its forces are left out")
+            self._tell("fluid", "fluid forces are left out")
 
 
 def _solid(kinds: Any, kind: int, size: list[float]) -> dict[str, Any] | None:
-    """The keys of a shape; MuJoCo has half lengths."""
+    """Keys of a shape; MuJoCo stores half lengths."""
     if kind == kinds.mjGEOM_SPHERE:
         return {"type": "sphere", "radius": size[0]}
     if kind == kinds.mjGEOM_BOX:

@@ -1,4 +1,4 @@
-"""The files that an MJCF file is made of, looked at before MuJoCo reads them."""
+"""Checks of an MJCF file and of the files it includes, before MuJoCo reads them."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from ..files.read import content_of
 from .markup import Element, parsed
 from .mjcf_limits import MOST_ELEMENTS, check_element, count_copies
 
-#: Elements inside each other: bodies are, a long chain of them too.
+#: Most nested elements: bodies of a long chain are nested.
 _DEEPEST = 2000
-#: Files of one model, and the largest of them in MB, of MJCF and of meshes and pictures.
+#: Most files of a model, and the largest of them in MB: MJCF, and meshes or textures.
 _MOST, _LARGEST, _LARGEST_ASSET = 200, 16, 200
-#: What names another file of MJCF.
+#: Tags that refer to another MJCF file.
 _NAMING = ("include", "model")
-#: Keys by which elements name files, and by which a compiler says where these are.
+#: Attributes that refer to files, and attributes of <compiler> that give their folders.
 _FILES = ("file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
 _FOLDERS = ("meshdir", "texturedir", "assetdir")
 
-#: Sections whose elements have names of their own kind, whatever their tags.
+#: Sections whose elements share one namespace for all tags.
 _SECTIONS = ("equality", "tendon", "contact", "actuator", "sensor")
 
-#: (section of these or else tag, name) -> where it is.
+#: (section of these or else tag, name) -> file and line.
 Places = dict[tuple[str, str], str]
 
 
 def looked_through(content: bytes, path: Path, where: str) -> Places:
-    """Where the elements with names are, in the file and in those that it includes.
+    """Check an MJCF file with its included files; return the locations of named elements.
 
-    Raises SceneError for document types and entities, for text that is no XML, for what is too
-    large or too much, and for files, of meshes and pictures too, that are not in the folder of the
-    model or below it, or no regular files.
+    Raises SceneError for document types and entities, for text that is not XML, and for too many or
+    too large files or elements.  It also raises SceneError for files, including meshes and
+    textures, that are outside the folder of the model or not regular.
     """
     folder, found = path.parent.resolve(), Places()
     waiting, seen, total = [(content, path, where, 1)], {path.resolve()}, 0
@@ -46,8 +46,8 @@ def looked_through(content: bytes, path: Path, where: str) -> Places:
             total += here
             if total > MOST_ELEMENTS:
                 raise SceneError(
-                    f"{one.where}: <{one.tag}>: the model has more than {MOST_ELEMENTS} elements, "
-                    "copies counted; leave some out"
+                    f"{one.where}: <{one.tag}>: the model has more than {MOST_ELEMENTS} elements "
+                    "including copies; leave some out"
                 )
             folders.update(one.attributes[key] for key in _FOLDERS if key in one.attributes)
             if one.tag not in _NAMING:
@@ -73,13 +73,15 @@ def looked_through(content: bytes, path: Path, where: str) -> Places:
 
 
 def _check_assets(one: Element, folder: Path, beside: Path, folders: Collection[str]) -> None:
-    """SceneError for a mesh or picture from elsewhere, that is no regular file or too large, in any
-    of the `folders` that compilers name."""
+    """Check the mesh or texture files of an element in all `folders` of compilers.
+
+    Raises SceneError for files outside the folder of the model, not regular, or too large.
+    """
     for key in _FILES:
         if one.attributes.get(key, "").strip():
             for other in _others(one, folder, beside, key, folders):
                 if other.stat().st_size > _LARGEST_ASSET * 2**20:
-                    raise _refused(one, f"has more than {_LARGEST_ASSET} MB", key)
+                    raise _refused(one, f"the file is larger than {_LARGEST_ASSET} MB", key)
 
 
 def _others(
@@ -89,8 +91,10 @@ def _others(
     key: str = "file",
     folders: Collection[str] | None = None,
 ) -> Iterator[Path]:
-    """The files that an element may mean: from the folder of the model, and from that of its own
-    file; those that are there.  MuJoCo takes a backslash for a slash, and may leave out folders."""
+    """Existing files that an element may refer to, in the folder of the model or its file.
+
+    MuJoCo reads a backslash as a slash, and may ignore folders.
+    """
     name = one.attributes[key]
     if not name.strip():
         raise _refused(one, "expected the name of a file", key)
@@ -104,14 +108,14 @@ def _others(
                 mode = other.stat().st_mode if other.is_relative_to(folder) else None
             except (FileNotFoundError, NotADirectoryError):
                 continue
-            except (OSError, RuntimeError, ValueError) as error:  # names too long, rings of links
+            except (OSError, RuntimeError, ValueError) as error:  # long names, cyclic links
                 why = getattr(error, "strerror", None) or "links to itself"
                 raise _refused(one, f"cannot be read: {why}", key) from None
             if mode is None:
                 why = "expected a file in the folder of the model or below it; copy it there"
                 raise _refused(one, why, key)
             if not stat.S_ISREG(mode):
-                raise _refused(one, "this is not a regular file; name one", key)
+                raise _refused(one, "this is not a regular file; give the path of one", key)
             yield other
 
 
@@ -120,8 +124,10 @@ def _refused(one: Element, why: str, key: str = "file") -> SceneError:
 
 
 def _all(one: Element, copies: int) -> Iterator[tuple[str, Element, int]]:
-    """The element and all that is inside, each with its section if that is one of `_SECTIONS`, and
-    how often it is there in the end."""
+    """Yield an element and all its descendants as (section, element, number of copies).
+
+    The section is one of `_SECTIONS` or "".
+    """
     left = [("", one, copies)]
     while left:
         section, one, copies = left.pop()

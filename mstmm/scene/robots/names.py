@@ -1,4 +1,4 @@
-"""Names of a file -> names of a scene."""
+"""Mapping from names of a robot file to names of a scene."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _LONGEST = 60
 
 
 class Names:
-    """Gives every name of the file one of its own that a scene takes."""
+    """Registry that gives each name of a file a unique valid name in the scene."""
 
     def __init__(self) -> None:
         self._taken = {GROUND}
@@ -22,8 +22,10 @@ class Names:
     def take_all(
         self, names: Iterable[str], instead: str, others: Iterable[str] = ()
     ) -> dict[str, str]:
-        """The same of several, by the names of the file; those that a scene takes stay, and none
-        becomes one of `others`."""
+        """Register several names: scene names by file names.
+
+        Names that are valid in a scene are kept; no other name becomes one of `others`.
+        """
         waiting, found = list(names), dict[str, str]()
         for stays in (True, False):
             some = [name for name in waiting if _stays(name) == stays]
@@ -32,8 +34,10 @@ class Names:
         return {name: found[name] for name in waiting}
 
     def take(self, name: str, instead: str) -> str:
-        """The name with _ for what a scene has not in names; `instead` is put before what does not
-        begin with a letter."""
+        """Register a name: invalid characters become _, and the result is made unique.
+
+        `instead` is the prefix of names that do not begin with a letter.
+        """
         plain = _OTHER.sub("_", name).strip("_")[:_LONGEST]
         if not plain[:1].isalpha():
             plain = f"{instead}_{plain}".rstrip("_")
@@ -52,10 +56,10 @@ def _stays(name: str) -> bool:
 def kept(
     links: Mapping[str, str], joints: Mapping[str, str], references: Container[str]
 ) -> dict[str, dict[str, str]]:
-    """What a scene keeps of the names of a file as its `[names]`: those of links and joints that
-    have others in it.  Where several links are one body, the first of them is its name.
+    """Table [names] of a scene: names of links and joints that are renamed in the scene.
 
-    `references` are those that the scene has itself, of bodies and ends.
+    Where several links are one body, the first of them is the name of the body.  `references` are
+    the bodies and ends of the scene.
     """
     shared = {one for one, count in Counter(links.values()).items() if count > 1}
     bodies = {

@@ -1,4 +1,4 @@
-"""A robot as the formats of others have it: links joined by joints, in frames of their own."""
+"""Intermediate model of a robot: links connected by joints, with their frames."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NOTHING: Matrix = (ZERO, ZERO, ZERO)
 
 @dataclass(frozen=True)
 class Link:
-    """A rigid body: mass (kg), mass centre (m) and inertia about it (kg m^2), in its own axes."""
+    """Rigid body: mass (kg), mass centre (m) and inertia about it (kg m^2), in link axes."""
 
     name: str
     mass: float = 0.0
@@ -26,9 +26,12 @@ class Link:
 
 @dataclass(frozen=True)
 class Joint:
-    """What joins two links, of a type of hinge: `pose` is the child's frame in the parent's at
-    q = 0; `keys` are more of its [[hinge]], and "armature" (kg) of a free one the mass at its
-    origin that accelerates and weighs nothing, which its law's inertia has besides."""
+    """Joint between two links, with the type of its hinge.
+
+    `pose` is the frame of the child in the parent at q = 0; `keys` are further keys of its
+    [[hinge]].  "armature" (kg) of a free joint is a mass at its origin that has inertia but no
+    weight; it is also part of the inertia in its law.
+    """
 
     name: str
     type: str
@@ -41,7 +44,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Mimic:
-    """The joint `of` goes with another one: q = multiplier q_other + offset."""
+    """Mimic relation of the joint `of` to another one: q = multiplier q_other + offset."""
 
     of: str
     other: str
@@ -51,7 +54,7 @@ class Mimic:
 
 @dataclass(frozen=True)
 class Look:
-    """What a link looks like: a [[shape]] in its axes, without the names."""
+    """Visual geometry of a link: a [[shape]] in its axes, without names."""
 
     link: str
     pose: Pose
@@ -59,13 +62,13 @@ class Look:
 
 
 def color(rgb: Iterable[float]) -> str:
-    """Red, green and blue, 0 to 1, as a scene has them."""
+    """Convert red, green and blue (0 to 1) to the colour format of a scene."""
     return "#" + "".join(f"{round(255 * min(max(float(x), 0.0), 1.0)):02x}" for x in rgb)
 
 
 @dataclass(frozen=True)
 class Note:
-    """What became of something in the file that a scene has not, or has otherwise."""
+    """Note on an element of a robot file that is left out or converted differently."""
 
     where: str
     element: str
@@ -77,7 +80,7 @@ class Note:
 
 @dataclass(frozen=True)
 class Robot:
-    """Links, joints and looks in the order of the file."""
+    """Links, joints and visual geometry of a robot, in the order of the file."""
 
     name: str
     where: str

@@ -1,4 +1,4 @@
-"""The tree of a robot's links: who holds whom, and what hangs on nothing that has mass."""
+"""Tree of the links of a robot: inboard joints, roots, and joints without outboard mass."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ from .robot import FIXED, NOTHING, Joint, Link, Robot
 
 
 class Tree:
-    """`links` and `joints` by name, `holder` the joint that holds a link, `carried` by link the
-    joints that hang on it, `roots` the links that nothing holds."""
+    """Tree of the links of a robot.
+
+    `links` and `joints` are by name; `holder` is the inboard joint of a link, `carried` the
+    outboard joints of a link; `roots` are the links without an inboard joint.
+    """
 
     def __init__(self, robot: Robot) -> None:
         self.links: dict[str, Link] = {}
@@ -27,15 +30,15 @@ class Tree:
             self.joints[joint.name] = joint
             self._hang(joint)
         if not self.links:
-            raise SceneError(f"{robot.where}: there is no link in it")
+            raise SceneError(f"{robot.where}: the robot has no link")
         self.roots = [name for name in self.links if name not in self.holder]
         self.outward = list(self._outward())
         if len(self.outward) < len(self.links):
             reached = {link.name for link in self.outward}
             name = next(name for name in self.links if name not in reached)
             raise SceneError(
-                f"{self.holder[name].where}: the joints around link {name!r} close a ring, which "
-                "URDF has not; take one of them out, and close the loop in the scene"
+                f"{self.holder[name].where}: the joints around link {name!r} form a cycle, which "
+                "URDF does not allow; remove one of them, and close the loop in the scene"
             )
 
     def _hang(self, joint: Joint) -> None:
@@ -47,14 +50,14 @@ class Tree:
                 )
         if joint.child in self.holder:
             raise SceneError(
-                f"{joint.where}: link {joint.child!r} is held by joint "
-                f"{self.holder[joint.child].name!r} and by {joint.name!r}; a link has one parent"
+                f"{joint.where}: link {joint.child!r} is the child of joint "
+                f"{self.holder[joint.child].name!r} and of {joint.name!r}; a link has one parent"
             )
         self.holder[joint.child] = joint
         self.carried[joint.parent].append(joint)
 
     def _outward(self) -> Iterator[Link]:
-        """Links, each behind the one that holds it."""
+        """Links in tree order, each after its parent."""
         left = list(reversed(self.roots))
         while left:
             name = left.pop()
@@ -62,7 +65,7 @@ class Tree:
             left += [joint.child for joint in reversed(self.carried[name])]
 
     def weightless(self) -> list[Joint]:
-        """Joints that move, and nothing that has mass or inertia."""
+        """Moving joints without any mass or inertia outboard of them."""
         heavy = set[str]()
         for link in reversed(self.outward):
             below = any(joint.child in heavy for joint in self.carried[link.name])
@@ -76,4 +79,4 @@ class Tree:
 
 def _once(known: Collection[str], one: Link | Joint, what: str) -> None:
     if one.name in known:
-        raise SceneError(f"{one.where}: {what} {one.name!r} is there twice; name one of them anew")
+        raise SceneError(f"{one.where}: {what} {one.name!r} is defined twice; rename one of them")

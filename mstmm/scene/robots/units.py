@@ -1,4 +1,4 @@
-"""Robots in other units than m and kg: converted where asked, and told where the sizes look so."""
+"""Unit conversion of robots, and notes where sizes suggest other units than m and kg."""
 
 from __future__ import annotations
 
@@ -15,29 +15,32 @@ from ...numbers.rotations import Matrix, Vector
 from .robot import Joint, Link, Look, Mimic, Note, Robot
 from .tree import Tree
 
-#: Quantity -> unit -> how many m or kg it has.
+#: Quantity -> unit -> its size in m or kg.
 UNITS = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254},
     "mass": {"kg": 1.0, "g": 1e-3, "t": 1e3, "lb": 0.45359237},
 }
-#: No robot reaches further, in m.
+#: Largest plausible reach of a robot, m.
 _FAR = 100.0
-#: Mass by the cube of the radius of gyration (kg/m^3): 9 densities of a ball, more of thin parts.
+#: Plausible mass over the cube of the radius of gyration (kg/m^3): a solid ball has about 9 times
+#: its density, thin parts more.
 _LIGHTEST, _HEAVIEST = 1e-1, 1e6
-#: Radii of gyration by the reach.
+#: Plausible radii of gyration relative to the reach.
 _SMALLEST, _LARGEST = 1e-4, 10.0
 
 
 class Units(NamedTuple):
-    """How many m and kg the units of a file have."""
+    """Size of the units of a file in m and kg."""
 
     length: float = 1.0
     mass: float = 1.0
 
     @classmethod
     def named(cls, given: Mapping[str, str] | None) -> Units:
-        """Of {"length": "mm", "mass": "g"}; what is not there is in m and kg.  Raises
-        SceneError."""
+        """Create from names such as {"length": "mm", "mass": "g"}; the default is m and kg.
+
+        Raises SceneError.
+        """
         if given is None:
             return cls()
         if not isinstance(given, Mapping) or set(given) - set(UNITS):
@@ -49,12 +52,12 @@ class Units(NamedTuple):
         return cls(**{key: UNITS[key][unit] for key, unit in given.items()})
 
     def of_law(self, power: float) -> float:
-        """What efforts by speeds have, of speeds with so many lengths."""
+        """Factor of effort over speed (or acceleration), for speeds with `power` lengths."""
         return self.mass * self.length ** (2 - 2 * power)
 
 
 def scaled(robot: Robot, units: Units, gravity: bool) -> Robot:
-    """The robot in m and kg; whether `gravity` is the file's."""
+    """Convert a robot to m and kg; `gravity` is whether its gravity comes from the file."""
     if units == Units():
         return robot
     lengths = {
@@ -98,7 +101,7 @@ def _joint(joint: Joint, units: Units) -> Joint:
 
 
 def _term(key: str, given: Any, powers: tuple[int, ...], units: Units) -> Any:
-    """An entry of a law: a number, a table, or one of these for each speed."""
+    """Convert an entry of a law: a number, a table, or a list of these by speed."""
     if isinstance(given, list):
         each = powers if len(powers) == len(given) else powers[:1] * len(given)
         return [_term(key, one, (power,), units) for one, power in zip(given, each, strict=True)]
@@ -111,7 +114,7 @@ def _term(key: str, given: Any, powers: tuple[int, ...], units: Units) -> Any:
 
 
 def _mimic(mimic: Mimic, lengths: Mapping[str, float]) -> Mimic:
-    """`lengths`: of the joints whose value is one."""
+    """Convert a mimic relation; `lengths` are the factors of joints whose value is a length."""
     own, other = lengths.get(mimic.of, 1.0), lengths.get(mimic.other, 1.0)
     return replace(mimic, multiplier=mimic.multiplier * own / other, offset=mimic.offset * own)
 
@@ -138,7 +141,7 @@ def _times(given: Vector, factor: float) -> Vector:
 
 
 def doubts(robot: Robot, tree: Tree) -> Iterator[Note]:
-    """Notes where the sizes of a robot look as if they were not in m and kg."""
+    """Notes about sizes of a robot that suggest other units than m and kg."""
     reach = _reach(tree)
     found = [
         (link.mass, math.sqrt(trace / (2 * link.mass))) for link in robot.links
@@ -146,21 +149,21 @@ def doubts(robot: Robot, tree: Tree) -> Iterator[Note]:
     ]  # fmt: skip
     signs = list[str]()
     if reach > _FAR:
-        signs.append(f"it reaches {reach:.3g} m")
+        signs.append(f"a reach of {reach:.3g} m")
     if found:
         size = median(radius for _, radius in found)
         dense = median(mass / radius**3 for mass, radius in found)
         if reach > 0 and not _SMALLEST < size / reach < _LARGEST:
-            signs.append(f"radii of gyration of {size:.3g} m in a reach of {reach:.3g} m")
+            signs.append(f"radii of gyration of {size:.3g} m with a reach of {reach:.3g} m")
         if not _LIGHTEST < dense < _HEAVIEST:
-            signs.append(f"masses of {dense:.3g} kg by the cube of the radius of gyration in m")
+            signs.append(f"mass over radius of gyration cubed of {dense:.3g} kg/m^3")
     if signs:
-        text = f"do not look like m and kg: {'; '.join(signs)}; `units` converts"
+        text = f"probably not m and kg: {'; '.join(signs)}; convert them with `units`"
         yield Note(robot.where, "units", text)
 
 
 def _reach(tree: Tree) -> float:
-    """The longest way from a root along the joints to a mass centre."""
+    """Longest path (m) from a root along the joints to a mass centre."""
     ways, longest = dict[str, float](), 0.0
     for link in tree.outward:
         joint = tree.holder.get(link.name)

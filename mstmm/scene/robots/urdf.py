@@ -1,7 +1,7 @@
-"""URDF -> a robot.
+"""Reader of URDF files.
 
-A link's axes are those of the joint that holds it; a joint's axis is in these, its origin in the
-parent's; <inertial> has a frame of its own, about whose origin the inertia is.
+The axes of a link are those of its inboard joint.  The axis of a joint is in these axes, its origin
+in those of the parent.  <inertial> has its own frame, about whose origin the inertia is given.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from .robot import FIXED, NOTHING, Joint, Link, Look, Mimic, Note, Robot, color
 
 
 class _Kind(NamedTuple):
-    """A type of joint: its hinge, the key of the axis if it has one, and the unit of its one
-    coordinate."""
+    """Type of joint: its hinge type, the key of its axis, and the unit of a single coordinate."""
 
     joint: str
     hinge: str
@@ -38,24 +37,23 @@ _KINDS = {
     )
 }  # fmt: skip
 _UNLIMITED = "continuous"
-#: Readers of URDF want limits of effort and velocity: that which stands for none.
+#: Limit of effort and velocity that means none: readers of URDF require a value.
 NO_LIMIT = 1e9
-#: Joints without limits -> those with; and a hinge's joint, without limits where there is one.
+#: Joint types without limits -> types with limits; and joint types by hinge type.
 LIMITED = {_UNLIMITED: "revolute"}
 BY_HINGE = {kind.hinge: kind for kind in _KINDS.values()}
 _READ = ("link", "joint", "material")
 
 
 class _Known(NamedTuple):
-    """Attributes of an element, and the elements that are read in it: once, and any number of
-    times."""
+    """Supported attributes of an element, and supported children: once, or any number of times."""
 
     attributes: tuple[str, ...]
     once: tuple[str, ...] = ()
     often: tuple[str, ...] = ()
 
 
-#: What is read of a robot; where a tag is not known, all inside it is somebody else's.
+#: Supported elements of a robot; elements with other tags are ignored with their content.
 _KNOWN = {
     "link": _Known(("name", "type"), ("inertial",), ("visual", "collision")),
     "inertial": _Known((), ("origin", "mass", "inertia")),
@@ -77,12 +75,12 @@ _MATERIAL = "material"
 
 
 def read_urdf(content: bytes, where: str) -> Robot:
-    """The robot of a file, `where` as messages show its name.  Raises SceneError."""
+    """Read a robot from a URDF file; `where` is its name in messages.  Raises SceneError."""
     root = parsed(content, where)
     if root.tag != "robot":
         raise SceneError(f"{root.where}: expected <robot>, found <{root.tag[:40]}>")
     if any(child.tag.startswith("xacro:") for child in root.children):
-        raise SceneError(f"{where}: this is a xacro file; expand it first: xacro FILE > robot.urdf")
+        raise SceneError(f"{where}: this is a xacro file; expand it with xacro FILE > robot.urdf")
     reader = _Reader(root)
     links = tuple(map(reader.link, root.all("link")))
     joints = tuple(map(reader.joint, root.all("joint")))
@@ -96,7 +94,7 @@ def read_urdf(content: bytes, where: str) -> Robot:
 
 
 class _Reader:
-    """Reads links and joints, and gathers what goes beside them."""
+    """Reader of links and joints that also collects notes, visuals and mimics."""
 
     def __init__(self, root: Element) -> None:
         self.notes, self.looks, self.mimics = list[Note](), list[Look](), list[Mimic]()
@@ -106,12 +104,11 @@ class _Reader:
         }  # fmt: skip
 
     def note(self, at: Element, element: str, text: str) -> None:
-        """Tell what became of something."""
+        """Add a note about an element."""
         self.notes.append(Note(at.where, element, text))
 
     def _note_unread(self, one: Element, owner: str) -> None:
-        """Tell of elements that are there twice, and of elements and attributes that are unknown,
-        in a link or joint."""
+        """Add notes about repeated elements, and unknown elements and attributes, of an owner."""
         known = _KNOWN.get(one.tag)
         if known is None:
             return
@@ -124,7 +121,7 @@ class _Reader:
             if tag not in (*known.once, *known.often):
                 self.note(one, owner, f"<{tag[:40]}> in <{one.tag}> left out")
             elif count > 1 and tag in known.once:
-                what = f"<{tag}> is there {count} times; the first counts, the others are left out"
+                what = f"<{tag}> is given {count} times; the first applies, the others are left out"
                 self.note(one, owner, what)
         for child in one.children:
             self._note_unread(child, owner)
@@ -140,7 +137,7 @@ class _Reader:
         kg = 0.0 if mass is None else mass.number("value", 0.0, "kg")
         if kg < 0:
             raise SceneError(
-                f"{inertial.where}: link {name!r}: a mass of {kg:g} kg; expected 0 or more"
+                f"{inertial.where}: link {name!r}: expected a mass of 0 kg or more, found {kg:g}"
             )
         given = _inertia(inertial.first("inertia"))
         inertia = without_dust(given, kg)
@@ -149,11 +146,11 @@ class _Reader:
         elif kg == 0 and inertia != NOTHING:
             self.note(one, f"link {name!r}", "moments of inertia without a mass")
         if inertia != given:
-            self.note(one, f"link {name!r}", "moments of inertia below 0 by rounding taken as 0")
+            self.note(one, f"link {name!r}", "moments of inertia below 0 by rounding set to 0")
         turned = product(product(frame.rotation, inertia), transpose(frame.rotation))
         link = Link(name, kg, frame.position, _symmetric(turned), one.where)
         if negative := negative_moment(inertia):
-            self.note(one, f"link {name!r}", f"taken as it is: {negative}")
+            self.note(one, f"link {name!r}", f"accepted unchanged: {negative}")
         return link
 
     def joint(self, one: Element) -> Joint:
@@ -162,12 +159,12 @@ class _Reader:
         kind = _KINDS.get(given)
         if kind is None:
             hint = near(given, _KINDS)
-            raise SceneError(f"{one.where}: joint {name!r}: the type {given!r} is unknown{hint}")
+            raise SceneError(f"{one.where}: joint {name!r}: unknown type {given!r}{hint}")
         ends = []
         for tag in ("parent", "child"):
             end = one.first(tag)
             if end is None:
-                raise SceneError(f"{one.where}: joint {name!r} has no <{tag} link=...>")
+                raise SceneError(f"{one.where}: joint {name!r} has no <{tag} link=...>; add it")
             ends.append(end.text("link"))
         keys = dict[str, Any]()
         if kind.axis:
@@ -190,13 +187,13 @@ class _Reader:
         x, y, z = (1.0, 0.0, 0.0) if axis is None else axis.numbers("xyz", (1.0, 0.0, 0.0), "1")
         size = x * x + y * y + z * z
         if size == 0:
-            raise SceneError(f"{one.where}: joint {name!r}: its axis has no direction")
+            raise SceneError(f"{one.where}: joint {name!r}: expected an axis that is not zero")
         if abs(size - 1) > 1e-3:
-            self.note(one, f"joint {name!r}", "its axis has not length 1; its direction counts")
+            self.note(one, f"joint {name!r}", "its axis is normalised to length 1")
         return (x, y, z)
 
     def _law(self, one: Element, name: str, unit: str, limited: bool) -> dict[str, Any]:
-        """Damping and friction act; limits are told, for a stop needs a stiffness."""
+        """Law keys of a joint from <dynamics> and <limit>; limits become stops only on request."""
         law: dict[str, Any] = {}
         if (dynamics := one.first("dynamics")) is not None:
             for key, its_unit in (("damping", "N m s/rad or N s/m"), ("friction", "N m or N")):
@@ -211,13 +208,13 @@ class _Reader:
             if lower < upper:
                 law["limits"] = {"lower": lower, "upper": upper}
             elif {"lower", "upper"} & set(limit.attributes):
-                what = f"limits from {lower:g} to {upper:g} leave no way, and are left out"
+                what = f"limits from {lower:g} to {upper:g} leave no range and are left out"
                 self.note(one, f"joint {name!r}", what)
         rated = {**law.get("limits", {}), **({} if limit is None else self._rated(limit, name))}
         return ({"law": law} if law else {}) | ({"rated": rated} if rated else {})
 
     def _rated(self, limit: Element, name: str) -> dict[str, float]:
-        """Largest effort and speed, which are told: nothing stops there."""
+        """Largest effort and speed of a joint, kept as its rating."""
         given, unread = dict[str, float](), list[str]()
         for key, unit in (("effort", "N m or N"), ("velocity", "rad/s or m/s")):
             if key in limit.attributes:
@@ -227,17 +224,17 @@ class _Reader:
                     unread.append(f"{key} {short(limit.attributes[key])}")
         kept = {key: number for key, number in given.items() if number >= 0 and number != NO_LIMIT}
         if kept:
-            what = "limits of effort and velocity stop nothing here; they are kept as rated"
+            what = "limits of effort and velocity have no effect; they are kept as rated"
             self.note(limit, f"joint {name!r}", what)
         if unread:
-            what = f"limits that are no finite numbers left out: {', '.join(unread)}"
+            what = f"limits that are not finite numbers left out: {', '.join(unread)}"
             self.note(limit, f"joint {name!r}", what)
         if any(number < 0 for number in given.values()):
             self.note(limit, f"joint {name!r}", "limits of effort or velocity below 0 left out")
         return kept
 
     def _looks_of(self, one: Element, link: str) -> None:
-        """Its visuals; where none of them can be drawn, its collision shapes."""
+        """Collect the visuals of a link, or its collision shapes where none can be drawn."""
         drawn = [self._look(link, visual) for visual in one.all("visual")]
         if all(drawn):
             return
@@ -246,7 +243,10 @@ class _Reader:
         self.note(one, f"link {link!r}", what)
 
     def _look(self, link: str, visual: Element) -> bool:
-        """Whether it is drawn; what cannot be read is not, for nothing moves otherwise."""
+        """Collect a visual; return whether it is drawn.
+
+        Errors only add a note: visuals do not affect the motion.
+        """
         try:
             return self._shape(link, visual)
         except SceneError as error:
@@ -283,13 +283,13 @@ def _inertia(one: Element | None) -> Matrix:
 
 
 def _symmetric(m: Matrix) -> Matrix:
-    """Without the difference that rounding made."""
+    """Symmetric part of a matrix, which removes differences by rounding."""
     xy, xz, yz = ((m[i][j] + m[j][i]) / 2 for i, j in ((0, 1), (0, 2), (1, 2)))
     return ((m[0][0], xy, xz), (xy, m[1][1], yz), (xz, yz, m[2][2]))
 
 
 def _solid(one: Element) -> dict[str, Any] | None:
-    """The keys of a shape; None of one that is not drawn."""
+    """Keys of a shape; None for one that is not drawn."""
     if one.tag == "box":
         size = one.numbers("size", (0.0, 0.0, 0.0), "m")
         return {"type": "box", "size": size} if min(size) > 0 else None
@@ -306,7 +306,7 @@ def _solid(one: Element) -> dict[str, Any] | None:
 
 
 def _mesh(file: str, scale: Vector | tuple[float, ...]) -> dict[str, Any] | None:
-    """A mesh, wherever it is; None of one that is in a format that is not read, or squeezed."""
+    """Keys of a mesh; None for an unsupported format or unequal scale factors."""
     readable = file.lower().endswith((".stl", ".obj")) and ".." not in file.split("/")
     if not readable or len(set(scale)) != 1 or scale[0] <= 0:
         return None

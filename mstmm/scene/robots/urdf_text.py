@@ -1,4 +1,4 @@
-"""A robot -> the text of its URDF."""
+"""Writer of URDF files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .urdf import BY_HINGE, LIMITED, NO_LIMIT
 
 
 def as_urdf(robot: Robot) -> str:
-    """The text: links, then joints."""
+    """Convert a robot to URDF text: links, then joints."""
     root = Element("robot", name=robot.name)
     looks: dict[str, list[Look]] = {}
     for look in robot.looks:
@@ -91,7 +91,7 @@ def _joint(root: Element, joint: Joint, mimic: Mimic | None) -> None:
 
 
 def _limit(one: Element, limits: Mapping[str, float], has_ends: bool) -> None:
-    """A range where there is one, and what readers want in any case."""
+    """Add <limit> with the range if there is one, and the attributes that readers require."""
     wanted = {"effort": NO_LIMIT, "velocity": NO_LIMIT}
     if has_ends:
         wanted = {"lower": -NO_LIMIT, "upper": NO_LIMIT, **wanted}

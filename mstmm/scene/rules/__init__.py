@@ -1,1 +1,1 @@
-"""What one value of a scene may be, and the words in which it is refused."""
+"""Validators of single scene values, and their error messages."""

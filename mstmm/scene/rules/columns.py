@@ -1,4 +1,4 @@
-"""Files of columns (CSV) beside a scene: rows of numbers under names."""
+"""CSV files in the folder of a scene: named columns of numbers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MAX_SIZE = 64
 
 @dataclass(frozen=True)
 class Columns:
-    """The first column of a file and another one; `lines` are their rows' places in the file."""
+    """Two columns of a file: the first and another; `lines` are their line numbers."""
 
     first: tuple[float, ...]
     other: tuple[float, ...]
@@ -24,11 +24,11 @@ class Columns:
 
 
 def read_columns(path: str, folder: str, column: str | int) -> Columns:
-    """Two columns of a file in or below `folder` (the present one if empty): the first, and that of
-    this name or number.
+    """Read the first column of a CSV file and the one with the given name or number.
 
-    Columns are separated by commas, semicolons or tabs; the first line may hold their names, and
-    empty ones and those that begin with # are passed over.  Raises Refused.
+    The file is in or below `folder` (empty: the current one).  Columns are separated by commas,
+    semicolons or tabs.  The first line may contain their names; empty lines and those that begin
+    with # are skipped.  Raises Refused.
     """
     rows = [
         (number, [cell.strip() for cell in line.split(_separator(line))])
@@ -38,12 +38,13 @@ def read_columns(path: str, folder: str, column: str | int) -> Columns:
     names = rows.pop(0)[1] if rows and _number(rows[0][1][0]) is None else []
     place = _place(path, column, names, len(rows[0][1]) if rows else 0)
     if not rows:
-        raise refuse(f"{found(path)}: there is no row of numbers in it; expected times in s first")
+        raise refuse(f"{found(path)}: expected rows of numbers, times in s first, found none")
     first, other = list[float](), list[float]()
     for line, cells in rows:
         if len(cells) <= place:
             raise refuse(
-                f"{found(path)}: row {line} has {len(cells)} columns, expected {place + 1} or more"
+                f"{found(path)}: row {line}: expected {place + 1} columns or more, found "
+                f"{len(cells)}"
             )
         for cell, numbers in ((cells[0], first), (cells[place], other)):
             value = _number(cell)
@@ -67,28 +68,30 @@ def _number(cell: str) -> float | None:
 def _place(path: str, column: str | int, names: list[str], width: int) -> int:
     if isinstance(column, str):
         if column not in names:
-            there = ", ".join(names) or "none; give its number instead"
-            raise refuse(f"{found(path)}: there is no column {found(column)}; its names: {there}")
+            there = ", ".join(names) or "none; give the column number instead"
+            raise refuse(f"{found(path)}: no column {found(column)}; its columns: {there}")
         return names.index(column)
     if width and column > width:
-        raise refuse(f"{found(path)}: there is no column {column}; it has {width}")
+        raise refuse(f"{found(path)}: no column {column}; it has {width} columns")
     return column - 1
 
 
 def _text(path: str, folder: str) -> str:
-    """The text of a file that does not lie outside the folder."""
+    """Text of a file in or below the folder."""
     home = Path(folder or os.curdir).resolve()
     place = (home / path).resolve()
     if Path(path).is_absolute() or not place.is_relative_to(home):
         raise refuse(
             f"expected a file in the folder of the scene, found {found(path)}; copy it there, or "
-            "write its numbers as times and values"
+            "give its numbers as times and values"
         )
     try:
         if not place.is_file():
             raise refuse(f"{found(path)}: there is no such file in the folder of the scene")
         if place.stat().st_size > MAX_SIZE * 2**20:
-            raise refuse(f"{found(path)}: the file has more than {MAX_SIZE} MB; thin out its rows")
+            raise refuse(
+                f"{found(path)}: the file is larger than {MAX_SIZE} MB; reduce its number of rows"
+            )
         return place.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise refuse(f"{found(path)}: cannot be read: {error.strerror}") from None

@@ -1,4 +1,4 @@
-"""Can a body have this inertia?  Checks on the tensor itself, free of any choice of axes."""
+"""Checks whether an inertia tensor is physically possible, for any choice of axes."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import math
 
 from ...numbers.rotations import Matrix, Vector
 
-#: Relative size of a violation that is put down to rounding.
+#: Relative size of a violation that counts as rounding.
 _ROUNDING = 1e-12
 _TRIANGLE_ROUNDING = 1e-6
-#: A radius of gyration (m) below this is rounding: no body of a scene is that small.
+#: Radius of gyration (m) below which inertia is rounding: no body of a scene is that small.
 _GYRATION = 1e-8
 
 
 def principal_moments(inertia: Matrix) -> Vector:
     """Eigenvalues of a symmetric 3x3 tensor, ascending (cyclic Jacobi rotations)."""
     a = [list(row) for row in inertia]
-    for _ in range(30):  # five suffice; the bound is for entries that are not finite
+    for _ in range(30):  # five suffice; the bound ends the loop where entries are not finite
         if a[0][1] == a[0][2] == a[1][2] == 0:
             break
         for p, q in ((0, 1), (0, 2), (1, 2)):
@@ -26,7 +26,7 @@ def principal_moments(inertia: Matrix) -> Vector:
 
 
 def _rotate(a: list[list[float]], p: int, q: int) -> None:
-    """One Jacobi rotation that makes a[p][q] zero."""
+    """Apply one Jacobi rotation that makes a[p][q] zero."""
     if a[p][q] == 0:
         return
     half = (a[q][q] - a[p][p]) / (2 * a[p][q])
@@ -52,8 +52,10 @@ def _scaled(inertia: Matrix) -> tuple[Vector, float]:
 
 
 def _is_definite(m: Matrix) -> bool:
-    """True where the pivots of a symmetric tensor say that its eigenvalues are positive, which is
-    much sooner known than these."""
+    """Whether a symmetric tensor is positive definite, by its pivots.
+
+    This is much faster than computing the eigenvalues.
+    """
     (a, b, c), (_, d, e), (_, _, f) = m
     if not a > 0 or not d - b * b / a > 0:
         return False
@@ -66,13 +68,16 @@ def _row(x: list[float]) -> Vector:
 
 
 def is_dust(entry: float, others: float, mass: float) -> bool:
-    """True for a moment of inertia (kg m^2) that is rounding beside the largest entry of its tensor
-    or, with the mass (kg), a radius of gyration below any body's."""
+    """Whether a moment of inertia (kg m^2) is rounding.
+
+    It is rounding if it is negligible against the largest entry of its tensor.  It also is if its
+    radius of gyration with the mass (kg) is below that of any body.
+    """
     return abs(entry) <= max(_ROUNDING * others, mass * _GYRATION**2)
 
 
 def without_dust(inertia: Matrix, mass: float) -> Matrix:
-    """The tensor with moments that are negative by rounding as zeros; itself where none is."""
+    """Set moments that are negative by rounding to zero; other tensors are returned unchanged."""
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
     if xx >= 0 and yy >= 0 and zz >= 0:
         return inertia
@@ -82,7 +87,7 @@ def without_dust(inertia: Matrix, mass: float) -> Matrix:
 
 
 def negative_moment(inertia: Matrix) -> str | None:
-    """What is wrong with a tensor that has a negative moment about some axis; None for others."""
+    """Message about a tensor with a negative moment about some axis; None for others."""
     for entry, label in zip((inertia[i][i] for i in range(3)), ("xx", "yy", "zz"), strict=True):
         if entry < 0:
             return (
@@ -101,8 +106,7 @@ def negative_moment(inertia: Matrix) -> str | None:
 
 
 def triangle_excess(inertia: Matrix) -> str | None:
-    """What breaks the triangle inequality of the principal moments, None where nothing does; of
-    negative moments that they are negative.
+    """Message about moments that violate the triangle inequality or are negative, or None.
 
     Every mass distribution has J1 + J2 >= J3: trace(J)/2 - J has no negative eigenvalue.
     """
@@ -116,11 +120,11 @@ def triangle_excess(inertia: Matrix) -> str | None:
     if moments[0] < -_ROUNDING * abs(moments[2]):
         return f"the principal moments {shown(moments, scale)} are not all positive"
     return (
-        f"the principal moments {shown(moments, scale)} break the triangle inequality "
+        f"the principal moments {shown(moments, scale)} violate the triangle inequality "
         "(each at most the sum of the other two)"
     )
 
 
 def shown(moments: Vector, scale: float) -> str:
-    """Moments as text, in kg m^2."""
+    """Format moments as text, in kg m^2."""
     return "[" + ", ".join(f"{m * scale:.4g}" for m in moments) + "] kg m^2"

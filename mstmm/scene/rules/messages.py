@@ -1,4 +1,4 @@
-"""From pydantic's findings to one line per problem: file, element, key, expected, way out."""
+"""Messages for validation errors: one line per problem with file, element, key, remedy."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from ...errors import SceneError
 from .values import Location, Refused, Rule, Shorthand, found
 
 MAX_LINES = 10
-#: Where to stop looking: a file in which every element is wrong should not take minutes.
+#: Most problems collected, so that a file with errors in every element fails within seconds.
 MAX_PROBLEMS = 60
-#: Nearest names are looked for among this many at most, and of these among the nearest.
+#: Most names compared for suggestions, and most candidates among them.
 _MAX_OPTIONS, _CANDIDATES = 2000, 20
-#: How alike, from 0 to 1, what is near must be, as a whole and where it differs.
+#: Least similarity of a suggestion, from 0 to 1, of the whole name and of the part that differs.
 _NEAR = 0.6
-#: Keys kept free for coming releases, and what they will hold.
+#: Keys reserved for future releases, with their planned content.
 RESERVED = {
     "thermal": "thermal data",
     "temperature": "thermal data",
@@ -28,7 +28,7 @@ RESERVED = {
     "include": "imports",
 }
 
-#: What else closed loops are called.
+#: Other keys that users try for closed loops.
 _LOOPS = ("loop", "loops", "closure", "closures", "joint", "joints")
 
 #: The lists of tables of a scene.
@@ -41,7 +41,7 @@ Problem = tuple[Location, str]
 
 
 def near(name: str, options: Iterable[str]) -> str:
-    """'; did you mean "x"?', or the options themselves where none is near and they are few."""
+    """Suggestion '; did you mean "x"?', or a list of the options where none is similar."""
     choices = list(dict.fromkeys(islice(options, _MAX_OPTIONS)))
     lowered = {option.lower(): option for option in reversed(choices)}
     close = difflib.get_close_matches(name.lower(), lowered, n=_CANDIDATES, cutoff=_NEAR)
@@ -49,16 +49,16 @@ def near(name: str, options: Iterable[str]) -> str:
         if _alike(name.lower(), one):
             return f'; did you mean "{lowered[one]}"?'
     if not choices:
-        return "; there is none"
+        return "; none is defined"
     if len(choices) > 12:
-        return f"; the first of them are {', '.join(choices[:5])}"
+        return f"; for example {', '.join(choices[:5])}"
     if len(choices) == 1:
-        return f"; there is only {choices[0]}"
-    return "; one of " + ", ".join(choices)
+        return f"; the only one is {choices[0]}"
+    return "; use one of " + ", ".join(choices)
 
 
 def _alike(name: str, option: str) -> bool:
-    """Are both alike without the parts that they share, such as an owner or a file's ending?"""
+    """Whether names are similar without common parts such as an owner or a file suffix."""
     one, other = name.split("."), option.split(".")
     for end in (0, -1):
         while min(len(one), len(other)) > 1 and one[end] == other[end]:
@@ -69,12 +69,12 @@ def _alike(name: str, option: str) -> bool:
 def scene_error(
     error: ValidationError, model: type[BaseModel], data: Any, where: str
 ) -> SceneError:
-    """The error a user sees for a scene that pydantic refused."""
+    """SceneError for a scene that pydantic rejected."""
     return report(list(islice(problems(error, model), MAX_PROBLEMS)), data, where)
 
 
 def report(found_problems: Sequence[Problem], data: Any, where: str) -> SceneError:
-    """One line per problem, at most MAX_LINES; `data` gives the names of the elements."""
+    """SceneError with one line per problem, at most MAX_LINES; `data` gives element names."""
     unique = list(dict.fromkeys(found_problems))
     lines = [f"{where}: {line(place, message, data)}" for place, message in unique[:MAX_LINES]]
     if len(unique) > MAX_LINES:
@@ -84,7 +84,7 @@ def report(found_problems: Sequence[Problem], data: Any, where: str) -> SceneErr
 
 
 def problems(error: ValidationError, model: type[BaseModel]) -> Iterator[Problem]:
-    """Every problem with its place."""
+    """Yield every problem of a validation error with its location."""
     for item in error.errors(include_url=False):
         place: Location = tuple(item["loc"])
         cause = item.get("ctx", {}).get("error")
@@ -96,7 +96,7 @@ def problems(error: ValidationError, model: type[BaseModel]) -> Iterator[Problem
 
 
 def _words(item: Mapping[str, Any], place: Location, model: type[BaseModel]) -> str:
-    """pydantic's own findings in the words of the format."""
+    """Message for an error that pydantic itself found."""
     if item["type"] == "missing":
         return f"missing; expected {_expected(model, place)}"
     if item["type"] == "extra_forbidden":
@@ -104,19 +104,20 @@ def _words(item: Mapping[str, Any], place: Location, model: type[BaseModel]) -> 
     return f"expected {_expected(model, place)}, found {found(item['input'])}"
 
 
-#: Keys of bodies and hinges that the members of a chain do not have.
+#: Keys of bodies and hinges that members of a chain do not have, with the remedy.
 _OF_CHAINS = {
-    "name": 'a chain names its members itself, as in "rope[3]"; leave it out',
-    "inboard": "the first member hangs on the chain's own inboard, every other on the one before",
-    "outboard": "a member is held at its origin; leave it out",
-    "position": "the chain itself takes the position; leave it out here",
-    "release": "members of a chain cannot be released; write this hinge as a [[hinge]]",
+    "name": 'members of a chain are named automatically, as in "rope[3]"; leave it out',
+    "inboard": "each member is connected to the one before, the first to inboard of the chain; "
+    "leave it out",
+    "outboard": "the hinge of a member is at the origin of its body; leave it out",
+    "position": "the position belongs to the chain; leave it out here",
+    "release": "members of a chain cannot be released; define this hinge as a [[hinge]]",
     "cut": "hinges of a chain are never cut; leave it out",
-    "hold": "members of a chain start as they are given; write this hinge as a [[hinge]]",
+    "hold": "initial values of chain members always apply; define this hinge as a [[hinge]]",
 }
 
 
-#: What else the keys of beams and hinges are called.
+#: Symbols and synonyms that users try for keys of beams and hinges.
 _SYMBOLS = {
     "EI": "bending_stiffness", "EA": "axial_stiffness", "GJ": "torsional_stiffness",
     "GIt": "torsional_stiffness", "rhoA": "mass_per_length", "mu": "mass_per_length",
@@ -129,12 +130,12 @@ def _unknown_key(key: str, model: type[BaseModel], place: Location) -> str:
     if len(place) == 5 and place[0] == "chain" and key in _OF_CHAINS:
         return _OF_CHAINS[key]
     if key in RESERVED:
-        return f"{RESERVED[key]} come in a later release; leave {key} out for now"
+        return f"{RESERVED[key]} are planned for a later release; leave {key} out"
     if key in _LOOPS and len(place) == 1:
-        return "unknown key; write [[hinge]]: one that holds a body held already closes a loop"
+        return "unknown key; use [[hinge]]: a second inboard hinge of a body closes a loop"
     if key == "units" and len(place) == 1:
         return (
-            "unknown key; scenes are in m, kg, s, N and rad: convert the numbers and leave it out"
+            "unknown key; scenes are in m, kg, s, N and rad; convert the numbers and leave it out"
         )
     keys = [f.alias or name for name, f in model.model_fields.items()]
     if _SYMBOLS.get(key) in keys:
@@ -146,14 +147,14 @@ def _unknown_key(key: str, model: type[BaseModel], place: Location) -> str:
 
 
 def _keys_inside(model: type[BaseModel], name: str) -> Iterable[str]:
-    """Keys of the table that a key holds; none where it holds no single table."""
+    """Keys of the table that is the value of a key; none where the value is no single table."""
     info = model.model_fields.get(name)
     held = None if info is None else info.annotation
     return held.model_fields if isinstance(held, type) and issubclass(held, BaseModel) else ()
 
 
 def _expected(model: type[BaseModel], place: Location) -> str:
-    """What the key at `place` holds, from the annotation of its field."""
+    """Expected value of the key at `place`, from the annotation of its field."""
     parent = _model_at(model, place[:-1]) if place else model
     key = place[-1] if place else ""
     for name, info in parent.model_fields.items():
@@ -169,7 +170,7 @@ def _expected(model: type[BaseModel], place: Location) -> str:
 
 
 def _model_at(model: type[BaseModel], place: Location) -> type[BaseModel]:
-    """The model of the table that `place` leads to."""
+    """Model class of the table at `place`."""
     current = model
     for part in place:
         for name, info in current.model_fields.items():
@@ -179,7 +180,7 @@ def _model_at(model: type[BaseModel], place: Location) -> type[BaseModel]:
 
 
 def _inner(annotation: Any) -> type[BaseModel] | None:
-    """The first model class inside an annotation such as tuple[Body, ...]."""
+    """First model class inside an annotation such as tuple[Body, ...]."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for part in get_args(annotation):
@@ -190,7 +191,7 @@ def _inner(annotation: Any) -> type[BaseModel] | None:
 
 
 def line(place: Location, message: str, data: Any) -> str:
-    """'hinge "shoulder": axis: message'."""
+    """Line of a message with its location: 'hinge "shoulder": axis: message'."""
     parts = list(place)
     label = ""
     if len(parts) >= 2 and parts[0] in TABLES and isinstance(parts[1], int):
@@ -208,7 +209,7 @@ def _key(part: str) -> str:
 
 
 def _element(data: Any, table: str, index: int) -> str:
-    """The name of an element, or its place in the file."""
+    """Name of an element in quotes, or its number in the file."""
     try:
         element = data[table][index]
         name = element["name"] if isinstance(element, dict) else element.name

@@ -1,4 +1,4 @@
-"""Matrices of six rows: how they may be written, and whether they store or spend energy."""
+"""6 x 6 stiffness and damping matrices: accepted forms, and checks for energy gain."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from typing import Any
 from .values import NUMBER, Rule, collect, counted, entries_of, finite, found, plain, refuse
 
 _SIX = range(6)
-#: Rows and columns of the upper triangle, row by row.
+#: (row, column) of the upper triangle, row by row.
 PAIRS = tuple((i, j) for i in _SIX for j in _SIX if i <= j)
-#: Entries that should be equal may differ by this part of the larger one, and a pivot may lie below
-#: zero by this part of its diagonal entry.
+#: Largest relative difference of entries that should be equal, and largest negative pivot relative
+#: to its diagonal entry.
 _ROUNDING = 1e-12
 
 _AXES = ("along x", "along y", "along z", "about x", "about y", "about z")
 
 Triangle = tuple[float, ...]
 
-#: Entries of two rows of two, along y and z, among those of six rows of six.
+#: Positions of a 2 x 2 matrix along y and z in the 36 entries of a 6 x 6 matrix.
 _ACROSS = (7, 8, 13, 14)
 _WHOLE = 36
 
 
 def six_by_six(linear: str, angular: str) -> Rule:
-    """Six numbers (the diagonal), 21 (the upper triangle row by row), six rows of six or all their
-    36 entries, or two rows of two along y and z; the result has 6 or 21 numbers, or 36 where the
-    matrix is not symmetric.
+    """Rule for a 6 x 6 matrix, given in full, as triangle, diagonal, or 2 x 2 along y and z.
 
-    The units are those of the diagonal, along and about the axes.
+    Accepted are 6 numbers (the diagonal), 21 (the upper triangle row by row), six rows of six, all
+    36 entries, or two rows of two along y and z.  The result has 6 or 21 numbers, or 36 where the
+    matrix is not symmetric.  The units are those of the diagonal, along and about the axes.
     """
     expected = (
         f"6 numbers, three in {linear} and three in {angular}, or a matrix: 6 rows of 6, the 21 of "
@@ -71,12 +71,12 @@ def _across(flat: Triangle) -> Triangle:
 
 
 def _shortest(flat: Triangle) -> Triangle:
-    """All 36 entries, or those of the upper triangle where the matrix is symmetric."""
+    """Shortest form of a matrix: its upper triangle if it is symmetric, else all 36 entries."""
     return flat if _skew(flat) else tuple(flat[6 * i + j] for i, j in PAIRS)
 
 
 def _skew(flat: Triangle) -> tuple[int, int] | None:
-    """The first pair of entries that differ."""
+    """Row and column of the first pair of entries that differ across the diagonal."""
     for i, j in PAIRS:
         one, other = flat[6 * i + j], flat[6 * j + i]
         if abs(one - other) > _ROUNDING * max(abs(one), abs(other)):
@@ -85,7 +85,7 @@ def _skew(flat: Triangle) -> tuple[int, int] | None:
 
 
 def full(given: Triangle) -> list[list[float]]:
-    """The matrix of its diagonal, of its upper triangle or of all its entries."""
+    """Full 6 x 6 matrix from its diagonal, its upper triangle or all its entries."""
     if len(given) == _WHOLE:
         return [list(given[6 * i : 6 * i + 6]) for i in _SIX]
     matrix = [[0.0] * 6 for _ in _SIX]
@@ -96,7 +96,7 @@ def full(given: Triangle) -> list[list[float]]:
 
 
 def triangle(given: Triangle) -> Triangle:
-    """Upper triangle of its symmetric part, row by row."""
+    """Upper triangle (21,) of the symmetric part of a matrix, row by row."""
     matrix = full(given)
     return tuple(
         matrix[i][j] if matrix[i][j] == matrix[j][i] else (matrix[i][j] + matrix[j][i]) / 2
@@ -105,34 +105,34 @@ def triangle(given: Triangle) -> Triangle:
 
 
 def antisymmetric(given: Triangle) -> Triangle:
-    """(15,) of its antisymmetric part above the diagonal, row by row."""
+    """Antisymmetric part (15,) of a matrix above the diagonal, row by row."""
     matrix = full(given)
     return tuple((matrix[i][j] - matrix[j][i]) / 2 for i, j in PAIRS if i != j)
 
 
 def refuse_nonconservative(given: Triangle, what: str) -> None:
-    """SceneError for a matrix that is not symmetric or has a negative eigenvalue."""
+    """Reject a matrix that is not symmetric or has a negative eigenvalue.  Raises Refused."""
     pair = _skew(given) if len(given) == _WHOLE else None
     if pair is not None:
         i, j = pair
         raise refuse(
             f"expected a symmetric matrix, found {found(given[6 * i + j])} at [{i}][{j}] and "
             f"{found(given[6 * j + i])} at [{j}][{i}]; a matrix that is not symmetric has no "
-            "potential: give conservative = false if it is meant, as of a bearing",
+            "potential: set conservative = false if that is intended, as for a journal bearing",
             what,
         )
     axis = _gaining(full(given))
     if axis is not None:
         raise refuse(
-            "expected a matrix without negative eigenvalues, found one from which a motion gains "
-            f"energy ({_AXES[axis]}); correct its signs, or the entries off its diagonal, or give "
-            "conservative = false if it is meant",
+            "expected a matrix without negative eigenvalues, found one that adds energy to a "
+            f"motion ({_AXES[axis]}); correct its signs or its off-diagonal entries, or set "
+            "conservative = false if that is intended",
             what,
         )
 
 
 def _gaining(matrix: list[list[float]]) -> int | None:
-    """The row in which elimination meets a negative pivot, None where it meets none."""
+    """Row in which elimination finds a negative pivot; None if it finds none."""
     sizes = [math.sqrt(abs(matrix[i][i])) for i in _SIX]
     for i, j in PAIRS:
         if i != j and matrix[i][j] and not sizes[i] * sizes[j]:

@@ -1,4 +1,4 @@
-"""Rules for text: names, references, words, and expressions of the small grammar."""
+"""Rules for text values: names, references, choices and expressions."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from .values import (
 
 
 def name(expected: str, missing: str = "") -> Rule:
-    """A name by the pattern of the format; "ground" is reserved.
+    """Rule for a name: a letter, then letters, digits or _; "ground" is reserved.
 
-    `missing` says more about what is expected where the name is left out.
+    `missing` describes the expected value where the name is left out.
     """
 
     def check(value: Any) -> str:
@@ -50,14 +50,14 @@ def _pattern(expression: re.Pattern[str]) -> str:
 
 
 def text(value: Any, expected: str) -> str:
-    """Text, or Refused."""
+    """Require text.  Raises Refused."""
     if not isinstance(value, str):
         raise refuse(f"expected {expected}, found {found(value)}")
     return str(value)
 
 
 def end(ground: bool = True) -> Rule:
-    """Reference to a body ("rod1", its own origin), one of its ends ("rod1.tip") or the ground."""
+    """Rule for a reference to a body ("rod1": its origin), an end ("rod1.tip") or the ground."""
     expected = 'a body or an end of one ("rod1" or "rod1.tip")' + (' or "ground"' if ground else "")
     shape = re.compile(rf"{BODY.pattern}(\.{NAME.pattern})?")
 
@@ -66,7 +66,7 @@ def end(ground: bool = True) -> Rule:
         if not shape.fullmatch(checked):
             raise refuse(f"expected {expected}, found {found(checked)}")
         if checked.startswith(f"{GROUND}."):
-            raise refuse(f'the ground has no ends, found {found(checked)}; write "ground"')
+            raise refuse(f'expected "ground", which has no ends, found {found(checked)}')
         if checked == GROUND and not ground:
             raise refuse(f"expected {expected}, found 'ground', which does not move")
         return checked
@@ -75,7 +75,7 @@ def end(ground: bool = True) -> Rule:
 
 
 def body(expected: str) -> Rule:
-    """Reference to a body ("rod1", or "rope[3]" of a chain), or a word in its place."""
+    """Rule for a reference to a body ("rod1", or "rope[3]" of a chain), or a keyword."""
 
     def check(value: Any) -> str:
         checked = text(value, expected)
@@ -87,7 +87,7 @@ def body(expected: str) -> Rule:
 
 
 def label(expected: str) -> Rule:
-    """A name that another program gave: printable text."""
+    """Rule for a name given by another program: 1 to 64 printable characters."""
 
     def check(value: Any) -> str:
         checked = text(value, expected)
@@ -99,7 +99,7 @@ def label(expected: str) -> Rule:
 
 
 def choice(*options: str) -> Rule:
-    """One of these words."""
+    """Rule for one of several keywords."""
     expected = " or ".join(f'"{option}"' for option in options)
 
     def check(value: Any) -> str:
@@ -111,7 +111,7 @@ def choice(*options: str) -> Rule:
 
 
 def flag() -> Rule:
-    """true or false."""
+    """Rule for true or false."""
 
     def check(value: Any) -> bool:
         value = plain(value)
@@ -123,7 +123,7 @@ def flag() -> Rule:
 
 
 def parameters() -> Rule:
-    """A table of named numbers, for elements of a user's own type."""
+    """Rule for a table of named numbers: parameters of user-defined elements."""
     expected = "a table of named numbers"
 
     def check(value: Any) -> dict[str, float]:
@@ -147,7 +147,7 @@ def parameters() -> Rule:
 
 
 def to_expression(value: Any, expected: str, *place: str | int) -> Expression:
-    """A number or the text of an expression as a parsed expression."""
+    """Convert a number or the text of an expression to an Expression.  Raises Refused."""
     value = plain(value)
     if isinstance(value, Expression):
         return value
@@ -160,7 +160,7 @@ def to_expression(value: Any, expected: str, *place: str | int) -> Expression:
 
 
 def quantity(value: Any, expected: str, *place: str | int) -> Expression:
-    """An expression that is a number, not a condition."""
+    """Convert a value to an expression that is no comparison.  Raises Refused."""
     result = to_expression(value, expected, *place)
     if result.is_condition:
         raise refuse(
@@ -171,7 +171,7 @@ def quantity(value: Any, expected: str, *place: str | int) -> Expression:
 
 
 def dump_expression(value: Expression | None) -> str | float:
-    """A plain number as a number, everything else as its text; a free coordinate as "free"."""
+    """Convert an expression to a number where it is one, else to text; None becomes "free"."""
     return "free" if value is None else _as_number(value.text)
 
 
@@ -187,9 +187,9 @@ _EXPRESSION_SCHEMA: dict[str, Any] = {"type": ["number", "string"]}
 
 
 def expressions(expected: str, length: int | None = None, free: bool = False) -> Rule:
-    """A list of numbers or expressions; without `length` one entry may stand alone.
+    """Rule for a list of numbers or expressions; without `length` a single entry needs no list.
 
-    With `free` the word "free" is accepted for an entry and becomes None.
+    With `free` the keyword "free" is accepted for an entry and becomes None.
     """
     entry = "a number or an expression" + (' or "free"' if free else "")
 
@@ -217,7 +217,7 @@ def expressions(expected: str, length: int | None = None, free: bool = False) ->
 
 
 def one_expression(expected: str) -> Rule:
-    """A number or an expression."""
+    """Rule for a number or an expression."""
 
     def check(value: Any) -> Expression:
         return quantity(value, expected)
@@ -229,7 +229,7 @@ def one_expression(expected: str) -> Rule:
 
 
 def formula(expected: str) -> Rule:
-    """One expression that is not constant, such as "rod1.tip.x - 2*shoulder.angle"."""
+    """Rule for an expression that is not constant, such as "rod1.tip.x - 2*shoulder.angle"."""
 
     def check(value: Any) -> Expression:
         value = plain(value)
@@ -237,7 +237,7 @@ def formula(expected: str) -> Rule:
             raise refuse(f"expected {expected}, found {found(value)}")
         result = to_expression(value, expected)
         if result.is_constant:
-            raise refuse(f"expected {expected}, found {found(result.text)}, which is one number")
+            raise refuse(f"expected {expected}, found {found(result.text)}, which is constant")
         return result
 
     return Rule(expected, check, {"type": "string"}, _text_of)
@@ -248,7 +248,7 @@ def _text_of(value: Expression | None) -> str | None:
 
 
 def condition(expected: str, time: bool = False) -> Rule:
-    """A comparison such as "rod1.x < 0.1"; with `time` a number alone means t >= number."""
+    """Rule for a comparison such as "rod1.x < 0.1"; with `time` a number means t >= number."""
 
     def check(value: Any) -> Expression:
         value = plain(value)

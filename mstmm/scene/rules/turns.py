@@ -1,4 +1,4 @@
-"""Rotations and inertias: the ways in which they may be written."""
+"""Rules for rotations and inertia tensors in their accepted forms."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from ...numbers.rotations import (
 from . import written
 from .values import Numbers, Rule, collect, counted, found, numbers, plain, refuse
 
-#: How far rows of a rotation may be from being orthonormal, and equal entries of a symmetric matrix
-#: from each other, in parts of the largest.
+#: Largest deviation of rotation rows from orthonormal, and largest difference between entries that
+#: should be equal, relative to the largest entry of the matrix.
 _ROUNDING = 1e-6
 _ROWS = {
     "type": "array", "minItems": 3, "maxItems": 3, "items": {
@@ -30,8 +30,11 @@ _ROWS = {
 
 
 def orientation() -> Rule:
-    """[roll, pitch, yaw] in rad, a quaternion [w, x, y, z], which is normalised, or the three rows
-    of a rotation matrix, which becomes [roll, pitch, yaw]."""
+    """Rule for an orientation: [roll, pitch, yaw] in rad, a quaternion, or a rotation matrix.
+
+    A quaternion [w, x, y, z] is normalised.  The three rows of a rotation matrix become
+    [roll, pitch, yaw].
+    """
     expected = "[roll, pitch, yaw] in rad, a quaternion [w, x, y, z] or 3 rows of a rotation matrix"
     inner = numbers(expected, 3, 4)
 
@@ -45,18 +48,22 @@ def orientation() -> Rule:
 
 
 def quaternion(q: tuple[float, ...], expected: str, *place: str | int) -> tuple[float, ...]:
-    """q / |q|; a quaternion (practically) zero is refused."""
+    """Normalise a quaternion; raise Refused where its length is below 1e-6."""
     if norm(q) < 1e-6:
         raise refuse(
-            f"expected {expected}, found a quaternion of zero length; no rotation is [1, 0, 0, 0]",
+            f"expected {expected}, found a quaternion of zero length; "
+            "use [1, 0, 0, 0] for no rotation",
             *place,
         )
     return written.alike(unit(q), q)
 
 
 def inertia() -> Rule:
-    """A tensor in kg m^2: three or six numbers, three rows, or a table of these with the
-    orientation of the axes in which they are; the result has three or six."""
+    """Rule for an inertia tensor (kg m^2); the result has three or six numbers.
+
+    Accepted are three or six numbers, three rows, or a table of these as `moments` with the
+    `orientation` of their axes.
+    """
     expected = "[xx, yy, zz] or [xx, yy, zz, xy, xz, yz] in kg m^2, or 3 rows of 3"
     inner, turned = numbers(expected, 3, 6, of="kg m^2"), orientation()
 
@@ -90,8 +97,10 @@ def inertia() -> Rule:
 
 
 def _three_rows(value: Any, of: str = "") -> Matrix | None:
-    """The matrix that a list of three lists is; None for anything else.  Refused for rows that are
-    not three numbers."""
+    """Matrix from a list of three lists; None for anything else.
+
+    Raises Refused for rows that are not three numbers.
+    """
     given = plain(value)
     if not isinstance(given, (list, tuple)) or len(given) != 3:
         return None
@@ -108,20 +117,20 @@ def _three_rows(value: Any, of: str = "") -> Matrix | None:
 
 
 def _angles(matrix: Matrix) -> Numbers:
-    """Roll, pitch and yaw of a matrix that turns."""
+    """Roll, pitch and yaw (rad) of a rotation matrix.  Raises Refused for other matrices."""
     off = max(abs(dot(matrix[i], matrix[j]) - (i == j)) for i in range(3) for j in range(i, 3))
     if not off <= _ROUNDING:
         raise refuse(
-            f"expected a rotation matrix, found rows that are not of length 1 and at right angles "
-            f"(off by {off:.2g}); give a quaternion, or more digits"
+            f"expected a rotation matrix, found rows that are not orthonormal "
+            f"(error {off:.2g}); give more digits, or a quaternion"
         )
     if dot(cross(matrix[0], matrix[1]), matrix[2]) < 0:
-        raise refuse("expected a rotation matrix, found one that mirrors; turn one axis around")
+        raise refuse("expected a rotation matrix, found a reflection; reverse one axis")
     return to_rpy(matrix)
 
 
 def _six(matrix: Matrix) -> Numbers:
-    """xx, yy, zz, xy, xz, yz of a symmetric matrix."""
+    """Entries xx, yy, zz, xy, xz, yz of a symmetric matrix.  Raises Refused for others."""
     largest = max(abs(x) for row in matrix for x in row)
 
     def both(i: int, j: int) -> float:

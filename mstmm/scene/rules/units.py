@@ -1,11 +1,11 @@
-"""Units that the format does not have: what to write in place of "30 deg"."""
+"""Numbers with unit suffixes, such as "30 deg", which scenes do not accept: the remedy."""
 
 from __future__ import annotations
 
 import math
 import re
 
-#: What people write behind a number -> its size in SI units and rad.
+#: Unit suffix -> its factor to SI units and rad.
 _UNITS = {
     "deg": math.pi / 180, "degree": math.pi / 180, "degrees": math.pi / 180, "°": math.pi / 180,
     "deg/s": math.pi / 180, "°/s": math.pi / 180, "rad": 1.0, "rad/s": 1.0,
@@ -20,25 +20,25 @@ _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*?
 
 
 def instead(text: str) -> str:
-    """The way out for a text that stands where a number is expected, as '; write ...'."""
+    """Remedy '; write ...' for text given in place of a number, or ""."""
     match = _QUANTITY.fullmatch(text)
     if match is None:
         return ""
     if not match[2]:
         return "; write the number without quotes"
-    return with_unit(text) or "; write the number alone, without quotes, in SI units and rad"
+    return with_unit(text) or "; write only the number, without quotes, in SI units and rad"
 
 
 def with_unit(text: str) -> str:
-    """The same for a number with a unit that is known here; else empty."""
+    """Remedy for a number with a known unit suffix, or ""."""
     match = _QUANTITY.fullmatch(text)
     if match is None or match[2] not in _UNITS:
         return ""
     value = float(match[1]) * _UNITS[match[2]]
-    return f"; units are not written, all are SI and rad: write {value:.12g}"
+    return f"; leave out the unit, all numbers are in SI units and rad: write {value:.12g}"
 
 
 def is_number(text: str) -> bool:
-    """Whether the text is a number alone, which is written without quotes."""
+    """Whether the text is a plain number, which needs no quotes."""
     match = _QUANTITY.fullmatch(text)
     return match is not None and not match[2]

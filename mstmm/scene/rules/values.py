@@ -1,8 +1,8 @@
-"""What one value of a scene may be: strict, finite, and with a message that says what was expected.
+"""Validators of scene values: strict checks, with messages that state the expected value.
 
-A `Rule` annotates a pydantic field: it checks and normalises the value as it comes from TOML, JSON
-or Python, and publishes the accepted form in the JSON Schema.  Numbers are never taken from
-truth values, and from text where it is an expression of constants ("pi/6", "2*half").
+A `Rule` annotates a pydantic field: it checks and normalises the value from TOML, JSON or Python,
+and publishes the accepted form in the JSON Schema.  Booleans are not accepted as numbers.  Text is
+accepted where it is an expression of constants ("pi/6", "2*half").
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from . import written
 from .units import instead, with_unit
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
-#: A body of the scene: its name, or the place of a chain's member, "rope[3]" or "rope[last]".
+#: A body of the scene: its name, or a chain member, "rope[3]" or "rope[last]".
 BODY = re.compile(rf"{NAME.pattern}(\[([0-9]{{1,8}}|last)\])?")
 NAME_SHAPE = "a letter, then letters, digits or _ (64 characters at most)"
 GROUND = "ground"
@@ -34,7 +34,7 @@ Orientation = tuple[float, ...]
 
 
 class Refused(ValueError):
-    """One or several problems of a value, each with its place inside the value."""
+    """Problems of a value, each as (location inside the value, message)."""
 
     def __init__(self, *problems: tuple[Location, str]) -> None:
         super().__init__("; ".join(message for _, message in problems))
@@ -42,12 +42,12 @@ class Refused(ValueError):
 
 
 def refuse(message: str, *place: str | int) -> Refused:
-    """The one problem `message` at `place` inside the value."""
+    """Exception with a single problem at `place` inside the value, for the caller to raise."""
     return Refused((place, message))
 
 
 def found(value: object, depth: int = 0) -> str:
-    """The value as a message shows it: short, printable, in the words of a scene file."""
+    """Describe a value in a message: short, printable, in the terms of a scene file."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -70,7 +70,7 @@ def found(value: object, depth: int = 0) -> str:
 
 
 class _Published(GenerateJsonSchema):
-    """Writes the default of a field as its rule does: pydantic would dump it by its type."""
+    """JSON Schema generator that writes defaults as their rule does, not by their type."""
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> dict[str, Any]:
         inner: dict[str, Any] = dict(schema["schema"])
@@ -81,25 +81,25 @@ class _Published(GenerateJsonSchema):
 
 
 class Table(BaseModel):
-    """Base of all tables: frozen, unknown keys refused."""
+    """Base of all tables of a scene: frozen; unknown keys are rejected."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
 
     @classmethod
     def model_json_schema(cls, *args: Any, **options: Any) -> dict[str, Any]:
-        """The JSON Schema of the table's file format, defaults as a file writes them."""
+        """JSON Schema of the table, with defaults as they are written in a file."""
         return super().model_json_schema(*args, **{"schema_generator": _Published} | options)
 
 
 def split(reference: str) -> tuple[str, str]:
-    """("rod1", "tip") of "rod1.tip"; ("rod1", "") of "rod1"."""
+    """Split a reference into body and end: ("rod1", "tip") for "rod1.tip", "" for no end."""
     body, _, at = reference.partition(".")
     return body, at
 
 
 @dataclass(frozen=True)
 class Rule:
-    """Annotation of a field: `check` returns the normalised value or raises `Refused`."""
+    """Field annotation whose `check` returns the normalised value or raises Refused."""
 
     expected: str
     check: Callable[[Any], Any]
@@ -128,7 +128,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class Shorthand:
-    """Annotation of a field: a short form of a table is widened before the table is read."""
+    """Field annotation that converts a short form of a table before the table is validated."""
 
     expected: str
     widen: Callable[[Any], Any]
@@ -150,12 +150,12 @@ class Shorthand:
 
 
 def plain(value: Any) -> Any:
-    """Arrays and numbers of other libraries as Python's own (scenes built in Python)."""
+    """Convert arrays and numbers of other libraries to Python lists and numbers."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 
 def finite(value: Any, expected: str, *place: str | int) -> float:
-    """A finite number, or Refused."""
+    """Require a finite number.  Raises Refused."""
     if isinstance(value, str):
         return _of_text(value, expected, *place)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -172,7 +172,7 @@ def finite(value: Any, expected: str, *place: str | int) -> float:
 
 
 def _of_text(text: str, expected: str, *place: str | int) -> float:
-    """The number of a constant expression, or Refused."""
+    """Value of a constant expression.  Raises Refused for other text."""
     hint, calculates = instead(text), bool(set(text) & _OPERATORS)
     try:
         result = written.as_number(text)
@@ -185,7 +185,7 @@ def _of_text(text: str, expected: str, *place: str | int) -> float:
     raise refuse(f"expected {expected}, found {found(text)}{hint}", *place)
 
 
-#: What makes a text an expression rather than a word.
+#: Characters that make a text an expression rather than a name.
 _OPERATORS = frozenset("+-*/^()")
 
 
@@ -198,7 +198,7 @@ NUMBER = {"type": ["number", "string"]}
 
 
 def number(of: str = "", minimum: float | None = None, above: float | None = None) -> Rule:
-    """A finite number in the unit `of`, not below `minimum`, strictly above `above`."""
+    """Rule for a finite number in the unit `of`, at least `minimum`, strictly above `above`."""
     bound = f", {minimum:g} or more" if minimum is not None else ""
     bound += f", more than {above:g}" if above is not None else ""
     expected = f"a number{_unit(of)}{bound}"
@@ -215,7 +215,7 @@ def number(of: str = "", minimum: float | None = None, above: float | None = Non
 
 
 def whole(minimum: int, maximum: int) -> Rule:
-    """A whole number between two others, both included."""
+    """Rule for a whole number from `minimum` to `maximum`, both included."""
     expected = f"a whole number from {minimum} to {maximum}"
 
     def check(value: Any) -> int:
@@ -237,7 +237,7 @@ def _within(
 
 
 def entries_of(value: Any, expected: str) -> Sequence[Any]:
-    """The entries of a list, or Refused."""
+    """Require a list and return its entries.  Raises Refused."""
     value = plain(value)
     if not isinstance(value, (list, tuple)):
         raise refuse(f"expected {expected}, found {found(value)}")
@@ -245,14 +245,14 @@ def entries_of(value: Any, expected: str) -> Sequence[Any]:
 
 
 def counted(entries: int) -> str:
-    """The number of entries in words."""
+    """Number of entries as text: "1 entry" or "3 entries"."""
     return "1 entry" if entries == 1 else f"{entries} entries"
 
 
 def collect(
     values: Sequence[Any], expected: str, check: Callable[[Any, int], Any]
 ) -> tuple[Any, ...]:
-    """Check every entry; the problems of all entries together."""
+    """Check every entry of a list; raise Refused with the problems of all of them."""
     problems: list[tuple[Location, str]] = []
     results = []
     for i, value in enumerate(values):
@@ -266,9 +266,9 @@ def collect(
 
 
 def numbers(expected: str, *lengths: int, minimum: float | None = None, of: str = "") -> Rule:
-    """A list of finite numbers of one of these lengths (any length when none is given).
+    """Rule for a list of finite numbers of one of these lengths (none given: any length).
 
-    Without lengths a single number stands for the list with this one entry.  `of` is the unit.
+    Without lengths a single number is accepted as a list with one entry.  `of` is the unit.
     """
     entry = f"a number{_unit(of)}" + (f", {minimum:g} or more" if minimum is not None else "")
 
@@ -296,12 +296,12 @@ def numbers(expected: str, *lengths: int, minimum: float | None = None, of: str 
     return Rule(expected, check, forms[0] if len(forms) == 1 else {"anyOf": forms})
 
 
-#: Entries of vectors and moments of inertia: products of two of them must be numbers as well.
+#: Largest entry of vectors and moments of inertia, so that products of two do not overflow.
 LARGEST = 1e150
 
 
 def vector(of: str) -> Rule:
-    """Three numbers in the unit `of`, whose squares are finite."""
+    """Rule for three numbers in the unit `of`, at most LARGEST in size."""
     inner = numbers(f"three numbers{_unit(of)}", 3, of=of.partition(",")[0])
 
     def check(value: Any) -> tuple[float, ...]:
@@ -309,8 +309,8 @@ def vector(of: str) -> Rule:
         for i, entry in enumerate(result):
             if abs(entry) > LARGEST:
                 raise refuse(
-                    f"expected a number{_unit(of)} of {LARGEST:g} at most in size, found "
-                    f"{found(entry)}; its square is beyond what numbers hold",
+                    f"expected a number{_unit(of)} of absolute value {LARGEST:g} or less, found "
+                    f"{found(entry)}, whose square overflows",
                     i,
                 )
         return result
@@ -319,7 +319,7 @@ def vector(of: str) -> Rule:
 
 
 def direction() -> Rule:
-    """Three numbers, not all zero; any length, the direction alone counts."""
+    """Rule for three numbers, not all zero: a direction; its length has no effect."""
     expected = "three numbers, not all zero (a direction)"
     inner = numbers(expected, 3)
 

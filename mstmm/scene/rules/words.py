@@ -1,4 +1,4 @@
-"""What other programs call the hinges of a scene."""
+"""Synonyms of hinge types in other programs."""
 
 from __future__ import annotations
 
@@ -15,6 +15,6 @@ _CALLED = {
 
 
 def ours(word: str) -> str | None:
-    """The type of hinge that others call so; None where nobody does."""
+    """Hinge type for a synonym used by other programs; None for an unknown one."""
     plain = re.sub("[^a-z]", "", word.lower())
     return _CALLED.get(plain) or _CALLED.get(re.sub("(joint|hinge)$", "", plain))

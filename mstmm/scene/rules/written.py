@@ -1,4 +1,4 @@
-"""Numbers that a scene writes as constant expressions: "pi/6", "30*deg", "2*half"."""
+"""Numbers given as constant expressions in a scene: "pi/6", "30*deg", "2*half"."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import Any
 
 from ...expression.expression import Expression, parse
 
-#: The named constants of the scene that is being read.
+#: Named constants of the scene that is being validated.
 _CONSTANTS: ContextVar[Mapping[str, float] | None] = ContextVar("constants", default=None)
 
 
-#: The inputs and signals of the scene that is being read.
+#: Names of inputs and signals of the scene that is being validated.
 _INPUTS: ContextVar[frozenset[str]] = ContextVar("inputs", default=frozenset())
 
 
 @contextmanager
 def known(constants: Mapping[str, float], inputs: Iterable[str] = ()) -> Iterator[None]:
-    """Texts that are read meanwhile may name these constants, drives these inputs."""
+    """Within this context, expressions may name these constants and drives these inputs."""
     tokens = _CONSTANTS.set(constants), _INPUTS.set(frozenset(inputs))
     try:
         yield
@@ -30,25 +30,22 @@ def known(constants: Mapping[str, float], inputs: Iterable[str] = ()) -> Iterato
 
 
 def constants() -> Mapping[str, float]:
-    """The named constants of the scene that is being read."""
+    """Named constants of the scene that is being validated."""
     return _CONSTANTS.get() or {}
 
 
 def inputs() -> frozenset[str]:
-    """The names of the inputs and signals of the scene that is being read."""
+    """Names of the inputs and signals of the scene that is being validated."""
     return _INPUTS.get()
 
 
 def expression_of(text: str) -> Expression:
-    """The text parsed, named constants of the scene with their numbers.
-
-    Raises ExpressionError.
-    """
+    """Parse an expression with the named constants of the scene.  Raises ExpressionError."""
     return parse(text, constants=constants())
 
 
 class Written(float):
-    """A number and the expression of named constants that gives it; arithmetic gives floats."""
+    """Number with the expression of named constants that gives it; arithmetic gives floats."""
 
     __slots__ = ("text",)
     text: str
@@ -63,10 +60,10 @@ class Written(float):
 
 
 def as_number(text: str) -> float | None:
-    """The number of a constant expression, `Written` where named constants are in it; None for what
-    has other names.
+    """Value of a constant expression, `Written` where it contains named constants.
 
-    Raises ExpressionError for what is no expression, or has no finite value.
+    None where it contains other names.  Raises ExpressionError for text that is no expression or
+    has no finite value.
     """
     found = expression_of(text)
     if found.constant is None or found.is_condition:
@@ -75,19 +72,20 @@ def as_number(text: str) -> float | None:
 
 
 def unknown(text: str, there: Collection[str] = ()) -> str:
-    """What to do about the first name in a text that is neither constant nor `there`, as '; ...';
-    else empty."""
+    """Remedy '; ...' for the first name that is neither a constant nor in `there`, or ""."""
     names = [name.text for name in expression_of(text).names if name.text not in there]
     if not names:
         return ""
     close = difflib.get_close_matches(names[0], constants(), n=1, cutoff=0.6)
-    way_out = f'did you mean "{close[0]}"?' if close else "give it a number in [constants]"
+    way_out = f'did you mean "{close[0]}"?' if close else "define it in [constants]"
     return f"; {names[0]!r} is no constant of the scene: {way_out}"
 
 
 def alike(values: tuple[float, ...], given: tuple[float, ...]) -> tuple[float, ...]:
-    """`values`, made of all of the numbers `given`, as they were written: where one is `Written`,
-    every one keeps what was given."""
+    """Keep the written form of `given` in `values`, which were computed from all of them.
+
+    Where one of `given` is `Written`, each value keeps the text of its given number.
+    """
     if not any(isinstance(x, Written) for x in given):
         return values
     return tuple(

@@ -1,1 +1,1 @@
-"""The tables of a scene, each with its keys and its own rules."""
+"""Tables of a scene, with their keys and checks."""

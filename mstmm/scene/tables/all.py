@@ -1,4 +1,4 @@
-"""All tables of a scene together, as they are written; `Scene` settles and checks them."""
+"""All tables of a scene; `Scene` resolves their defaults and checks them."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ from .rigid import bare
 
 def _version(value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or value != 1:
-        raise rules.refuse(f"expected 1, the only version there is, found {rules.found(value)}")
+        raise rules.refuse(f"expected 1, the only version, found {rules.found(value)}")
     return value
 
 
 class SceneTables(Table):
-    """The tables of a scene, and its bodies and hinges by number and by name."""
+    """Tables of a scene, with access to bodies and hinges by number and by name."""
 
     schema_version: Annotated[int, rules.Rule("1", _version, {"const": 1})] = 1
     gravity: Annotated[Vector, rules.vector("m/s^2, such as [0, -9.81, 0]")]
@@ -63,17 +63,17 @@ class SceneTables(Table):
 
     @cached_property
     def bodies(self) -> Bodies:
-        """Every body: `body`, then the members of the chains, made when they are asked for."""
+        """All bodies: `body`, then the members of the chains, which are created on access."""
         return Bodies(self.body, self.chain)
 
     @cached_property
     def hinges(self) -> Hinges:
-        """Every hinge: `hinge`, then the members of the chains, made when they are asked for."""
+        """All hinges: `hinge`, then the members of the chains, which are created on access."""
         return Hinges(self.hinge, self.chain)
 
     @cached_property
     def channels(self) -> dict[str, Pieces]:
-        """Inputs, then signals, over time by their names."""
+        """Inputs, then signals, as piecewise polynomials of time by name."""
         signals = {signal.name: signal.pieces for signal in self.signal}
         inputs = {
             one.name: signals.get(one.value, steady(0.0)) if isinstance(one.value, str)
@@ -84,27 +84,29 @@ class SceneTables(Table):
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
-        """Everything that happens: `event`, then the hard stops of hinges."""
+        """All events: `event`, then the hard stops of hinges."""
         return (*self.event, *stops_of(self.hinges))
 
     def happening(self, number: int) -> str:
-        """What a message calls number `number` of `events`."""
+        """Name in messages of the event at index `number` of `events`."""
         what = "event" if number < len(self.event) else "stop"
         return f'{what} "{self.events[number].name}"'
 
     @property
     def forces(self) -> tuple[Spring | Bushing, ...]:
-        """What acts between two ends, without mass: springs, then bushings."""
+        """Force elements between two ends: springs, then bushings."""
         return (*self.spring, *self.bushing)
 
     @property
     def controlled(self) -> dict[str, str]:
-        """The inputs that controllers set, with the names of those."""
+        """Names of controllers by the inputs that they set."""
         return {name: one.name for one in self.controller for name in one.outputs}
 
     def with_inputs(self, values: Mapping[str, float | str]) -> Self:
-        """The same with inputs at other numbers, or following other signals of the scene.  Nothing
-        is validated: the values are what an input may have, and none of them drives anything."""
+        """Copy of the scene with other input values: numbers, or names of signals of the scene.
+
+        Nothing is validated: the values must be permitted, and no drive may depend on the inputs.
+        """
         inputs = tuple(
             one.model_copy(update={"value": values[one.name], "rates": None})
             if one.name in values else one
@@ -117,8 +119,10 @@ class SceneTables(Table):
 
     @property
     def skeleton(self) -> SceneTables:
-        """The same scene with every beam and elastic body as a body with the same ends (and no
-        mass), behind `body`: what names and the tree are checked on."""
+        """Scene with flexible bodies replaced by massless bodies with the same ends, after `body`.
+
+        Names and the tree are checked on it.
+        """
         return self._skeleton if self.beam or self.elastic else self
 
     @cached_property

@@ -1,4 +1,4 @@
-"""[[beam]]: an Euler-Bernoulli beam along its x axis, with ends "root" (x = 0) and "tip"."""
+"""Table [[beam]]: Euler-Bernoulli beam along its x axis, with ends "root" (x = 0) and "tip"."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from .flexible import AUTO
 
 
 class Beam(BeamKeys):
-    """An Euler-Bernoulli beam.
+    """Euler-Bernoulli beam.
 
-    `modes` is None for "auto", `quadrature` likewise.  `ends` holds "root" and "tip" too.  What a
-    piece in `section` leaves out it takes from the beam; `sections` are the pieces filled in.
+    `modes` and `quadrature` are None for "auto".  `ends` also contains "root" and "tip".  Keys that
+    are left out in an entry of `section` have the value of the beam; `sections` are the completed
+    entries.
     """
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""The keys of a beam: sections, shapes, ends; what they say to each other is checked elsewhere."""
+"""Keys of a beam: sections, shapes, ends; `beam_rules` checks them against each other."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ ROOT, TIP = "root", "tip"
 #: Directions of the shapes in the order of the modal coordinates: deflection along y, along z,
 #: rotation about x, displacement along x.
 DIRECTIONS = ("y", "z", "twist", "axial")
-#: Most shapes in one direction.  More have half-waves so short that neither Euler's hypothesis nor
-#: the integrals of their products in double precision tell them apart.
+#: Most shapes in one direction.  For more, half-waves are too short for the theory, and products of
+#: shapes cannot be integrated accurately in double precision.
 MAX_SHAPES = 60
 SHAPES = rules.Rule(
     "a whole number, 0 or more", lambda value: _count(value), {"type": "integer", "minimum": 0}
@@ -36,7 +36,7 @@ def _count(value: Any) -> int:
 
 
 class Modes(Table):
-    """How many shapes there are in each direction."""
+    """Number of shapes in each direction."""
 
     y: Annotated[int, SHAPES] = 0
     z: Annotated[int, SHAPES] = 0
@@ -45,12 +45,12 @@ class Modes(Table):
 
     @property
     def counts(self) -> tuple[int, int, int, int]:
-        """Numbers of shapes along y, along z, twist, axial."""
+        """Number of shapes along y, along z, in twist and axial."""
         return (self.y, self.z, self.twist, self.axial)
 
     @property
     def total(self) -> int:
-        """How many modal coordinates there are."""
+        """Number of modal coordinates."""
         return sum(self.counts)
 
     @property
@@ -81,10 +81,10 @@ _MODES_RULE = Shorthand(_MODES, _as_modes, {"type": ["integer", "string"]})
 
 
 class Shapes(Table):
-    """Shapes of the user's own, by direction: expressions of x (m, from the root) and L (the
-    length, m).
+    """User-defined shape functions by direction: expressions of x (m, from the root) and L (m).
 
-    Deflections and axial displacements are m per m of the modal coordinate, twists rad per rad.
+    L is the length.  Deflections and axial displacements are in m per m of the modal coordinate,
+    twists in rad per rad.
     """
 
     y: Annotated[tuple[Expression, ...], texts.expressions("a list of expressions of x")] = ()
@@ -94,12 +94,12 @@ class Shapes(Table):
 
     @property
     def modes(self) -> Modes:
-        """How many there are in each direction."""
+        """Number of shapes in each direction, as `Modes`."""
         return Modes(**{word: len(getattr(self, word)) for word in DIRECTIONS})
 
 
 def _pair(of: str) -> rules.Rule:
-    """One number for both bending planes, or one for each."""
+    """Rule for one number for both bending planes, or one for each."""
     expected = f"a number, or two, [about y, about z], in {of}"
     inner = rules.numbers(expected, of=of)
 
@@ -119,7 +119,7 @@ def _pair(of: str) -> rules.Rule:
 
 
 class SectionTable(Table):
-    """The numbers of a section; a section's own, or those of the whole beam (None: not given).
+    """Properties of a section, or of the whole beam (None: not given).
 
     `bending_stiffness` is (EI_y, EI_z): about y, for deflection along z, and about z, for
     deflection along y; `rotary_inertia` (rho I_y, rho I_z) likewise.
@@ -134,7 +134,7 @@ class SectionTable(Table):
 
 
 class Section(SectionTable):
-    """A piece of a beam with the same section everywhere, from one x to another (m)."""
+    """Piece of a beam with a constant section, `from` one x `to` another (m)."""
 
     from_: Annotated[float, rules.number("m", minimum=0)] = Field(alias="from")
     to: Annotated[float, rules.number("m", above=0)]
@@ -150,7 +150,7 @@ def _as_ends(value: Any) -> Any:
 
 
 def _as_end(value: Any) -> Any:
-    """A place along the beam, alone or in a table, as a point in beam axes."""
+    """Expand the position of an end along the beam (m) to a point in beam axes."""
     value = plain(value)
     if isinstance(value, dict):
         position = plain(value.get("position"))
@@ -165,7 +165,7 @@ def _as_end(value: Any) -> Any:
 
 
 class BeamKeys(FlexibleTable, SectionTable):
-    """The keys of a beam, as they are written and as `Beam` leaves them."""
+    """Keys of a beam, before and after `Beam` resolves their defaults."""
 
     length: Annotated[float, rules.number("m", above=0)]
     section: tuple[Section, ...] = ()
@@ -189,10 +189,11 @@ class BeamKeys(FlexibleTable, SectionTable):
 
     @property
     def sections(self) -> tuple[Section, ...]:
-        """The pieces from root to tip, each with every number that is known of it.
+        """Pieces from root to tip, each with all properties that are given for it or the beam.
 
-        Without `section` there is one piece.  Where the rotary inertia is given and the polar one
-        is not, the polar one is the sum of both, as for every plane section.
+        Without `section` there is one piece.  If rotary_inertia is given and
+        polar_inertia_per_length is not, the latter is the sum of both entries, as for every plane
+        section.
         """
         pieces = self.section or (
             Section.model_construct(from_=0.0, to=self.length, **dict.fromkeys(_DATA)),
@@ -210,15 +211,15 @@ class BeamKeys(FlexibleTable, SectionTable):
 
     @property
     def mass(self) -> float:
-        """The whole mass in kg."""
+        """Total mass (kg)."""
         return sum((s.mass_per_length or 0.0) * (s.to - s.from_) for s in self.sections)
 
     @property
     def mode_names(self) -> tuple[str, ...] | None:
-        """Names of the modal coordinates, None where the model decides how many there are.
+        """Names of the modal coordinates, None where their number is chosen at compilation.
 
-        That is so for "auto", and for a tangent frame at an inner section, where clamped-free
-        shapes stand on either side of it.
+        This is the case for "auto", and for a tangent frame at an inner section, which has
+        clamped-free shapes on both sides.
         """
         inner = [name for name in self.ends if 0 < self.end_x(name) < self.length]
         either_side = self.frame_end in inner if self.frame_end else bool(inner)
@@ -228,7 +229,7 @@ class BeamKeys(FlexibleTable, SectionTable):
         return self.modes.names
 
     def end_x(self, at: str) -> float:
-        """Place of the end `at` along the beam in m; "" is the root."""
+        """Position of the end `at` along the beam (m); "" is the root."""
         return self.ends[at or ROOT].position[0]
 
 

@@ -1,4 +1,4 @@
-"""What the keys of one beam say to each other: sections, shapes, ends, start values."""
+"""Checks of the keys of a beam against each other: sections, shapes, ends, initial values."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from .shapes import problem_with
 
 Problem = tuple[Location, str]
 
-#: Pieces join, and ends lie on the beam, to this share of its length.
+#: Largest gap between pieces, and distance of ends from the beam, relative to its length.
 _ROUNDING = 1e-9
-#: Polar inertia against the sum of both rotary inertias.
+#: Largest relative difference of the polar inertia from the sum of both rotary inertias.
 _AGREES = 1e-3
 #: Smallest mass, moment and stiffness of a beam, and the inverse of the largest.
 _TINY = 1e-100
 #: Largest ratio between two pieces of a beam in mass or stiffness per length.
 _CONTRAST = 1e12
 
-#: Key of the section -> what it is, with its unit.
+#: Key of the section -> its meaning and unit.
 _MEANING = {
     "mass_per_length": "a number in kg/m, more than 0",
     "bending_stiffness": "E I in N m^2, more than 0: a number, or [about y, about z]",
@@ -32,7 +32,7 @@ _MEANING = {
 
 
 def problems(beam: BeamKeys) -> Iterator[Problem]:
-    """Everything in which the keys of a beam do not fit each other."""
+    """Problems of the keys of a beam with each other."""
     pieces = list(_pieces(beam))
     yield from pieces
     yield from _modes(beam)
@@ -46,7 +46,7 @@ def problems(beam: BeamKeys) -> Iterator[Problem]:
 
 
 def joined(beam: BeamKeys) -> tuple[Section, ...]:
-    """The pieces of a beam, each beginning exactly where the one before ends."""
+    """Pieces of a beam, each starting exactly where the one before ends."""
     pieces: list[Section] = []
     for k, piece in enumerate(beam.section):
         start = pieces[-1].to if pieces else 0.0
@@ -56,7 +56,7 @@ def joined(beam: BeamKeys) -> tuple[Section, ...]:
 
 
 def _pieces(beam: BeamKeys) -> Iterator[Problem]:
-    """Do the pieces cover the beam from root to tip, each once?"""
+    """Problems of pieces that do not cover the beam exactly once from root to tip."""
     reached, slack = 0.0, _ROUNDING * beam.length
     for i, piece in enumerate(beam.section):
         if piece.to - piece.from_ <= slack:
@@ -67,7 +67,7 @@ def _pieces(beam: BeamKeys) -> Iterator[Problem]:
             return
         if abs(piece.from_ - reached) > slack:
             what = "gap" if piece.from_ > reached else "overlap"
-            before = "the beam begins" if i == 0 else "the piece before ends"
+            before = "the beam begins" if i == 0 else "the previous piece ends"
             yield (
                 ("section", i, "from"),
                 f"expected {reached:g} m, where {before}, found {piece.from_:g}, "
@@ -78,8 +78,8 @@ def _pieces(beam: BeamKeys) -> Iterator[Problem]:
     if beam.section and abs(reached - beam.length) > slack:
         yield (
             ("section", len(beam.section) - 1, "to"),
-            f"expected the length of the beam, {beam.length:g} m, found {reached:g}; let the last "
-            "piece end there, or correct length",
+            f"expected the length of the beam, {beam.length:g} m, found {reached:g}; correct the "
+            "end of the last piece, or length",
         )
 
 
@@ -87,7 +87,7 @@ def _article(word: str) -> str:
     return f"{'an' if word[0] in 'aeiou' else 'a'} {word}"
 
 
-# --- shapes and what they need --------------------------------------------------------------------
+# --- shapes and their required properties ---------------------------------------------------------
 
 
 def _modes(beam: BeamKeys) -> Iterator[Problem]:
@@ -96,21 +96,21 @@ def _modes(beam: BeamKeys) -> Iterator[Problem]:
     if beam.modes.total == 0:
         yield (
             ("modes",),
-            "there is no shape in any direction; give at least one, as in modes = 3, or write "
+            "expected at least one shape, found none; write for example modes = 3, or "
             'model = "rigid"',
         )
     for word, count in zip(DIRECTIONS, beam.modes.counts, strict=True):
         if count > MAX_SHAPES:
             yield (
                 ("modes", word),
-                f"expected {MAX_SHAPES} shapes or fewer, found {count}: shapes of so short waves "
-                "cannot be told apart by their mass matrix, and no thin beam bends like that; "
+                f"expected {MAX_SHAPES} shapes or fewer, found {count}: shapes with such short "
+                "waves are linearly dependent to rounding and outside beam theory; "
                 "divide the beam into parts on fixed hinges",
             )
 
 
 def _data(beam: BeamKeys) -> Iterator[Problem]:
-    """Every piece has what its mass and the shapes need; nothing is given for some pieces only."""
+    """Problems of missing section properties, or of properties given only for some pieces."""
     given = beam.sections
     for key, why in _needed(beam).items():
         for i, piece in enumerate(given):
@@ -131,7 +131,7 @@ def _at(beam: BeamKeys, i: int, key: str) -> Location:
 
 
 def _needed(beam: BeamKeys) -> dict[str, str]:
-    """Keys that must be given, each with what needs it."""
+    """Required keys, each with the reason as a prefix for messages."""
     needed = {"mass_per_length": ""}
     if beam.model == "rigid":
         return needed
@@ -139,29 +139,29 @@ def _needed(beam: BeamKeys) -> dict[str, str]:
     if modes is None or modes.y or modes.z:
         needed["bending_stiffness"] = ""
     if modes is not None and modes.twist:
-        needed["torsional_stiffness"] = "shapes of twist need it: "
-        needed["polar_inertia_per_length"] = "shapes of twist need it: "
+        needed["torsional_stiffness"] = "twist shapes need it: "
+        needed["polar_inertia_per_length"] = "twist shapes need it: "
     if modes is not None and modes.axial:
         needed["axial_stiffness"] = "axial shapes need it: "
     return needed
 
 
 def _polar(beam: BeamKeys) -> Iterator[Problem]:
-    """A plane section has the sum of both rotary inertias about its axis."""
+    """Problems of a polar inertia that is not the sum of both rotary inertias."""
     for i, piece in enumerate(beam.sections):
         polar, rotary = piece.polar_inertia_per_length, piece.rotary_inertia
         if polar is None or rotary is None or abs(polar - sum(rotary)) <= _AGREES * polar:
             continue
         yield (
             _at(beam, i, "polar_inertia_per_length"),
-            f"expected the sum of both entries of rotary_inertia, {sum(rotary):g} kg m, as every "
-            f"plane section has it, found {polar:g}; leave it out",
+            f"expected the sum of both entries of rotary_inertia, {sum(rotary):g} kg m, as for "
+            f"every plane section, found {polar:g}; leave it out",
         )
         return
 
 
 def _sizes(beam: BeamKeys) -> Iterator[Problem]:
-    """Can the moments, stiffnesses and frequencies of the beam be written as numbers at all?"""
+    """Problems of a beam whose moments, stiffnesses or frequencies overflow or underflow."""
     if any(piece.mass_per_length is None for piece in beam.sections):
         return
     square, cube = beam.length * beam.length, beam.length * beam.length * beam.length
@@ -176,15 +176,15 @@ def _sizes(beam: BeamKeys) -> Iterator[Problem]:
     if not all(_TINY < size < 1 / _TINY for size in sizes):
         yield (
             ("length",),
-            f"a beam of {beam.length:g} m and {beam.mass:g} kg has mass and stiffness beyond what "
-            "numbers hold; check the units (m, kg/m, N m^2)",
+            f"a beam of {beam.length:g} m and {beam.mass:g} kg has mass and stiffness outside the "
+            "range of double precision; check the units (m, kg/m, N m^2)",
         )
         return
     yield from _contrast(beam)
 
 
 def _contrast(beam: BeamKeys) -> Iterator[Problem]:
-    """Are the pieces so unlike that the shapes of the one drown in the rounding of the other?"""
+    """Problems of pieces so different that shapes of one are lost to rounding of another."""
     for key in _MEANING:
         given = [getattr(piece, key) for piece in beam.sections]
         rows = [one if isinstance(one, tuple) else (one,) for one in given if one is not None]
@@ -195,8 +195,8 @@ def _contrast(beam: BeamKeys) -> Iterator[Problem]:
                 yield (
                     _at(beam, i, key),
                     f"expected {1 / _CONTRAST:g} of the largest one, {most:g}, or more, found "
-                    f"{least:g}: the shapes of such a beam cannot be told apart; model the light "
-                    "part as a beam of its own",
+                    f"{least:g}: the shapes of such a beam are linearly dependent to rounding; "
+                    "model the light part as a separate beam",
                 )
                 return
 
@@ -210,7 +210,7 @@ def _shapes(beam: BeamKeys) -> Iterator[Problem]:
     if beam.basis != "given":
         yield (
             ("basis",),
-            f'"{beam.basis}" and shapes are two bases; leave out basis or shapes',
+            f'expected "given" with shapes, found "{beam.basis}"; leave out basis or shapes',
         )
     if beam.modes is not None and beam.modes != shapes.modes:
         counts = ", ".join(
@@ -236,31 +236,31 @@ def _ends(beam: BeamKeys) -> Iterator[Problem]:
         if y or z:
             yield (
                 place,
-                f"expected a place on the axis of the beam, found {found(end.position)}; put what "
-                "lies beside it on a rigid body on a fixed hinge",
+                f"expected a point on the axis of the beam, found {found(end.position)}; connect "
+                "an offset end by a rigid body on a fixed hinge",
             )
         elif fixed is not None and abs(x - fixed) > slack:
             yield (
                 place,
-                f'expected {fixed:g} m, where every beam has its end "{name}", found {x:g}; '
+                f'expected {fixed:g} m, the position of "{name}" on every beam, found {x:g}; '
                 "choose another name",
             )
         elif not -slack <= x <= beam.length + slack:
             yield (
                 place,
-                f"expected a place on the beam, 0 to {beam.length:g} m, found {x:g}",
+                f"expected a position on the beam, 0 to {beam.length:g} m, found {x:g}",
             )
     at = beam.frame_end
     if at and at not in beam.ends:
         yield (
             ("frame",),
-            f'there is no end "{at}"{near(at, beam.ends)}; a section that is an end has a name in '
-            f"ends, as in ends = {{ {at} = {beam.length / 2:g} }}",
+            f'there is no end "{at}"{near(at, beam.ends)}; define a section as an end, as in '
+            f"ends = {{ {at} = {beam.length / 2:g} }}",
         )
 
 
 def _lists(beam: BeamKeys) -> Iterator[Problem]:
-    """Lists with one entry per shape."""
+    """Problems of lists that need one entry per shape."""
     lists = [
         (("initial", "eta"), beam.initial.eta),
         (("initial", "etad"), beam.initial.etad),
@@ -271,7 +271,7 @@ def _lists(beam: BeamKeys) -> Iterator[Problem]:
             continue
         names = beam.mode_names
         if beam.modes is None:
-            yield place, 'modes = "auto" chooses how many shapes there are; write modes as numbers'
+            yield place, 'modes = "auto" chooses the number of shapes; give modes as numbers'
         elif names is not None and len(values) != len(names):
             yield (
                 place,
@@ -282,4 +282,4 @@ def _lists(beam: BeamKeys) -> Iterator[Problem]:
 
 def _named(names: tuple[str, ...]) -> str:
     shown = ", ".join(names[:8])
-    return f"{shown}, ..., {names[-1]}" if len(names) > 8 else shown or "there is none"
+    return f"{shown}, ..., {names[-1]}" if len(names) > 8 else shown or "none"

@@ -1,4 +1,4 @@
-"""[[body]]: a rigid body, or one of a user's own type, and its ends."""
+"""Table [[body]]: a rigid body or a body of a user-defined type, with its ends."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from ..rules.values import (
 
 
 class End(Table):
-    """An output end of a body: where it is (m) and how its axes lie, in body axes."""
+    """Output end of a body: position (m) and orientation in body axes."""
 
     position: Annotated[Vector, rules.vector("m")]
     orientation: Annotated[Orientation, turns.orientation()] = (0.0, 0.0, 0.0)
 
     @property
     def rotation(self) -> Matrix:
-        """Rotation matrix: axes of the end -> body axes."""
+        """Rotation matrix from axes of the end to body axes."""
         return from_orientation(self.orientation)
 
 
 def as_end(value: Any) -> Any:
-    """A place alone is that of an end without axes of its own."""
+    """Expand a position to the table of an end with the axes of the body."""
     return {"position": value} if isinstance(value, (list, tuple)) else value
 
 
@@ -52,8 +52,7 @@ def _as_ends(value: Any) -> Any:
 
 
 class BodyTable(Table):
-    """What a body is, without its name: a rigid body, or one of a user's own type with
-    `parameters`.
+    """Properties of a body without its name: rigid, or of a user-defined type with `parameters`.
 
     Body axes have their origin at the input end.  `inertia` is about the centre of mass as
     (xx, yy, zz, xy, xz, yz), tensor entries (Jxy = -int xy dm), kg m^2.
@@ -76,17 +75,19 @@ class BodyTable(Table):
 
     @property
     def inertia_matrix(self) -> Matrix:
-        """The inertia tensor about the centre of mass, body axes, kg m^2, without moments that
-        are negative by rounding."""
+        """Inertia tensor (kg m^2) about the centre of mass in body axes.
+
+        Moments that are negative by rounding are zero.
+        """
         xx, yy, zz, xy, xz, yz = self.inertia
         return without_dust(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), self.mass)
 
     def end_position(self, at: str) -> Vector:
-        """Position (m) of the end `at` in body axes; "" is the body's own origin."""
+        """Position (m) of the end `at` in body axes; "" is the origin of the body."""
         return self.ends[at].position if at else (0.0, 0.0, 0.0)
 
     def end_rotation(self, at: str) -> Matrix:
-        """Rotation matrix of the end `at`: its axes -> body axes."""
+        """Rotation matrix from axes of the end `at` to body axes."""
         return self.ends[at].rotation if at else IDENTITY
 
     @model_validator(mode="after")
@@ -97,11 +98,11 @@ class BodyTable(Table):
         if self.type == "rigid" and "mass" not in self.model_fields_set:
             problems.append((("mass",), "missing; expected a number in kg, 0 or more"))
         if self.type == "rigid" and self.parameters:
-            way_out = "give the type of your own body"
+            way_out = "set type to your user-defined type"
             problems.append((("parameters",), f"a rigid body has no parameters; {way_out}"))
         moment = float(self.mass) * sum(float(x) ** 2 for x in self.center_of_mass)
         if not max(float(self.mass), moment, *(abs(float(x)) for x in self.inertia)) <= LARGEST:
-            limit = f"at most {LARGEST:g} kg and kg m^2, beyond which products overflow"
+            limit = f"at most {LARGEST:g} kg and kg m^2, above which products overflow"
             of = "mass, mass times the square of center_of_mass, and inertia"
             problems.append((("mass",), f"expected {of}: {limit}"))
         if problems:
@@ -110,6 +111,6 @@ class BodyTable(Table):
 
 
 class Body(BodyTable):
-    """A body of the scene."""
+    """Body of a scene: rigid, or of a user-defined type."""
 
     name: Annotated[str, texts.name("the body's name")]

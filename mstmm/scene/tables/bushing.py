@@ -1,4 +1,4 @@
-"""[[bushing]]: three forces and three moments between two ends."""
+"""Table [[bushing]]: spring and damper with three forces and three moments between two ends."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from ..rules.values import GROUND, Numbers, Orientation, Shorthand, Table, refus
 from .body import End, as_end
 
 _NOTHING = (0.0,) * 6
-#: Entries along axes in the upper triangle of a matrix of six rows.
+#: Positions of the translational entries in the upper triangle of a 6 x 6 matrix.
 _ALONG = (0, 1, 2, 6, 7, 11)
 
 
 class Bushing(Table):
-    """A spring and damper in all six directions: load on `to` = preload - K e - C e', and its
-    reaction on `from`.
+    """Spring and damper in all six directions: load preload - K e - C e' on `to`.
 
-    The bushing's axes are those of the end `from` (of the ground the inertial ones) turned by
-    `orientation`.  The deflection e is how `to` has moved from where it is at `rest`, x, y, z in m,
-    and its rotation vector in rad, by less than 170 degrees; `rest` is the pose of the end `to` in
-    the bushing's axes, by itself that of `from`.  `position` (m) is the place of the end that is on
-    the ground.  With `conservative` false the matrices may be any, as those of a journal bearing or
-    a seal: the load -N e of the antisymmetric part N of K has no potential and counts as work.
+    The reaction acts on `from`.  The bushing's axes are those of the end `from` (inertial axes for
+    the ground), rotated by `orientation`.  The deflection e is the displacement of `to` from `rest`
+    (x, y, z in m) with its rotation vector (rad), below 170 degrees.  `rest` is the undeformed pose
+    of the end `to` in the bushing's axes; by default it is that of `from`.  `position` (m) is the
+    position of an end on the ground.
+
+    With `conservative` false any matrices are accepted, such as those of a journal bearing or a
+    seal.  The load -N e of the antisymmetric part N of K then has no potential and counts as work.
     """
 
     name: Annotated[str, texts.name("the bushing's name")] = ""
@@ -55,11 +56,11 @@ class Bushing(Table):
         bodies = (split(self.from_)[0], split(self.to)[0])
         if bodies[0] == bodies[1]:
             raise refuse(
-                f'both ends are on "{bodies[0]}", so it does nothing; join two bodies', "to"
+                f'both ends are on "{bodies[0]}", so it has no effect; connect two bodies', "to"
             )
         if GROUND not in bodies and self.position != (0.0, 0.0, 0.0):
             raise refuse(
-                "only a bushing on the ground takes a position; give the body an end there",
+                "only a bushing on the ground has a position; define an end of the body there",
                 "position",
             )
         if not any((*self.stiffness, *self.damping, *self.preload)):
@@ -71,12 +72,12 @@ class Bushing(Table):
 
     @property
     def rotation(self) -> Matrix:
-        """The bushing's axes -> axes of the end `from`."""
+        """Rotation matrix from bushing axes to axes of the end `from`."""
         return from_orientation(self.orientation)
 
     @property
     def numbers(self) -> Numbers:
-        """Parameters of its force element."""
+        """Parameters of the force element: stiffness, damping and preload."""
         both, preload = (self.stiffness, self.damping), self.preload
         symmetric, skew = (
             tuple(x for one in both for x in part(one)) for part in (triangle, antisymmetric)
@@ -90,7 +91,7 @@ class Bushing(Table):
 
     @property
     def element(self) -> str:
-        """Its force element: without moments, so that its ends may spin, where it needs none."""
+        """Name of the force element; one without moments, whose ends may spin, where possible."""
         if self.conservative:
             return "bushing6"
         moments = (matrix[i][j] for matrix in map(full, (self.stiffness, self.damping))
@@ -99,12 +100,12 @@ class Bushing(Table):
 
     @property
     def stiffest(self) -> tuple[float, float]:
-        """The largest stiffness along axes (N/m) and about them (N m/rad)."""
+        """Largest stiffness along axes (N/m) and about them (N m/rad)."""
         return _largest(self.stiffness)
 
     @property
     def most_damped(self) -> tuple[float, float]:
-        """The largest damping along axes (N s/m) and about them (N m s/rad)."""
+        """Largest damping along axes (N s/m) and about them (N m s/rad)."""
         return _largest(self.damping)
 
 

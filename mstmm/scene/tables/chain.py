@@ -1,4 +1,4 @@
-"""A chain: a body and a hinge repeated in a row, read and checked once for all its members."""
+"""Table [[chain]]: a row of equal bodies and hinges, validated once for all members."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from ..rules.values import GROUND, Location, Orientation, Refused, Shorthand, Ta
 from .body import BodyTable
 from .hinge import HingeTable
 
-#: The longest chain; 1e6 bodies take some gigabytes.
+#: Longest chain; 1e6 bodies need some gigabytes.
 MAX_COUNT = 10_000_000
 
-#: What a member's hinge is called behind the member's name: "rope[3].hinge".
+#: Name of a member's hinge after the name of the member: "rope[3].hinge".
 HINGE = "hinge"
 
 
@@ -35,12 +35,12 @@ def _pattern(what: str) -> Shorthand:
 
 
 class Chain(Table):
-    """`count` bodies in a row, each on a hinge on the body before it.
+    """Row of `count` bodies, each connected by a hinge to the body before it.
 
-    Member k, from 0, has the body `body[k % len(body)]` on the hinge `hinge[k % len(hinge)]`.  It
-    is called "rope[3]", its hinge "rope[3].hinge"; "rope[last]" is the last one.  The first hangs
-    on `inboard`, every other on the `end` of the body before it (None: its only end).
-    `orientation` is that of the first hinge, in place of the one in its table (None: that one).
+    Member k, from 0, has the body `body[k % len(body)]` and the hinge `hinge[k % len(hinge)]`.  Its
+    name is "rope[3]", that of its hinge "rope[3].hinge"; "rope[last]" is the last member.  The
+    first is connected to `inboard`, every other to the `end` of the body before it (None: its only
+    end).  `orientation` replaces that of the first hinge (None: the one in its table).
     """
 
     name: Annotated[str, texts.name("the chain's name")]
@@ -48,33 +48,35 @@ class Chain(Table):
     inboard: Annotated[str, texts.end()]
     position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
     orientation: Annotated[Orientation | None, turns.orientation()] = None
-    end: Annotated[str | None, texts.name("the end on which the next body hangs")] = None
+    end: Annotated[str | None, texts.name("the end that connects to the next body")] = None
     body: Annotated[tuple[BodyTable, ...], _pattern("body")]
     hinge: Annotated[tuple[HingeTable, ...], _pattern("hinge")]
 
     @property
     def period(self) -> int:
-        """Members after which the pattern begins again."""
+        """Number of members after which the pattern repeats."""
         return lcm(len(self.body), len(self.hinge))
 
     def body_of(self, k: int) -> BodyTable:
-        """The body of member k."""
+        """Body table of member k."""
         return self.body[k % len(self.body)]
 
     def hinge_of(self, k: int) -> HingeTable:
-        """The hinge of member k."""
+        """Hinge table of member k."""
         return self.hinge[k % len(self.hinge)]
 
     @property
     def held_ends(self) -> tuple[str, ...]:
-        """Per body of the pattern, the end on which the next member hangs; "" where there is none
-        because the chain has one member."""
+        """For each body of the pattern the end that connects to the next member.
+
+        "" where a body has no end because the chain has one member.
+        """
         if self.end is not None:
             return (self.end,) * len(self.body)
         return tuple(next(iter(body.ends), "") for body in self.body)
 
     def inboard_of(self, k: int) -> str:
-        """The end on which member k hangs: "ground", "body.end" or "rope[2].tip"."""
+        """Inboard end of member k: "ground", "body.end" or "rope[2].tip"."""
         if k == 0:
             return self.inboard
         return f"{self.name}[{k - 1}].{self.held_ends[(k - 1) % len(self.body)]}"
@@ -91,8 +93,8 @@ class Chain(Table):
         if on != GROUND and self.position != (0.0, 0.0, 0.0):
             yield (
                 ("position",),
-                'only a chain whose inboard is "ground" takes a position; '
-                f'give "{on}" an end there',
+                'only a chain with inboard = "ground" has a position; '
+                f'define an end of "{on}" there',
             )
 
     def _too_many(self) -> Iterator[tuple[Location, str]]:
@@ -105,7 +107,7 @@ class Chain(Table):
                 )
 
     def _ends(self) -> Iterator[tuple[Location, str]]:
-        """Every body that carries another needs an end for it."""
+        """Problems of the ends that connect to the next member."""
         carriers = min(self.count - 1, len(self.body))
         for i, body in enumerate(self.body):
             names = list(body.ends)
@@ -127,5 +129,5 @@ class Chain(Table):
                 way_out = f'write end = "{names[0]}"' if names else "give it one"
                 yield (
                     ("body", i, "ends"),
-                    f"the next body hangs on its only end, but it has {has}; {way_out}",
+                    f"expected one end for the next body, found {has}; {way_out}",
                 )

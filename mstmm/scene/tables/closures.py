@@ -1,4 +1,4 @@
-"""[[constraint]] and [[coupling]]: what closes loops besides hinges."""
+"""Tables [[constraint]] and [[coupling]]: loop closures other than hinges."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..rules import values as rules
 from ..rules.values import GROUND, Table, refuse, split
 
 DISTANCE, PLANE, CURVE, ROLLING = "distance", "point-on-plane", "point-on-curve", "rolling"
-#: Keys of each type besides the common ones, and which of them it cannot do without.
+#: Required and optional keys of each type, besides the common ones.
 _KEYS = {
     DISTANCE: (("length",), ()), PLANE: (("normal",), ("offset",)),
     CURVE: (("curve",), ("start",)), ROLLING: (("normal", "radius"), ("offset", "axis")),
@@ -27,15 +27,15 @@ _EXPECTED = {
 
 
 class Constraint(Table):
-    """Rows between the points of two ends.
+    """Constraint between the points of two ends.
 
-    "distance": `to` stays `length` (m, more than 0) away from `from`.  "point-on-plane": `to` stays
-    in the plane through `from` with the `normal`, in the axes of the end `from`, or `offset` (m)
-    above it along the normal.  "point-on-curve": `to` stays on the `curve`, three expressions of a
-    parameter s in m, from `from` and in its axes; s begins near `start`.  "rolling": a disc of
-    `radius` (m) with its centre at `to` and its `axis` in the axes of that end rolls without
-    slipping on such a plane, above it; without an axis a ball.  `position` (m) is the place of the
-    end that is on the ground.
+    "distance": `to` keeps the distance `length` (m, more than 0) from `from`.  "point-on-plane":
+    `to` remains in a plane with the `normal`, in the axes of the end `from`, at `offset` (m) along
+    the normal.  "point-on-curve": `to` remains on the `curve`, three expressions of a parameter s
+    in m, relative to `from` and in its axes; s starts near `start`.  "rolling": a disc of `radius`
+    (m) rolls without slip on top of such a plane, with its centre at `to` and its `axis` in the
+    axes of that end.  Without an axis it is a ball.  `position` (m) is the position of an end on
+    the ground.
     """
 
     name: Annotated[str, texts.name("the constraint's name")] = ""
@@ -58,10 +58,10 @@ class Constraint(Table):
     def _check(self) -> Constraint:
         bodies = (split(self.from_)[0], split(self.to)[0])
         if bodies[0] == bodies[1]:
-            raise refuse(f'both ends are on "{bodies[0]}"; join two bodies', "to")
+            raise refuse(f'both ends are on "{bodies[0]}"; connect two bodies', "to")
         if GROUND not in bodies and self.position != (0.0, 0.0, 0.0):
             raise refuse(
-                "only a constraint on the ground takes a position; give the body an end there",
+                "only a constraint on the ground has a position; define an end of the body there",
                 "position",
             )
         needed, more = _KEYS[self.type]
@@ -72,22 +72,22 @@ class Constraint(Table):
             if getattr(self, key) is None:
                 raise refuse(f"missing; expected {_EXPECTED[key].format(self.from_)}", key)
         if self.type == ROLLING and bodies[1] == GROUND:
-            raise refuse("the ground does not roll; swap from and to", "to")
+            raise refuse("expected a body, found the ground; swap from and to", "to")
         return self
 
     @property
     def unit_normal(self) -> Vector | None:
-        """The normal with length 1, in the axes of the end `from`."""
+        """Unit normal in the axes of the end `from`, or None."""
         return None if self.normal is None else _unit(self.normal)
 
     @property
     def unit_axis(self) -> Vector:
-        """The axis of a disc with length 1, in the axes of the end `to`; 0 of a ball."""
+        """Unit axis of a disc in the axes of the end `to`; zero for a ball."""
         return (0.0, 0.0, 0.0) if self.axis is None else _unit(self.axis)
 
     @property
     def rows(self) -> int:
-        """How many rows it has."""
+        """Number of constraint rows."""
         return {CURVE: 2, ROLLING: 3}.get(self.type, 1)
 
 
@@ -100,11 +100,11 @@ def _unit(vector: Vector) -> Vector:
 
 
 class Coupling(Table):
-    """One row between coordinates of hinges: gears, racks, screws, differentials.
+    """Coupling of hinge coordinates by one row: gears, racks, screws, differentials.
 
-    `expression` of the coordinates has the value `equals`, or keeps that of the start where
-    `equals` is left out; `speeds`, linear in speeds of hinges, has the value `equals`, or 0.
-    `equals` is a number or an expression of t.
+    `expression` of the coordinates has the value `equals`, or keeps its initial value if `equals`
+    is left out.  `speeds`, linear in speeds of hinges, has the value `equals`, or 0.  `equals` is a
+    number or an expression of t.
     """
 
     name: Annotated[str, texts.name("the coupling's name")] = ""
@@ -123,29 +123,31 @@ class Coupling(Table):
     @model_validator(mode="after")
     def _check(self) -> Coupling:
         if self.expression is None and self.speeds is None:
-            raise refuse("missing; give an expression of coordinates, or speeds", "expression")
+            raise refuse("missing; give expression or speeds", "expression")
         if self.expression is not None and self.speeds is not None:
-            raise refuse("a coupling has one row: expression or speeds; write two", "speeds")
+            raise refuse(
+                "expected expression or speeds, found both; define two couplings", "speeds"
+            )
         return self
 
     @property
     def key(self) -> str:
-        """The key that has its row: "expression" of coordinates or "speeds"."""
+        """Key that gives the row: "expression" or "speeds"."""
         return "speeds" if self.expression is None else "expression"
 
     @property
     def row(self) -> Expression:
-        """The expression that is kept, of coordinates or of speeds."""
+        """Expression of the row, in coordinates or in speeds."""
         row: Expression = getattr(self, self.key)
         return row
 
     @property
     def goes_by_time(self) -> bool:
-        """Whether it moves what it couples, as a drive does."""
+        """Whether it prescribes motion, as a drive does."""
         by = self.equals
         return by is not None and not by.is_zero if self.speeds else bool(by and by.names)
 
     @property
     def names(self) -> tuple[Name, ...]:
-        """What it couples."""
+        """Names in the row: the coupled coordinates or speeds."""
         return self.row.names

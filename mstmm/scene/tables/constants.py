@@ -1,4 +1,4 @@
-"""Named constants of a scene: numbers by their names, for every number and expression in it."""
+"""Named constants of a scene, usable in every number and expression of it."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from ...expression.expression import FUNCTIONS
 from ..rules import written
 from ..rules.values import NAME, NAME_SHAPE, Location, Refused, Rule, finite, found, plain, refuse
 
-#: Words of expressions, and of the shapes of beams (x, L), that mean something already.
+#: Names with a meaning in expressions, or in the shape functions of beams (x, L).
 TAKEN = ("t", "q", "u", "x", "L", "pi", "deg", "free", *FUNCTIONS)
 
 
 def problem_with_name(name: object) -> str:
-    """Why an expression cannot have such a name of its own; empty if it can."""
+    """Message about a name that users cannot define in expressions, or ""."""
     if not isinstance(name, str) or not NAME.fullmatch(name):
         return f"expected a name ({NAME_SHAPE}), found {found(name)}"
     if name in TAKEN:
-        return f'"{name}" has a meaning in expressions already; choose another name'
+        return f'"{name}" already has a meaning in expressions; choose another name'
     return ""
 
 
 def evaluated(value: Any) -> dict[str, float]:
-    """The constants of a table of numbers and of expressions of those above them.
+    """Evaluate a table of constants: numbers, or expressions of constants above them.
 
     Raises Refused.
     """
@@ -37,7 +37,9 @@ def evaluated(value: Any) -> dict[str, float]:
             continue
         try:
             with written.known(made):
-                made[name] = finite(plain(given), "a number, or an expression of those above", name)
+                made[name] = finite(
+                    plain(given), "a number, or an expression of constants above", name
+                )
         except Refused as refused:
             problems += refused.problems
     if problems:
@@ -46,7 +48,7 @@ def evaluated(value: Any) -> dict[str, float]:
 
 
 def constants() -> Rule:
-    """The table `[constants]`."""
+    """Rule for the table [constants]."""
     item = {"type": ["number", "string"]}
     return Rule(
         "a table of named numbers", evaluated, {"type": "object", "additionalProperties": item}

@@ -1,4 +1,4 @@
-"""[[elastic]]: a general elastic body, from mass and stiffness matrices or from a mesh."""
+"""Table [[elastic]]: elastic body from mass and stiffness matrices or from a mesh."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from .elastic_keys import ElasticKeys
 
 
 class Elastic(ElasticKeys):
-    """A general elastic body; its axes are those of its mesh.
+    """General elastic body; its axes are those of its mesh.
 
-    Exactly one of `matrices` (a .npz file), `arrays`, `mesh` (a file) and `box` tells what it is
-    made of.  `modes` is the number of vibration modes, None for "auto".
+    Exactly one of `matrices` (a .npz file), `arrays`, `mesh` (a file) and `box` gives its finite
+    elements.  `modes` is the number of vibration modes, None for "auto".
     """
 
     @model_validator(mode="after")

@@ -1,5 +1,4 @@
-"""The keys of an elastic body: its source, its ends; what they say to each other is checked
-elsewhere."""
+"""Keys of an elastic body: source, ends; `elastic_rules` checks them against each other."""
 
 from __future__ import annotations
 
@@ -18,14 +17,14 @@ from ..rules import values as rules
 from ..rules.values import NAME, Location, Refused, Rule, Shorthand, Table, found, plain, refuse
 from .flexible import AUTO, FlexibleTable, Numbers, decided, framed
 
-#: Folder that relative paths start from while a scene file is read; "" leaves them as they are.
+#: Folder from which relative paths start while a scene file is read; "" leaves paths unchanged.
 FOLDER: ContextVar[str] = ContextVar("folder", default="")
 
 SOURCES = ("matrices", "arrays", "mesh", "box")
 REGIONS = ("nodes", "box", "plane", "sphere", "set")
 COUPLINGS = ("rigid", "mean")
 ORDERS = ("node", "component")
-#: Unknowns of matrices written into the scene itself.
+#: Most unknowns of matrices given in the scene file.
 MAX_UNKNOWNS = 3000
 MAX_MODES = 200
 
@@ -33,7 +32,7 @@ Rows = tuple[Numbers, ...]
 
 
 def path(*suffixes: str) -> Rule:
-    """Path of a file, made absolute from the folder of the scene file that names it."""
+    """Rule for the path of a file, relative to the folder of the scene file."""
     kinds = " or ".join(suffixes)
     expected = "the path of a file" + (f" ending in {kinds}" if suffixes else "")
 
@@ -49,8 +48,10 @@ def path(*suffixes: str) -> Rule:
 
 
 def path_inside(*suffixes: str) -> Rule:
-    """Path of a regular file in the folder of the scene file that names it, or below; of a scene
-    that was not read from a file, any path."""
+    """Rule for the path of a regular file in the folder of the scene file, or below.
+
+    For a scene that was not read from a file, any path is accepted.
+    """
     anywhere = path(*suffixes)
 
     def check(value: Any) -> str:
@@ -70,7 +71,7 @@ def path_inside(*suffixes: str) -> Rule:
 
 
 def table_of_numbers(expected: str, columns: int = 0) -> Rule:
-    """Rows of finite numbers, each of the same length (`columns` where it is given)."""
+    """Rule for rows of finite numbers of equal length (`columns` if given)."""
 
     def check(value: Any) -> Rows:
         value = plain(value.toarray() if hasattr(value, "toarray") else value)
@@ -79,7 +80,7 @@ def table_of_numbers(expected: str, columns: int = 0) -> Rule:
         if not rows or len(rows) > MAX_UNKNOWNS:
             raise refuse(
                 f"expected {expected}, 1 to {MAX_UNKNOWNS} rows, found {len(rows)}"
-                + ("; save larger ones to a file and name it in matrices" if rows else "")
+                + ("; save larger ones to a file and give its path in matrices" if rows else "")
             )
         row = rules.numbers(f"rows of {width} numbers", width or 1)
         return tuple(_row(row, one, i) for i, one in enumerate(rows))
@@ -99,13 +100,13 @@ def _row(rule: Rule, value: Any, i: int) -> Numbers:
 class Arrays(Table):
     """Matrices of a finite-element model: rows of numbers, kg (kg m^2) and N/m (N m).
 
-    With N nodes there are u = 3 N unknowns (x, y, z of each) or 6 N (and rotations).  `order`
-    "node" counts x1 y1 z1 x2 ..., "component" x1 x2 ... y1 y2 ...
+    N nodes have 3 N unknowns (x, y, z of each) or 6 N (with rotations).  `order` "node" means
+    x1 y1 z1 x2 ..., "component" means x1 x2 ... y1 y2 ...
     """
 
     mass: Annotated[Rows, table_of_numbers("the mass matrix, rows of numbers")]
     stiffness: Annotated[Rows, table_of_numbers("the stiffness matrix, rows of numbers")]
-    nodes: Annotated[Rows, table_of_numbers("the places of the nodes, rows of x, y, z in m", 3)]
+    nodes: Annotated[Rows, table_of_numbers("the positions of the nodes, rows of x, y, z in m", 3)]
     scalar_mass: Annotated[
         Rows | None, table_of_numbers("the mass matrix of one component, rows of numbers")
     ] = None
@@ -141,8 +142,7 @@ class Arrays(Table):
 
 
 class Box(Table):
-    """A block meshed with hexahedra: edges in m, elements along each, its corner of least
-    x, y and z."""
+    """Block meshed with hexahedra: edges (m), elements along each edge, lowest corner (m)."""
 
     size: Annotated[Vector, rules.numbers("three numbers in m, more than 0", 3, of="m")]
     divisions: Annotated[tuple[int, ...], rules.numbers("three whole numbers, 1 or more", 3)]
@@ -200,12 +200,13 @@ def _corners() -> Rule:
 
 
 class ElasticEnd(Table):
-    """An end of an elastic body: the nodes that move with it as one section.
+    """End of an elastic body: the nodes that move with it as one section.
 
     Exactly one of `nodes` (numbers from 0), `box` (two corners), `plane` (n . r = d as
-    [nx, ny, nz, d]), `sphere` ([x, y, z, radius]), `set` (a named surface of the mesh file) tells
-    them.  `position` None is their mean.  `coupling` "rigid" makes the nodes rigid, "mean" lets
-    them carry the load evenly.  `static_shapes` None means: where something acts on the end.
+    [nx, ny, nz, d]), `sphere` ([x, y, z, radius]) and `set` (a named surface of the mesh file)
+    selects them.  `position` None is their mean.  With `coupling` "rigid" the nodes form a rigid
+    section; with "mean" they share the load evenly.  `static_shapes` None adds static shapes only
+    where something acts on the end.
     """
 
     nodes: Annotated[tuple[int, ...] | None, _numbers_of_nodes()] = None
@@ -222,12 +223,12 @@ class ElasticEnd(Table):
 
     @property
     def rotation(self) -> Matrix:
-        """Rotation matrix: axes of the end -> body axes."""
+        """Rotation matrix from axes of the end to body axes."""
         return from_orientation(self.orientation)
 
     @property
     def region(self) -> str:
-        """Which key tells the nodes."""
+        """Key that selects the nodes."""
         return next(key for key in REGIONS if getattr(self, key) is not None)
 
     @model_validator(mode="after")
@@ -263,7 +264,7 @@ _ENDS = Shorthand(
 
 
 class ElasticKeys(FlexibleTable):
-    """The keys of an elastic body."""
+    """Keys of an elastic body."""
 
     matrices: Annotated[str | None, path(".npz")] = None
     arrays: Arrays | None = None
@@ -281,5 +282,5 @@ class ElasticKeys(FlexibleTable):
 
     @property
     def source(self) -> str:
-        """Which key tells what the body is made of: matrices, arrays, mesh or box."""
+        """Key that gives the finite elements: matrices, arrays, mesh or box."""
         return next(key for key in SOURCES if getattr(self, key) is not None)

@@ -1,4 +1,4 @@
-"""What the keys of one elastic body say to each other: source, material, ends."""
+"""Checks of the keys of an elastic body against each other: source, material, ends."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .elastic_keys import SOURCES, ElasticKeys
 
 Problem = tuple[Location, str]
 
-#: Keys of the material, with their units; of bodies that are meshed.
+#: Material keys of meshed bodies, with their meaning and unit.
 MATERIAL = {
     "young": "Young's modulus in Pa, more than 0",
     "poisson": "Poisson's ratio, more than -1 and less than 0.5",
@@ -18,13 +18,13 @@ MATERIAL = {
 
 
 def problems(elastic: ElasticKeys) -> Iterator[Problem]:
-    """Everything in which the keys of an elastic body do not fit each other."""
+    """Problems of the keys of an elastic body with each other."""
     given = [key for key in SOURCES if getattr(elastic, key) is not None]
     if len(given) != 1:
         named = " and ".join(given) if given else "none"
         yield (
             (),
-            f"expected exactly one of {', '.join(SOURCES)} to say what the body is made of, found "
+            f"expected exactly one of {', '.join(SOURCES)} as the source of the body, found "
             f'{named}; write for example matrices = "link.npz"',
         )
         return
@@ -40,24 +40,24 @@ def _material(elastic: ElasticKeys, source: str) -> Iterator[Problem]:
         if meshed and value is None:
             yield (key,), f"missing; a body from a {source} needs {meaning}"
         elif not meshed and value is not None:
-            yield (key,), f"{source} hold the material already; leave it out"
+            yield (key,), f"{source} already contain the material; leave it out"
     if elastic.poisson is not None and not -1 < elastic.poisson < 0.5:
         yield (
             ("poisson",),
             f"expected {MATERIAL['poisson']}, found {elastic.poisson:g}"
-            + ("; no element here is incompressible" if elastic.poisson == 0.5 else ""),
+            + ("; no element is incompressible" if elastic.poisson == 0.5 else ""),
         )
     if elastic.order is not None and not meshed:
-        yield ("order",), "only mesh and box have elements of an order; leave it out"
+        yield ("order",), "only mesh and box have an element order; leave it out"
     if elastic.scale is not None and source != "mesh":
-        yield ("scale",), "only a mesh file has a unit of its own; leave it out"
+        yield ("scale",), "only a mesh file has its own length unit; leave it out"
 
 
 def _ends(elastic: ElasticKeys, source: str) -> Iterator[Problem]:
     if not elastic.ends:
         yield (
             ("ends",),
-            "missing; an elastic body is met at its ends alone, write for example "
+            "missing; an elastic body connects only at its ends; write for example "
             "ends = { root = { plane = [1, 0, 0, 0.0] } }",
         )
     nodes = len(elastic.arrays.nodes) if elastic.arrays is not None else None
@@ -65,7 +65,7 @@ def _ends(elastic: ElasticKeys, source: str) -> Iterator[Problem]:
         if end.set is not None and source != "mesh":
             yield (
                 ("ends", name, "set"),
-                "only a mesh file has named surfaces; write plane, box, sphere or nodes",
+                "only a mesh file has named surfaces; use plane, box, sphere or nodes",
             )
         beyond = [n for n in end.nodes or () if nodes is not None and n >= nodes]
         if beyond:
@@ -76,7 +76,7 @@ def _ends(elastic: ElasticKeys, source: str) -> Iterator[Problem]:
 
 
 def _start(elastic: ElasticKeys) -> Iterator[Problem]:
-    """eta and etad belong together; how many there are the matrices decide."""
+    """Problem of eta and etad with different lengths; the matrices determine their number."""
     start = elastic.initial
     if start.eta is not None and start.etad is not None and len(start.eta) != len(start.etad):
         yield (

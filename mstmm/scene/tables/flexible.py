@@ -1,4 +1,4 @@
-"""What beams and elastic bodies have in common: damping, start values, frame, level of model."""
+"""Common keys of beams and elastic bodies: damping, initial values, frame, model level."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from ..rules.values import NAME, Refused, Rule, Shorthand, Table, found, plain, 
 
 Numbers = tuple[float, ...]
 
-#: Levels of model: coupled with the rigid motion; no deformation; rigid motion first, then the
-#: linear response to it.
+#: Model levels: coupled with the rigid motion; no deformation; rigid motion first, then the linear
+#: elastic response to it.
 MODELS = ("flexible", "rigid", "one-way")
 
 AUTO = "auto"
@@ -22,9 +22,9 @@ _TANGENT = re.compile(rf"tangent(@{NAME.pattern})?")
 
 
 class Damping(Table):
-    """Damping of the shapes: D = 2 ratio omega m per shape, plus `stiffness` times K.
+    """Damping of the shapes: D = 2 ratio omega m for each shape, plus `stiffness` times K.
 
-    `ratio` is one modal ratio for all, or one per shape; `stiffness` is a time in s.
+    `ratio` is one modal damping ratio for all, or one per shape; `stiffness` is a time in s.
     """
 
     ratio: Annotated[
@@ -40,7 +40,7 @@ class Damping(Table):
 
     @property
     def acts(self) -> bool:
-        """True when there is any damping."""
+        """Whether there is any damping."""
         return self.stiffness > 0 or any(self.ratio)
 
 
@@ -59,7 +59,7 @@ DAMPING = Shorthand(
 class Start(Table):
     """Deformation at t = 0: modal coordinates and their rates (None: zero).
 
-    With `static` the deformation is that under the loads at t = 0.
+    With `static` it is the static deformation under the loads at t = 0.
     """
 
     static: Annotated[bool, texts.flag()] = False
@@ -69,7 +69,7 @@ class Start(Table):
     @model_validator(mode="after")
     def _check(self) -> Start:
         if self.static and self.eta is not None:
-            raise refuse("static gives the deformation itself; leave one of them out", "eta")
+            raise refuse("static already gives the deformation; leave one of them out", "eta")
         for key in ("eta", "etad"):
             if getattr(self, key) == ():
                 raise refuse("expected one number per shape, found none; leave it out", key)
@@ -96,10 +96,10 @@ START = Shorthand(
 
 
 def framed(*words: str, at_end: bool = False) -> Rule:
-    """The floating frame: one of these words, and "tangent@mid" where `at_end` is set."""
+    """Rule for the floating frame: one of these keywords, and with `at_end` "tangent@mid"."""
     expected = ", ".join(f'"{word}"' for word in words[:-1]) + f' or "{words[-1]}"'
     if at_end:
-        expected += ' ("tangent@mid": at that end, else at the end that a hinge holds)'
+        expected += ' ("tangent@mid": at that end, else at the end of the inboard hinge)'
 
     def check(value: Any) -> str:
         if isinstance(value, str) and (
@@ -115,7 +115,7 @@ def framed(*words: str, at_end: bool = False) -> Rule:
 
 
 def decided(rule: Rule) -> Rule:
-    """The values of another rule, or "auto", which becomes None."""
+    """Rule for the values of another rule, or "auto", which becomes None."""
     expected = f'{rule.expected} or "{AUTO}"'
 
     def check(value: Any) -> Any:
@@ -134,9 +134,9 @@ def decided(rule: Rule) -> Rule:
 
 
 class FlexibleTable(Table):
-    """What every flexible body has.
+    """Common keys of flexible bodies.
 
-    `stiffening` takes second-order displacements into the kinematics.
+    `stiffening` includes second-order displacements in the kinematics.
     """
 
     name: Annotated[str, texts.name("the body's name")]
@@ -147,10 +147,10 @@ class FlexibleTable(Table):
 
     @property
     def frame_kind(self) -> str:
-        """The word of `frame` alone: "auto", "tangent", "chord" or "mean"."""
+        """Kind of the floating frame: "auto", "tangent", "chord" or "mean"."""
         return str(getattr(self, "frame", AUTO)).partition("@")[0]
 
     @property
     def frame_end(self) -> str:
-        """The end a tangent frame is asked for at; "" is the one that a hinge holds."""
+        """End given for a tangent frame; "" is the end of the inboard hinge."""
         return str(getattr(self, "frame", AUTO)).partition("@")[2]

@@ -1,4 +1,4 @@
-"""[[hinge]]: what joins two bodies, or a body to the ground."""
+"""Table [[hinge]]: a hinge between two bodies, or between a body and the ground."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .hinge_rules import settled
 
 
 class HingeTable(HingeKeys):
-    """What a hinge is, without its name and what it joins.
+    """Properties of a hinge without its name and ends.
 
-    `axis` and `axis2` are in the axes of the outboard end at q = 0; planar: the normal and the
-    direction of x.  `drive` has one entry per coordinate, None where the coordinate is free; it is
-    None for a hinge without drive.  For built-in types `initial` is filled in (None when every
-    coordinate is driven) and `law` has one entry per speed.
+    `axis` and `axis2` are in the axes of the outboard end at q = 0; for planar hinges they are the
+    normal and the direction of x.  `drive` has one entry per coordinate, None where the coordinate
+    is free; it is None for a hinge without drive.  For built-in types `initial` is complete (None
+    if every coordinate is driven) and `law` has one entry per speed.
     """
 
     @model_validator(mode="after")
@@ -32,12 +32,12 @@ class HingeTable(HingeKeys):
 
 
 class Hinge(HingeTable):
-    """A hinge between an inboard end (or the ground) and an outboard body.
+    """Hinge between an inboard end (or the ground) and an outboard body.
 
-    Where other hinges hold the outboard body too, loops close: one of them is part of the tree and
-    the others are cut, which costs it nothing but work.  `cut` True: cut this one; False: not this
-    one; None: whichever costs less.  In loops start values are wishes; `hold` keeps those of q
-    exactly.  Nothing acts by what it is `rated` for.
+    If the outboard body has several inboard hinges, loops close: one of the hinges is part of the
+    tree and the others are cut, which affects only the cost.  `cut` True: cut this one; False: not
+    this one; None: whichever costs less.  In loops, initial values are targets of the assembly;
+    `hold` keeps those of q exactly.  `rated` has no effect on the motion.
     """
 
     name: Annotated[str, texts.name("the hinge's name")]
@@ -66,7 +66,7 @@ class Hinge(HingeTable):
 
     @property
     def inboard_end(self) -> str:
-        """End of the inboard body, "" for its origin or the ground."""
+        """Inboard end of the hinge, "" for the origin of the body or the ground."""
         return split(self.inboard)[1]
 
     @property
@@ -75,11 +75,11 @@ class Hinge(HingeTable):
 
     @property
     def outboard_end(self) -> str:
-        """End by which the outboard body is held, "" for its origin."""
+        """Outboard end of the hinge, "" for the origin of the body."""
         return split(self.outboard)[1]
 
     def misplaced(self) -> list[tuple[Location, str]]:
-        """Ends that cannot be joined."""
+        """Problems of the ends: ground as outboard, a single body, or a misplaced position."""
         problems: list[tuple[Location, str]] = []
         if self.outboard_body == GROUND:
             problems.append(
@@ -88,22 +88,22 @@ class Hinge(HingeTable):
         elif self.inboard_body == self.outboard_body:
             problems.append((
                 ("outboard",),
-                f'"{self.outboard_body}" is hinged to itself; join two different bodies',
+                f'"{self.outboard_body}" is hinged to itself; connect two different bodies',
             ))  # fmt: skip
         if self.inboard_body != GROUND and self.position != (0.0, 0.0, 0.0):
             problems.append((
                 ("position",),
-                'only a hinge whose inboard is "ground" takes a position; '
-                f'give "{self.inboard_body}" an end there',
+                'only a hinge with inboard = "ground" has a position; '
+                f'define an end of "{self.inboard_body}" there',
             ))  # fmt: skip
         return problems
 
     @property
     def holds(self) -> bool:
-        """True when its start values are kept exactly."""
+        """Whether initial values of q are kept exactly."""
         return self.hold
 
     @property
     def lets_go(self) -> bool:
-        """True when it is released by itself."""
+        """Whether the hinge has a release condition."""
         return self.release is not None

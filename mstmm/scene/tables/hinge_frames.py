@@ -1,6 +1,6 @@
-"""How the frame of a hinge lies in the axes of the ends it joins, and the numbers its kernel takes.
+"""Frames of a hinge in the axes of its ends, and the parameters of its kernel.
 
-Everything here stays exact where axes lie along axes, and differentiable (`numbers.dual`).
+All results are exact where axes coincide, and differentiable (`numbers.dual`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .hinge_keys import HingeKeys
 
 
 def hinge_frames(hinge: HingeKeys) -> tuple[Matrix, Matrix]:
-    """(inboard, outboard) axes of the hinge's kernel in the axes of its outboard end at q = 0."""
+    """Inboard and outboard axes of the hinge kernel in the axes of the outboard end at q = 0."""
     frame = "axis" if hinge.facts is None else hinge.facts.frame
     if frame == "own":
         return IDENTITY, IDENTITY
@@ -34,12 +34,12 @@ def hinge_frames(hinge: HingeKeys) -> tuple[Matrix, Matrix]:
 
 
 def twist_axes(hinge: HingeKeys) -> Matrix:
-    """Axes in which a law splits a rotation: twist about z, the hinge's axis."""
+    """Axes in which a law decomposes a rotation: twist about z, the axis of the hinge."""
     return about(hinge.unit_axis, None)
 
 
 def key_numbers(hinge: HingeKeys) -> dict[str, float]:
-    """Parameters of the kernel that keys of the hinge give, by name; a crossing frame's angle."""
+    """Kernel parameters by name that follow from keys of the hinge, such as lead or axis angle."""
     facts = hinge.facts
     if facts is None:
         return {}
@@ -52,10 +52,10 @@ def key_numbers(hinge: HingeKeys) -> dict[str, float]:
 
 
 def start_motion(hinge: HingeKeys) -> list[tuple[Vector, Vector]] | None:
-    """(translation, rotation) of the outboard end per unit of each speed, in its own axes, at the
-    default start values of the coordinates.
+    """Translation and rotation of the outboard end per unit of each speed, in its own axes.
 
-    None where the type is not known, or its coordinates fail there.
+    The coordinates have their default initial values.  None where the type is not defined, or its
+    motion is not finite there.
     """
     facts = hinge.facts
     if facts is None:
@@ -74,14 +74,14 @@ def _turned(axes: Matrix, v: Vector) -> Vector:
 
 
 def about(axis: Vector, in_plane: Vector | None) -> Matrix:
-    """Axes with z along a unit vector, and x along `in_plane` or anywhere."""
+    """Rotation matrix with z along a unit vector, and x along `in_plane` or arbitrary."""
     if in_plane is not None:
         return _frame(axis, reject(in_plane, axis))
     return IDENTITY if axis == (0.0, 0.0, 1.0) else _frame(axis, perpendicular(axis))
 
 
 def _frame(z: Vector, x: Vector) -> Matrix:
-    """Rotation with columns x, z x x, z."""
+    """Rotation matrix with columns x, z x x, z."""
     y = cross(z, x)
     return ((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2]))
 

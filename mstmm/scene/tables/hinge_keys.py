@@ -1,4 +1,4 @@
-"""The keys of a hinge and its start values; what they say to each other is settled elsewhere."""
+"""Keys of a hinge and its initial values; `hinge_rules` resolves and checks them."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from .law import Law
 
 
 class Initial(Table):
-    """Start values of a hinge: q (quaternions w, x, y, z) and u, one entry per coordinate."""
+    """Initial values of a hinge: q (quaternions w, x, y, z) and u, one entry per coordinate."""
 
     q: Annotated[Numbers | None, rules.numbers("one number per coordinate")] = None
     u: Annotated[Numbers | None, rules.numbers("one number per speed")] = None
 
 
 class Rated(Table):
-    """What a joint is built for: its range, its largest effort and speed.  Nothing acts by it."""
+    """Rating of a joint: range, largest effort and speed; without effect on the motion."""
 
     lower: Annotated[float | None, rules.number("m or rad")] = None
     upper: Annotated[float | None, rules.number("m or rad")] = None
@@ -42,9 +42,11 @@ class Rated(Table):
 
 
 class HingeKeys(Table):
-    """The keys of a hinge, as they are written and as `HingeTable` leaves them."""
+    """Keys of a hinge, before and after `HingeTable` resolves their defaults."""
 
-    type: Annotated[str, texts.name("a hinge type", ", ".join(builtin_hinges()) + " or your own")]
+    type: Annotated[
+        str, texts.name("a hinge type", ", ".join(builtin_hinges()) + " or a user-defined type")
+    ]
     orientation: Annotated[Orientation, turns.orientation()] = (0.0, 0.0, 0.0)
     axis: Annotated[Vector, rules.direction()] = (0.0, 0.0, 1.0)
     axis2: Annotated[Vector | None, rules.direction()] = None
@@ -62,34 +64,36 @@ class HingeKeys(Table):
 
     @property
     def builtin(self) -> HingeFacts | None:
-        """Facts of the built-in type, None for a user's type."""
+        """Facts of the built-in type, None for a user-defined type."""
         return builtin_hinges().get(self.type)
 
     @cached_property
     def facts(self) -> HingeFacts | None:
-        """What the type leaves free; of a user's type None until its definition is known
-        (`Scene.check_types`)."""
+        """Facts of the type: coordinates, speeds, keys.
+
+        None for a user-defined type until `Scene.check_types` provides its definition.
+        """
         return self.builtin
 
     @property
     def is_weld(self) -> bool:
-        """Both ends are one, by its type."""
+        """Whether the type of the hinge is a weld."""
         return self.facts is not None and self.facts.welds
 
     @property
     def rotation(self) -> Matrix:
-        """Rotation matrix at q = 0: axes of the outboard end -> axes of the inboard end."""
+        """Rotation matrix at q = 0 from axes of the outboard end to axes of the inboard end."""
         return from_orientation(self.orientation)
 
     @property
     def unit_axis(self) -> Vector:
-        """The axis (planar: the normal) with length 1."""
+        """Unit axis; for planar hinges the unit normal."""
         x, y, z = unit(self.axis)
         return (x, y, z)
 
     @property
     def unit_axis2(self) -> Vector | None:
-        """The second axis with length 1; planar: made perpendicular to the normal."""
+        """Second unit axis; for planar hinges made perpendicular to the normal."""
         if self.axis2 is None:
             return None
         if self.facts is not None and self.facts.frame == "plane":
@@ -98,15 +102,15 @@ class HingeKeys(Table):
         return (x, y, z)
 
     def misplaced(self) -> list[tuple[Location, str]]:
-        """What is wrong with the ends it joins; a table without ends has none to be wrong."""
+        """Problems of the ends of the hinge; none for a table without ends."""
         return []
 
     @property
     def lets_go(self) -> bool:
-        """True when it is released by itself."""
+        """Whether the hinge has a release condition."""
         return False
 
     @property
     def holds(self) -> bool:
-        """True when its start values are kept exactly, whatever loops ask for."""
+        """Whether initial values of q are kept exactly when loops are assembled."""
         return False

@@ -1,4 +1,4 @@
-"""What a hinge of each type takes: keys, start values, drive, law; defaults filled in."""
+"""Checks and defaults of a hinge by its type: keys, initial values, drive, law."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from .law import Law, LawEntry
 
 _Z = (0.0, 0.0, 1.0)
 _X = (1.0, 0.0, 0.0)
-#: Start values of a driven coordinate must agree with the drive to this accuracy.
+#: Largest difference of initial values of a driven coordinate from its drive, relative above 1.
 _AGREES = 1e-9
 
 
 def settled(hinge: HingeKeys) -> dict[str, Any]:
-    """Fields with their defaults filled in; Refused names everything that does not fit.
+    """Resolve the defaults of a hinge: changed fields.  Raises Refused with all problems.
 
-    Of a user's type nothing is known here: it is settled when its definition is (`settled_as`).
+    Hinges of user-defined types are resolved by `settled_as` when their definition is available.
     """
     problems = hinge.misplaced()
     changes: dict[str, Any] = {}
@@ -35,7 +35,7 @@ def settled(hinge: HingeKeys) -> dict[str, Any]:
         if hinge.parameters:
             problems.append((
                 ("parameters",),
-                f"a {hinge.type} hinge has no parameters; name them in the type of your own hinge",
+                f"a {hinge.type} hinge has no parameters; only user-defined types have them",
             ))  # fmt: skip
         changes = _settled(hinge, hinge.builtin, problems)
     if problems:
@@ -44,7 +44,10 @@ def settled(hinge: HingeKeys) -> dict[str, Any]:
 
 
 def settled_as(hinge: HingeKeys, facts: HingeFacts) -> dict[str, Any]:
-    """`settled`, of a hinge of a user's type with these facts."""
+    """Resolve the defaults of a hinge of a user-defined type with these facts.
+
+    Raises Refused with all problems.
+    """
     problems: list[tuple[Location, str]] = []
     changes = _settled(hinge, facts, problems)
     if problems:
@@ -62,19 +65,19 @@ def _settled(
     if hinge.lets_go and drive is None and kind.coordinates:
         problems.append((
             ("release",),
-            "only a driven or fixed hinge can be released; add a drive or leave it out",
+            "only a driven or fixed hinge can be released; add a drive, or leave it out",
         ))  # fmt: skip
     if hinge.holds and not kind.coordinates:
-        problems.append((("hold",), f"{a_hinge(kind.name)} has nothing to hold; leave it out"))
+        problems.append((("hold",), f"{a_hinge(kind.name)} has no coordinates; leave it out"))
     elif hinge.holds and drive is not None and None not in drive:
-        problems.append((("hold",), "the drive says where it starts; leave hold out"))
+        problems.append((("hold",), "the drive gives the initial values; leave it out"))
     if not problems:
         changes["initial"] = _initial(hinge, kind, drive, problems)
     return changes
 
 
 def misplaced_keys(hinge: HingeKeys, facts: HingeFacts | None) -> list[tuple[Location, str]]:
-    """Keys of a hinge of a user's type that its definition does not read, or misses."""
+    """Problems of unused or missing keys of a hinge with a user-defined type."""
     problems: list[tuple[Location, str]] = []
     if facts is not None:
         _axes(hinge, facts, problems)
@@ -86,14 +89,14 @@ def misplaced_keys(hinge: HingeKeys, facts: HingeFacts | None) -> list[tuple[Loc
 def _axes(
     hinge: HingeKeys, kind: HingeFacts, problems: list[tuple[Location, str]]
 ) -> dict[str, Any]:
-    """axis, axis2, normal and lead, each where the type has it."""
+    """Check axis, axis2, normal and lead for a type; return changed fields."""
     for key in ("axis2", "lead"):
         if key not in kind.keys and getattr(hinge, key) is not None:
             problems.append(((key,), f"{a_hinge(kind.name)} has no {key}; leave it out"))
     if hinge.normal is not None and kind.frame != "plane":
-        problems.append((("normal",), f"{a_hinge(kind.name)} has no normal; write axis"))
+        problems.append((("normal",), f"{a_hinge(kind.name)} has no normal; use axis"))
     if "axis" not in kind.keys and hinge.axis != _Z:
-        way_out = "leave it out" if kind.welds else "turn it by orientation"
+        way_out = "leave it out" if kind.welds else "rotate it by orientation"
         problems.append((("axis",), f"{a_hinge(kind.name)} has no axis; {way_out}"))
     if "lead" in kind.keys and (hinge.lead is None or hinge.lead == 0):
         problems.append((
@@ -115,7 +118,7 @@ def _axes(
 
 
 def _planar_axes(hinge: HingeKeys, problems: list[tuple[Location, str]]) -> dict[str, Any]:
-    """The normal under both its names, and the direction of x in the plane."""
+    """Resolve the normal under both its keys, and the direction of x in the plane."""
     normal = hinge.axis if hinge.normal is None else hinge.normal
     if hinge.normal is not None and hinge.axis not in (_Z, hinge.normal):
         problems.append((
@@ -134,7 +137,7 @@ def _not_collinear(
 ) -> None:  # fmt: skip
     if norm(cross(unit(a), unit(b))) < 1e-6:
         problems.append((
-            (key,), f"{key} {found(a)} is parallel to {other} {found(b)}; turn one of them"
+            (key,), f"{key} {found(a)} is parallel to {other} {found(b)}; change one of them"
         ))  # fmt: skip
 
 
@@ -142,7 +145,7 @@ def _not_collinear(
 
 
 def _law(hinge: HingeKeys, kind: HingeFacts, problems: list[tuple[Location, str]]) -> Law:
-    """The law with one entry per speed."""
+    """Resolve the law to one entry per speed."""
     law, count = hinge.law, len(kind.speeds)
     neutral = _neutral(type(law))
     changes: dict[str, Any] = {}
@@ -159,17 +162,17 @@ def _law(hinge: HingeKeys, kind: HingeFacts, problems: list[tuple[Location, str]
             units = ", ".join(effort_unit(s.unit) for s in kind.speeds)
             problems.append((
                 place,
-                f"one number cannot stand for all coordinates of {a_hinge(kind.name)}, whose "
+                f"one number cannot be used for all coordinates of {a_hinge(kind.name)}, whose "
                 f"efforts are in {units}; give a list with {count} entries",
             ))  # fmt: skip
         changes[key] = values * count if len(values) == 1 else values or (default,) * count
     if kind.quaternion is not None:
         problems += _rotation_law(kind, changes)
-    turns = kind.quaternion is not None  # which has been said
+    turns = kind.quaternion is not None  # already reported by _rotation_law
     if not (kind.straight or turns) and any(stop.restitution for stop in changes["limits"]):
         problems.append((
             ("law", "limits"),
-            f"the rates of {a_hinge(kind.name)} are not its speeds, which a hard stop throws back; "
+            f"the rates of {a_hinge(kind.name)} are not its speeds, which a hard stop reverses; "
             "give the stop a stiffness instead of a restitution",
         ))  # fmt: skip
     return law.model_copy(update=changes)
@@ -177,17 +180,17 @@ def _law(hinge: HingeKeys, kind: HingeFacts, problems: list[tuple[Location, str]
 
 @cache
 def _neutral(law: type[Law]) -> LawEntry:
-    """The law that does nothing."""
+    """Law without effect."""
     return law().entry(0)
 
 
 def a_hinge(type_name: str) -> str:
-    """The type with its article."""
+    """Hinge type with its article: "a pin hinge"."""
     return f"{'an' if type_name[0] in 'aeio' else 'a'} {type_name} hinge"
 
 
 def entries_of(type_name: str, coordinates: tuple[Any, ...]) -> str:
-    """How many entries a list has and what they are."""
+    """Expected entries of a list as text: "2 entries for a universal hinge: ..."."""
     names = ", ".join(f"{c.name} ({c.unit})" if c.unit else c.name for c in coordinates)
     return f"{counted(len(coordinates))} for {a_hinge(type_name)}" + (f": {names}" if names else "")
 
@@ -197,13 +200,13 @@ def _units_differ(kind: HingeFacts) -> bool:
 
 
 def _rotation_law(kind: HingeFacts, law: dict[str, Any]) -> list[tuple[Location, str]]:
-    """A rotation stored as a quaternion has no angle to rest at or to stop."""
+    """Problems of rest and limits for a rotation stored as a quaternion, which has no angle."""
     problems: list[tuple[Location, str]] = []
     if any(law["rest"][-3:]):
         problems.append((
             ("law", "rest"),
-            f"the rotation of {a_hinge(kind.name)} rests where it is not turned; "
-            "write 0 there and turn orientation instead",
+            f"the rest angle of the rotation of {a_hinge(kind.name)} is 0; "
+            "write 0 and change orientation instead",
         ))  # fmt: skip
     if any(stop.acts for stop in law["limits"]):
         problems.append((
@@ -247,7 +250,7 @@ def _drive(
             )
             problems.append((
                 place,
-                f"a drive depends on t{inputs} alone, found {others[0].text!r}"
+                f"expected a function of t{inputs} only, found {others[0].text!r}"
                 f"{around(entry.text, others[0])}{way_out}",
             ))  # fmt: skip
         elif entry.depends_on_time_only:
@@ -256,7 +259,7 @@ def _drive(
 
 
 def unsmooth(entry: Expression, place: Location) -> list[tuple[Location, str]]:
-    """A drive whose start is not finite or whose derivatives cannot be formed."""
+    """Problems of a drive: no finite start, no derivatives, or jumps."""
     try:
         start = motion_at(entry, 0.0)
     except ExpressionError as error:
@@ -269,7 +272,7 @@ def unsmooth(entry: Expression, place: Location) -> list[tuple[Location, str]]:
     return [(
         place,
         f"{found(entry.text)} or one of its first two derivatives is not finite at t = 0; "
-        "begin with a smooth motion, for example t^2",
+        "start with a smooth motion, for example t^2",
     )]  # fmt: skip
 
 
@@ -279,14 +282,13 @@ def _initial(
     drive: tuple[Expression | None, ...] | None,
     problems: list[tuple[Location, str]],
 ) -> Initial | None:
-    """Start values, filled in; None when a drive gives all of them."""
+    """Resolve the initial values; None where a drive gives all of them."""
     given = hinge.initial
     if drive is not None and None not in drive:
         if given is not None and (given.q is not None or given.u is not None):
             problems.append((
                 ("initial",),
-                "a drive stands instead of initial: it gives the start values itself; "
-                "leave one of them out",
+                "the drive already gives the initial values; leave one of them out",
             ))  # fmt: skip
         return None
     start = [motion_at(d, 0.0) if _goes_by_time(d) else (0.0, 0.0, 0.0) for d in drive or ()]
@@ -305,7 +307,7 @@ def _initial(
 
 
 def _goes_by_time(drive: Expression | None) -> TypeGuard[Expression]:
-    """Whether it drives by itself; where inputs drive is not known here."""
+    """Whether a coordinate has a drive that depends on time only; inputs are unknown here."""
     return drive is not None and drive.depends_on_time_only
 
 
@@ -332,7 +334,7 @@ def _start_values(
         ):
             problems.append((
                 ("initial", key, k),
-                f"{given[k]:g} contradicts the drive, which begins at {default[k]:g}; write that, "
-                'or "free" in the drive',
+                f"expected {default[k]:g}, the start of the drive, found {given[k]:g}; correct "
+                'it, or write "free" in the drive',
             ))  # fmt: skip
     return given

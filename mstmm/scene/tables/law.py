@@ -1,4 +1,4 @@
-"""The tables inside a law: what acts along the coordinates of a hinge or along a spring."""
+"""Tables of a law: efforts on the coordinates of a hinge, or along a spring."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Numbers = tuple[float, ...]
 
 
 class Friction(Table):
-    """Coulomb and Stribeck friction, regularised; efforts in N or N m, velocities m/s or rad/s.
+    """Regularised Coulomb and Stribeck friction; efforts in N or N m, velocities m/s or rad/s.
 
     All zero means no friction.  `static` 0 means equal to `coulomb`.
     """
@@ -27,7 +27,7 @@ class Friction(Table):
 
     @property
     def acts(self) -> bool:
-        """True when there is any friction."""
+        """Whether there is any friction."""
         return self.static > 0
 
     @model_validator(mode="after")
@@ -37,14 +37,17 @@ class Friction(Table):
         if self.static < self.coulomb:
             raise rules.refuse(
                 f"static friction {self.static:g} is below coulomb friction {self.coulomb:g}; "
-                "leave it out, or make it at least as large", "static",
+                "leave it out, or increase it", "static",
             )  # fmt: skip
         return self
 
 
 class Limits(Table):
-    """Stops of one coordinate, below `lower` and above `upper`: one-sided springs and dampers, or
-    hard ones that throw it back by `restitution`, speed of parting over speed of meeting."""
+    """Stops of a coordinate, below `lower` and above `upper`.
+
+    They are one-sided springs and dampers, or hard stops with a coefficient of `restitution`, the
+    ratio of separation speed to approach speed.
+    """
 
     lower: Annotated[float | None, rules.number("m or rad")] = None
     upper: Annotated[float | None, rules.number("m or rad")] = None
@@ -54,12 +57,12 @@ class Limits(Table):
 
     @property
     def acts(self) -> bool:
-        """True when there is a stop."""
+        """Whether there is a stop."""
         return self.lower is not None or self.upper is not None
 
     @property
     def yields(self) -> bool:
-        """True when there is a stop that pushes back by a spring and a damper."""
+        """Whether there is a stop with a spring and a damper."""
         return self.acts and self.restitution is None
 
     @model_validator(mode="after")
@@ -84,19 +87,19 @@ class Limits(Table):
     def _hard(self, restitution: float) -> Limits:
         if restitution > 1:
             raise rules.refuse(
-                f"expected at most 1, which loses nothing, found {rules.found(restitution)}",
+                f"expected at most 1 (no loss), found {rules.found(restitution)}",
                 "restitution",
             )
         if self.stiffness > 0 or self.damping > 0:
             raise rules.refuse(
-                "a stop throws back by restitution or pushes back by stiffness; give one",
+                "expected restitution or stiffness for a stop, found both; give one",
                 "restitution",
             )
         return self
 
 
 class LawEntry(NamedTuple):
-    """The law of one coordinate."""
+    """Law of one coordinate."""
 
     stiffness: float
     rest: float
@@ -126,10 +129,10 @@ _NO_EFFORT, _NO_FRICTION, _NO_LIMITS = number(0), Friction(), Limits()
 
 
 class Law(Table):
-    """What acts along the coordinates of a hinge: one entry per speed.
+    """Law of a hinge: one entry per speed.
 
     effort > 0 pushes the outboard body along +u; `inertia` is reflected rotor inertia.  In a file
-    one number may stand for all coordinates.
+    one number may be given for all coordinates.
     """
 
     stiffness: Annotated[Numbers, _per_coordinate("a number in N/m or N m/rad", minimum=0)] = ()
@@ -144,12 +147,12 @@ class Law(Table):
     limits: Annotated[tuple[Limits, ...], _TABLES] = ()
 
     def entries(self) -> tuple[LawEntry, ...]:
-        """The laws of all coordinates; at least one, which does nothing where nothing is said."""
+        """Laws of all coordinates; at least one, which has no effect if nothing is given."""
         count = max(1, *(len(getattr(self, key)) for key in type(self).model_fields))
         return tuple(self.entry(k) for k in range(count))
 
     def entry(self, k: int) -> LawEntry:
-        """The law of coordinate k; a list with one entry is shared by all, none means no effect."""
+        """Law of coordinate k; a list with one entry applies to all, an empty one has no effect."""
 
         def pick(values: tuple[Any, ...], default: Any) -> Any:
             if not values:

@@ -1,5 +1,4 @@
-"""[[load]], [[event]] and [[spring]]: what acts on the bodies, and what happens to them, hard stops
-of hinges among it."""
+"""Tables [[load]], [[event]] and [[spring]], and the events of hard stops of hinges."""
 
 from __future__ import annotations
 
@@ -17,20 +16,20 @@ from .hinge import Hinge
 from .law import SpringLaw
 from .members import Hinges
 
-#: What `at` of a load may be.
+#: The only value of `at` of a load.
 MASS_CENTER = "center_of_mass"
 _ZERO = (number(0), number(0), number(0))
 
 
 class Load(Table):
-    """A force (N) and a moment (N m) on an end of a body; three expressions each.
+    """Force (N) and moment (N m) on an end of a body; three expressions each.
 
     With `at` = "center_of_mass" the force acts at the mass centre of the rigid body named in `on`.
 
-    On a beam alternatively `force_per_length` (N/m), the same everywhere on `span`, from one x to
-    another in m (None: the whole length).  `axes` is "inertial", "body" (the loaded body's own; of
-    a beam those of the loaded section, for `force_per_length` those of the floating frame) or the
-    name of another body.
+    A beam can have a `force_per_length` (N/m) instead, constant over `span`, from one x to another
+    in m (None: the whole length).  `axes` is "inertial", "body" or the name of another body.  The
+    "body" axes of a beam are those of the loaded section, or of the floating frame for
+    `force_per_length`.
     """
 
     name: Annotated[str, texts.name("the load's name")] = ""
@@ -64,11 +63,11 @@ class Load(Table):
         for key in ("force", "moment"):
             if not all(entry.is_zero for entry in getattr(self, key)):
                 raise refuse(
-                    f"{key} acts on one point, force_per_length on a beam; write two loads", key
+                    f"{key} acts at a point, force_per_length along a beam; write two loads", key
                 )
         if split(self.on)[1]:
             raise refuse(
-                "expected the name of a beam alone for a load per length, found "
+                "expected the name of a beam without an end for force_per_length, found "
                 f"{found(self.on)}; write {found(split(self.on)[0])}, and span for a part of it",
                 "on",
             )
@@ -79,11 +78,11 @@ class Load(Table):
         return self
 
     def _check_mass_center(self) -> None:
-        """Raises for what does not act at a mass centre."""
+        """Reject a load at the mass centre with an end or a force per length.  Raises Refused."""
         body, end = split(self.on)
         if end:
             raise refuse(
-                f'"{MASS_CENTER}" is a place of the body, and on = {found(self.on)} another one; '
+                f'"{MASS_CENTER}" needs a body without an end, found on = {found(self.on)}; '
                 f"write on = {found(body)}, or leave `at` out", "at",
             )  # fmt: skip
         if self.force_per_length is not None:
@@ -91,10 +90,10 @@ class Load(Table):
 
 
 class Event(Table):
-    """Something that happens when a comparison begins to hold: stop, release a hinge, or bounce.
+    """Event at which a comparison becomes true: stop, release of a hinge, or bounce.
 
-    A bounce throws back what the places in `when` belong to: their rate against it leaves by
-    `restitution` (above 0, at most 1) times what it came with, and closed loops stay closed.
+    A bounce reverses the rate of the difference in `when`, multiplied by `restitution` (above 0, at
+    most 1).  Closed loops remain closed.
     """
 
     name: Annotated[str, texts.name("the event's name")] = ""
@@ -108,30 +107,32 @@ class Event(Table):
         if (self.do == "bounce") != (self.restitution is not None):
             raise refuse(
                 'missing; do = "bounce" needs a number above 0, at most 1' if self.do == "bounce"
-                else 'only do = "bounce" takes a restitution; leave it out', "restitution",
+                else 'only do = "bounce" has a restitution; leave it out', "restitution",
             )  # fmt: skip
         if self.restitution is not None and self.restitution > 1:
             raise refuse(
-                f"expected at most 1, which loses nothing, found {found(self.restitution)}",
+                f"expected at most 1 (no loss), found {found(self.restitution)}",
                 "restitution",
             )
         if self.do == "release" and self.hinge is None:
             raise refuse('missing; do = "release" needs the name of a hinge', "hinge")
         if self.do != "release" and self.hinge is not None:
-            raise refuse('only do = "release" takes a hinge; leave it out', "hinge")
+            raise refuse('only do = "release" has a hinge; leave it out', "hinge")
         return self
 
 
 def stops_of(hinges: Hinges) -> tuple[Event, ...]:
-    """Events of all hard stops, `knee.upper` or `planar.lower[1]` by name, in the order of the
-    hinges."""
+    """Events of all hard stops in the order of the hinges.
+
+    Their names are such as `knee.upper` or `planar.lower[1]`.
+    """
     return tuple(
         stop for number in _stopped(hinges) for stop in _of(hinges.name(number), hinges[number])
     )
 
 
 def _stopped(hinges: Hinges) -> Iterator[int]:
-    """Numbers of hinges that have hard stops."""
+    """Indices of the hinges that have hard stops."""
     for k, hinge in enumerate(hinges.tables):
         if any(limits.restitution for limits in hinge.law.limits):
             yield k
@@ -156,9 +157,9 @@ def _of(name: str, hinge: Hinge) -> Iterator[Event]:
 
 
 class Spring(Table):
-    """A spring, damper and actuator between two ends, or a force element of a user's own type.
+    """Spring, damper and actuator between two ends, or a user-defined force element.
 
-    `position` (m) is the place of the end that is on the ground.
+    `position` (m) is the position of an end on the ground.
     """
 
     name: Annotated[str, texts.name("the spring's name")] = ""
@@ -174,15 +175,15 @@ class Spring(Table):
         bodies = (split(self.from_)[0], split(self.to)[0])
         if bodies[0] == bodies[1]:
             raise refuse(
-                f'both ends are on "{bodies[0]}", so it does nothing; join two bodies', "to"
+                f'both ends are on "{bodies[0]}", so it has no effect; connect two bodies', "to"
             )
         if GROUND not in bodies and self.position != (0.0, 0.0, 0.0):
             raise refuse(
-                "only a spring on the ground takes a position; give the body an end there",
+                "only a spring on the ground has a position; define an end of the body there",
                 "position",
             )
         if self.type == "spring" and self.parameters:
-            raise refuse("a spring has no parameters; give the type of your own element",
+            raise refuse("a spring has no parameters; set type to your user-defined type",
                          "parameters")  # fmt: skip
         if self.type != "spring" and self.law != SpringLaw():
             raise refuse('law belongs to type "spring"; use parameters', "law")

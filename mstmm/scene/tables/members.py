@@ -1,7 +1,6 @@
-"""Every body and every hinge of a scene, by number and by name: its tables, then its chains'
-members in the order of the chains.
+"""Bodies and hinges of a scene by number and by name: tables, then members of the chains.
 
-Members of chains are made when they are asked for; a chain of a million bodies costs nothing here.
+Members of chains are created on access, so that a chain of a million bodies costs nothing here.
 """
 
 from __future__ import annotations
@@ -24,9 +23,9 @@ T = TypeVar("T", bound=Body | Hinge)
 
 
 class Members(Sequence[T], Generic[T]):
-    """Bodies or hinges of a scene; `len`, index and iteration as a tuple, and by name."""
+    """Bodies or hinges of a scene as a sequence, with access by name."""
 
-    #: What follows the member's name: "" for bodies, ".hinge" for hinges.
+    #: Suffix of the member's name: "" for bodies, ".hinge" for hinges.
     behind = ""
     word = ""
 
@@ -35,7 +34,7 @@ class Members(Sequence[T], Generic[T]):
         self._index = {table.name: i for i, table in enumerate(tables)}
         self._chain = {chain.name: i for i, chain in enumerate(chains)}
         counts = accumulate((chain.count for chain in chains), initial=len(tables))
-        #: Number of each chain's first member; behind them how many there are.
+        #: Index of each chain's first member, then the total count.
         self.starts = tuple(counts)
 
     def __len__(self) -> int:
@@ -58,21 +57,21 @@ class Members(Sequence[T], Generic[T]):
         raise NotImplementedError
 
     def member(self, index: int) -> tuple[int, int]:
-        """(chain, place in it) of a number behind the tables.  IndexError if there is none."""
+        """Chain and position in it of an index after the tables.  Raises IndexError."""
         if not len(self.tables) <= index < len(self):
-            raise IndexError(f"there are {len(self)}, not {index}")
+            raise IndexError(f"expected an index below {len(self)}, found {index}")
         chain = bisect_right(self.starts, index) - 1
         return chain, index - self.starts[chain]
 
     def name(self, index: int) -> str:
-        """The name of number `index`: "rod1" or "rope[3]"."""
+        """Name of the element at `index`: "rod1" or "rope[3]"."""
         if index < len(self.tables):
             return self.tables[index].name
         chain, k = self.member(index)
         return f"{self.chains[chain].name}[{k}]{self.behind}"
 
     def find(self, name: str) -> int | None:
-        """Number of the one of this name, None if there is none."""
+        """Index of the element with this name, or None."""
         known = self._index.get(name)
         if known is not None or not self.chains or not name.endswith(self.behind):
             return known
@@ -82,7 +81,7 @@ class Members(Sequence[T], Generic[T]):
         return self.starts[place[0]] + place[1]
 
     def place(self, name: str) -> tuple[int, int] | None:
-        """(chain, k) of "rope[k]" for a chain there is, k perhaps beyond its end."""
+        """Chain and k of the name "rope[k]" of an existing chain; k may exceed its length."""
         match = _MEMBER.fullmatch(name)
         if match is None or match[1] not in self._chain:
             return None
@@ -90,11 +89,11 @@ class Members(Sequence[T], Generic[T]):
         return chain, self.chains[chain].count - 1 if match[2] == "last" else int(match[2])
 
     def of_chain(self, name: str) -> bool:
-        """True where a name begins with that of a chain."""
+        """Whether a name begins with the name of a chain."""
         return name.partition("[")[0].partition(".")[0] in self._chain
 
     def missing(self, name: str, shown: str = "") -> str:
-        """Why there is nothing of this name, and what is near it; `shown` is how it is quoted."""
+        """Message about a missing name, with a suggestion; `shown` is the name in quotes."""
         shown = shown or f'"{name}"'
         plain = name.removesuffix(self.behind) if self.behind else name
         place = self.place(plain)
@@ -108,7 +107,7 @@ class Members(Sequence[T], Generic[T]):
         return f'there is no {self.word} {shown}; the chain "{chain.name}" has {first} to {last}'
 
     def names(self) -> Iterator[str]:
-        """Every name, in order."""
+        """Yield all names in order."""
         yield from self._index
         for chain in self.chains:
             for k in range(chain.count):
@@ -116,12 +115,12 @@ class Members(Sequence[T], Generic[T]):
 
     @property
     def by_name(self) -> Mapping[str, T]:
-        """The same as a mapping from names."""
+        """Mapping from names to elements."""
         return ByName(self)
 
 
 class Bodies(Members[Body]):
-    """Every body of a scene."""
+    """All bodies of a scene as a sequence."""
 
     word = "body"
 
@@ -129,7 +128,7 @@ class Bodies(Members[Body]):
         return Body.model_construct(name=f"{chain.name}[{k}]", **vars(chain.body_of(k)))
 
     def ends(self, name: str) -> Mapping[str, object] | None:
-        """The ends of the body of this name, None if there is none."""
+        """Ends of the body with this name, or None if there is no such body."""
         index = self.find(name)
         if index is None:
             return None
@@ -140,7 +139,7 @@ class Bodies(Members[Body]):
 
 
 class Hinges(Members[Hinge]):
-    """Every hinge of a scene."""
+    """All hinges of a scene as a sequence."""
 
     word = "hinge"
     behind = f".{HINGE}"
@@ -160,7 +159,7 @@ class Hinges(Members[Hinge]):
 
 
 class ByName(Mapping[str, T]):
-    """Members by their names, made when they are asked for."""
+    """Mapping from names to members, which are created on access."""
 
     def __init__(self, members: Members[T]) -> None:
         self.members = members

@@ -1,4 +1,4 @@
-"""Flexible bodies as rigid ones with the same ends."""
+"""Rigid equivalents of flexible bodies, with the same ends."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .elastic import Elastic
 
 
 def rigid_beam(beam: Beam) -> Body:
-    """The undeformed beam: mass, mass centre and inertia of its sections, and its ends."""
+    """Rigid body of an undeformed beam: mass, mass centre, inertia and ends."""
     mass = first = second = polar = 0.0
     about = [0.0, 0.0]
     for s in beam.sections:
@@ -30,7 +30,7 @@ def rigid_beam(beam: Beam) -> Body:
 
 
 def bare(flexible: Beam | Elastic) -> Body:
-    """A body with the ends alone: names and the tree ask for no more."""
+    """Massless body with the ends of a flexible body, sufficient for names and the tree."""
     ends = {
         name: End.model_construct(position=end.position or (0.0, 0.0, 0.0),
                                   orientation=end.orientation)

@@ -1,4 +1,4 @@
-"""Shapes that a user gives as expressions of x: values, exact derivatives, what they must be."""
+"""User-defined shape functions as expressions of x: values, exact derivatives, and checks."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ...ir.graph import Graph, Node
 from ...ir.tangent import derivative
 from ..rules.messages import near
 
-#: Names a shape may use: the place along the beam and the beam's length, both in m.
+#: Names in shape functions: the position along the beam and the length of the beam, both in m.
 NAMES = ("x", "L")
-#: Pieces of the beam in which a shape is sampled.
+#: Intervals of the beam in which a shape function is sampled.
 _PIECES = 32
-#: Three-point Gauss rule on [0, 1]: places and weights.
+#: Three-point Gauss rule on [0, 1]: points and weights.
 _GAUSS = ((0.5 - math.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + math.sqrt(0.15), 5 / 18))
-#: A slope may differ by this share of its size from the integral of its derivative.
+#: Largest difference of a derivative from the integral of the next one, relative to the latter.
 _CONTINUOUS = 1e-2
 _ROUNDING = 1e-9
 
@@ -26,7 +26,7 @@ Values = tuple[float, float, float, float]
 
 
 class ShapeFunction:
-    """One shape f(x) of a beam of this length, with f', f'' and f''' by exact differentiation."""
+    """Shape function f(x) of a beam of given length (m), with exact derivatives f', f'', f'''."""
 
     def __init__(self, expression: Expression, length: float) -> None:
         self.length = length
@@ -42,22 +42,22 @@ class ShapeFunction:
         return self._x if name.text == "x" else self._L
 
     def __call__(self, x: float) -> Values:
-        """(f, f', f'', f''') at x in m; nan or infinite where the mathematics has no value."""
+        """Values (f, f', f'', f''') at x (m); nan or infinite where there is no finite value."""
         at = {self._x.number: x, self._L.number: self.length}
         f, slope, second, third = (value(n, lambda leaf: at[leaf.number]) for n in self._nodes)
         return f, slope, second, third
 
 
 def shape_at(expression: Expression, x: float, length: float) -> Values:
-    """(f, f', f'', f''') of a shape at x (m) of a beam of this length (m)."""
+    """Values (f, f', f'', f''') of a shape function at x (m) of a beam of given length (m)."""
     return ShapeFunction(expression, length)(x)
 
 
 def problem_with(expression: Expression, length: float, order: int) -> str | None:
-    """Why an expression is no shape, None where it is one.
+    """Message about an expression that is no shape function; None for valid ones.
 
-    `order` is that of the derivative that strains: 2 for deflections, 1 for twist and axial
-    displacement; the derivatives below it must be continuous.
+    `order` is the order of the derivative in the strain: 2 for deflections, 1 for twist and axial
+    displacement.  The derivatives of lower order must be continuous.
     """
     for name in expression.names:
         if name.text not in NAMES:
@@ -71,27 +71,27 @@ def _findings(shape: ShapeFunction, length: float, order: int) -> Iterator[str]:
     samples = [shape(x) for x in places]
     for x, sample in zip(places, samples, strict=True):
         if not all(map(math.isfinite, sample[: order + 1])):
-            words = "it, its slope or its curvature" if order == 2 else "it or its slope"
-            yield f"{words} is not finite at x = {x:g} m; write a smooth shape such as (x/L)^2"
+            words = "the value, slope or curvature" if order == 2 else "the value or slope"
+            yield f"{words} is not finite at x = {x:g} m; use a smooth shape such as (x/L)^2"
             return
     sizes = [max(abs(sample[k]) for sample in samples) for k in range(order + 1)]
     for k in range(order):
         allowed = max(_CONTINUOUS * sizes[k + 1] * length, _ROUNDING * sizes[k])
         if max(_gaps(shape, places, samples, k)) > allowed:
-            what = ("it jumps", "its slope jumps")[k]
+            what = ("the value jumps", "the slope jumps")[k]
             yield (
-                f"{what} somewhere along the beam; join the pieces smoothly, or divide the beam "
+                f"{what} along the beam; join the pieces smoothly, or divide the beam "
                 "into two on a fixed hinge"
             )
             return
     if sizes[order] * length**order <= _ROUNDING * sizes[0]:
-        yield "it does not deform the beam; rigid motion comes from the hinge, leave it out"
+        yield "the shape does not deform the beam; leave it out, the hinge gives rigid motion"
 
 
 def _gaps(
     shape: ShapeFunction, places: list[float], samples: list[Values], k: int
 ) -> Iterator[float]:
-    """Per piece, how far the k-th derivative's change is from the integral of the next one."""
+    """Difference per interval of the k-th derivative from the integral of the next one."""
     for (a, b), (before, after) in zip(pairwise(places), pairwise(samples), strict=True):
         integral = sum(w * (b - a) * shape(a + s * (b - a))[k + 1] for s, w in _GAUSS)
         yield abs(after[k] - before[k] - integral)

@@ -163,7 +163,7 @@ def test_the_height_follows_from_bending_and_axial_stiffness() -> None:
 def test_beams_welded_in_line_are_judged_as_one() -> None:
     assert welded(4, 2.0).warnings == ()
     (warning,) = welded(4, 0.8).warnings
-    assert 'beam "part0": the line it is welded into is 8 times the height' in warning
+    assert 'beam "part0": its line of welded beams is 8 times the height' in warning
     assert len(welded(4, 2.0, angle=1.0).warnings) == 4
     assert len(welded(4, 2.0, kind="pin").warnings) == 4
 

@@ -148,7 +148,7 @@ BAD: dict[str, tuple[list[Scene], Scene, Scene, str]] = {
     "two on one freedom": ([GEAR, {"expression": "A.q + 2*B.q"}], {}, {},
                            'no freedom is left, .* at "gear", "coupling2": a structure; take'),
     "both driven": ([GEAR], {"drive": "t"}, {"drive": "2*t"},
-                    "a drive says already how A.q and B.q goes; leave one drive or"),
+                    "drives already prescribe A.q and B.q; leave out one drive or"),
 }  # fmt: skip
 
 

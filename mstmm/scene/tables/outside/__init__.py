@@ -1,1 +1,1 @@
-"""What a scene has to do with the outside: what comes in, what is measured, what is seen."""
+"""Tables for the exchange with other programs: inputs, outputs, controllers, names, geometry."""

@@ -1,4 +1,4 @@
-"""Controllers: linear, in discrete time, from what is measured to inputs of the scene."""
+"""Table [[controller]]: linear discrete-time controllers from measurements to inputs."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Matrix = tuple[Numbers, ...]
 
 
 def _matrix() -> Rule:
-    """Rows of numbers, all as long; none for a matrix without rows."""
-    expected = "a matrix: a list of rows of numbers, all as long"
+    """Rule for a matrix as rows of numbers; no rows for an empty matrix."""
+    expected = "a matrix: a list of rows of numbers of equal length"
 
     def row(value: Any, i: int) -> Numbers:
         entries = entries_of(plain(value), "a row of numbers")
@@ -51,10 +51,10 @@ def _names(expected: str) -> Rule:
 
 
 class Controller(Table):
-    """At the times k `sample_time`, k = 0, 1, 2, ..., with y what `inputs` are there:
+    """Linear discrete-time controller, evaluated at times k `sample_time`, k = 0, 1, 2, ...
 
-    u = C x + D (y - reference) + offset, what the `outputs` are until the next sample, and then
-    x <- A x + B (y - reference); x begins with `initial`.
+    y are the values of `inputs`.  The `outputs` u = C x + D (y - reference) + offset are constant
+    until the next sample.  Then x <- A x + B (y - reference); x starts with `initial`.
     """
 
     name: Annotated[str, texts.name("the controller's name")]
@@ -88,12 +88,12 @@ class Controller(Table):
                 raise refuse(f"expected {counted(length)}, found {len(given)}", key)
         for name in self.outputs:
             if self.outputs.count(name) > 1:
-                raise refuse(f'"{name}" stands twice; a controller sets an input once', "outputs")
+                raise refuse(f'"{name}" is listed twice; leave one out', "outputs")
         return self
 
     @cached_property
     def filled(self) -> dict[str, Numbers]:
-        """All matrices row by row and all vectors, with zeros where nothing is given."""
+        """Matrices, flat row by row, and vectors by key, with zeros where nothing is given."""
         n, n_y, n_u = len(self.A), len(self.inputs), len(self.outputs)
         sizes = {"A": n * n, "B": n * n_y, "C": n_u * n, "D": n_u * n_y,
                  "initial": n, "reference": n_y, "offset": n_u}  # fmt: skip

@@ -1,5 +1,4 @@
-"""What a scene has to do with the outside: inputs, which are set, signals, which go by time, and
-outputs, which are looked at."""
+"""Tables [[input]], [[signal]], [[output]]: external values, tabulated values, observations."""
 
 from __future__ import annotations
 
@@ -23,7 +22,7 @@ Numbers = tuple[float, ...]
 
 
 def _unit() -> Rule:
-    """A unit for tables and pictures; nothing is converted."""
+    """Rule for a unit shown in tables and plots; nothing is converted."""
     expected = 'a unit such as "N m"'
 
     def check(value: Any) -> str:
@@ -36,7 +35,7 @@ def _unit() -> Rule:
 
 
 def _value() -> Rule:
-    """A number, or the name of a signal."""
+    """Rule for a number, or the name of a signal."""
     expected = "a number or the name of a signal"
 
     def check(value: Any) -> float | str:
@@ -50,11 +49,10 @@ def _value() -> Rule:
 
 
 class Input(Table):
-    """A number that is set from outside: by `simulate(inputs=...)`, or as its `value` says, a
-    number or the name of a signal.
+    """Input set from outside by `simulate(inputs=...)`; by default it is `value`.
 
-    `rates` are its rate and the rate of that (per s, per s^2) at t = 0, from where on the value is
-    value + rate t + second rate t^2 / 2.
+    `value` is a number or the name of a signal.  `rates` are its first and second rate (per s, per
+    s^2) at t = 0, so that the input is value + rate t + second rate t^2 / 2.
     """
 
     name: Annotated[str, texts.name("the input's name")]
@@ -65,13 +63,15 @@ class Input(Table):
     @model_validator(mode="after")
     def _check(self) -> Input:
         if self.rates is not None and isinstance(self.value, str):
-            raise refuse(f'the signal "{self.value}" has rates of its own; leave them out', "rates")
+            raise refuse(f'the signal "{self.value}" has its own rates; leave them out', "rates")
         return self
 
 
 class Output(Table):
-    """A quantity of results, or an expression of such and of t, inputs and signals, under a name of
-    its own; without a `unit` it has that of its one quantity."""
+    """Named quantity of results, or an expression of quantities, t, inputs and signals.
+
+    Without a `unit` it has the unit of its quantity.
+    """
 
     name: Annotated[str, texts.name("the output's name")]
     of: Annotated[Expression, texts.formula("a quantity of results or an expression of some")]
@@ -92,11 +92,10 @@ def _column() -> Rule:
 
 
 class Signal(Table):
-    """A number over time: values at times (s, ascending), or columns of a CSV file in the folder of
-    the scene, read when the scene is.
+    """Signal tabulated over time: values at ascending times (s), or columns of a CSV file.
 
-    Between them it is held, goes on lines, or on a cubic spline; before the first and behind the
-    last it stands still.
+    The file is in the folder of the scene and is read with it.  `interpolation` is by steps, lines
+    or a cubic spline; before the first and after the last time the signal is constant.
     """
 
     name: Annotated[str, texts.name("the signal's name")]
@@ -112,15 +111,15 @@ class Signal(Table):
         if self.file is not None:
             self._read()
         elif self.column is not None:
-            raise refuse("only a file has columns; leave it out", "column")
+            raise refuse("only a signal from a file has a column; leave it out", "column")
         else:
             self._in_order([f"times[{k}]" for k in range(len(self.times))], "times")
         return self
 
     def _read(self) -> None:
-        """The numbers of the file in the place of its name."""
+        """Replace the file name by the numbers of the file."""
         if self.times or self.values:
-            raise refuse("a file stands instead of times and values; leave one out", "file")
+            raise refuse("expected a file, or times and values, found both; leave one out", "file")
         try:
             read = read_columns(str(self.file), FOLDER.get(), self.column or 2)
         except Refused as refused:
@@ -132,11 +131,9 @@ class Signal(Table):
         object.__setattr__(self, "column", None)
 
     def _in_order(self, rows: list[str], place: str) -> None:
-        """Refused, with the rows, for times that do not ascend."""
+        """Check that times ascend and rates are finite.  Raises Refused with the rows."""
         if not self.times:
-            raise refuse(
-                "missing; expected times in s and values, or the file that has them", place
-            )
+            raise refuse("missing; expected times in s and values, or a file with them", place)
         if len(self.values) != len(self.times):
             raise refuse(
                 f"expected {rules.counted(len(self.times))}, one for each of the times, found "
@@ -155,11 +152,11 @@ class Signal(Table):
         for k, piece in enumerate(self.pieces.pieces):
             if not all(map(math.isfinite, piece)):
                 raise refuse(
-                    f"from {rows[max(0, k - 1)]} on its rate is beyond what numbers hold; take "
-                    "fewer rows, or scale it", place,
+                    f"from {rows[max(0, k - 1)]} on its rate overflows; use fewer rows, or "
+                    "scale it", place,
                 )  # fmt: skip
 
     @cached_property
     def pieces(self) -> Pieces:
-        """What it is over time."""
+        """Signal as a piecewise polynomial of time."""
         return through(self.times, self.values, self.interpolation)

@@ -1,4 +1,4 @@
-"""[names]: what others, such as a robot's file, call bodies, ends and hinges of the scene."""
+"""Table [names]: names of bodies, ends and hinges in other programs, such as a robot file."""
 
 from __future__ import annotations
 
@@ -9,20 +9,19 @@ from pydantic import Field
 
 from ...rules.values import Location, Refused, Rule, Table, found, refuse
 
-#: The longest name of others, in characters.
+#: Most characters of a name in other programs.
 LONGEST = 200
 
 
 def is_name(name: object) -> bool:
-    """Whether others may call something so: printable text of `LONGEST` characters at most, not of
-    blanks alone."""
+    """Whether text is a valid name in other programs: printable, not blank, at most `LONGEST`."""
     if not isinstance(name, str) or len(name) > LONGEST:
         return False
     return name.isprintable() and bool(name.strip())
 
 
 def _names(of: str, example: str) -> Rule:
-    expected = f"a table of {of} by the names that others have for them, such as {example}"
+    expected = f"a table of {of} by their names in other programs, such as {example}"
 
     def check(value: Any) -> dict[str, str]:
         if not isinstance(value, dict):
@@ -30,7 +29,7 @@ def _names(of: str, example: str) -> Rule:
         problems = list[tuple[Location, str]]()
         for name, one in value.items():
             if not is_name(name):
-                what = f"expected printable names of 1 to {LONGEST} characters, not blanks alone"
+                what = f"expected printable names of 1 to {LONGEST} characters, not only blanks"
                 problems.append(((str(name),), what))
             elif not isinstance(one, str):
                 problems.append(((name,), f"expected a name of the scene, found {found(one)}"))
@@ -46,28 +45,35 @@ _HINGES = _names("hinges", '{ "joint-1" = "joint_1" }')
 
 
 class Names(Table):
-    """Names of others -> names of the scene: `body` for bodies and ends ("arm", "arm.tool"),
-    `hinge` for hinges.  The scene's own names go before them."""
+    """Map from names in other programs to names of the scene.
+
+    `body` contains bodies and ends ("arm", "arm.tool"), `hinge` hinges.  Names of the scene take
+    precedence.
+    """
 
     body: Annotated[dict[str, str], _BODIES] = Field(default_factory=dict)
     hinge: Annotated[dict[str, str], _HINGES] = Field(default_factory=dict)
 
     def reference(self, name: str) -> str:
-        """The body or end that has this name elsewhere, also with an end of it behind; the name
-        itself where none has."""
+        """Body or end with this name in other programs, else the name itself.
+
+        The name may be followed by an end of the body.
+        """
         return _own(name, self.body)
 
     def of_hinge(self, name: str) -> str:
-        """The same of a hinge."""
+        """Hinge with this name in other programs, else the name itself."""
         return _own(name, self.hinge)
 
     def meant(self, name: str) -> Iterator[str]:
-        """What the name of a quantity or of a number may mean: itself first, then with the names of
-        the scene in place of those of others."""
+        """Possible meanings of the name of a quantity or parameter.
+
+        First the name itself, then with names of other programs replaced by those of the scene.
+        """
         yield from dict.fromkeys((name, self.of_hinge(name), self.reference(name)))
 
     def among(self, references: Container[str], hinges: Container[str]) -> Names:
-        """Those of what there is."""
+        """Subset of the names whose bodies, ends and hinges exist."""
         return Names.model_construct(
             body={name: one for name, one in self.body.items() if one in references},
             hinge={name: one for name, one in self.hinge.items() if one in hinges},
@@ -75,7 +81,7 @@ class Names(Table):
 
 
 def _own(name: str, known: Mapping[str, str]) -> str:
-    """The longest beginning of a name that is known, up to a dot, in the names of the scene."""
+    """Replace the longest known prefix of a name, up to a dot, by the name in the scene."""
     end = len(name) if known else -1
     while end > 0:
         if name[:end] in known:

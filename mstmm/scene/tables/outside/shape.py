@@ -1,4 +1,4 @@
-"""[[shape]]: what something looks like.  Nothing of it changes how anything moves."""
+"""Table [[shape]]: geometry for drawing, without effect on the motion."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from ...rules.values import (
 )
 from ..elastic_keys import path_inside
 
-#: What each type is made of.
+#: Keys of each type.
 _KEYS = {
     "box": ("size",), "sphere": ("radius",), "cylinder": ("radius", "length"),
     "capsule": ("radius", "length"), "mesh": ("file",),
 }  # fmt: skip
 _MEANT = {
     "size": "[x, y, z] in m", "radius": "a number in m", "length": "a number in m",
-    "file": "an .stl or .obj file beside the scene",
+    "file": "an .stl or .obj file in the folder of the scene",
 }  # fmt: skip
 _COLOUR = re.compile("#[0-9a-fA-F]{6}")
 
@@ -49,11 +49,11 @@ def _colour() -> Rule:
 
 
 class Shape(Table):
-    """A box, cylinder, sphere, capsule or mesh that is drawn where a body, an end or the ground is.
+    """Box, cylinder, sphere, capsule or mesh drawn at a body, an end or the ground.
 
-    It is drawn in the axes of `on`, turned by `orientation` and moved by `position` (m); cylinders
-    and capsules lie along z with their middle there.  A body with shapes is drawn by them alone.
-    `length` of a capsule is without its round ends; `scale` is m per unit of the mesh.
+    It is drawn in the axes of `on`, rotated by `orientation` and displaced by `position` (m).
+    Cylinders and capsules are along z, with their centre there.  A body with shapes is drawn only
+    by them.  `length` of a capsule excludes its round ends; `scale` is in m per unit of the mesh.
     """
 
     name: Annotated[str, texts.name("the shape's name")] = ""
@@ -87,13 +87,13 @@ class Shape(Table):
         if self.size is not None and min(self.size) <= 0:
             yield ("size",), f"expected three lengths above 0, found {found(self.size)}"
         if self.scale is not None and self.type != "mesh":
-            yield ("scale",), "only a mesh is scaled; leave it out"
+            yield ("scale",), "only a mesh has a scale; leave it out"
         if self.opacity > 1:
             yield ("opacity",), f"expected at most 1, found {found(self.opacity)}"
 
     @property
     def owner(self) -> str:
-        """The body that it is on, or "ground"."""
+        """Body on which the shape is drawn, or "ground"."""
         return split(self.on)[0]
 
     @property
@@ -102,5 +102,5 @@ class Shape(Table):
 
     @property
     def rotation(self) -> Matrix:
-        """Axes of the shape -> axes of `on`."""
+        """Rotation matrix from axes of the shape to axes of `on`."""
         return from_orientation(self.orientation)
