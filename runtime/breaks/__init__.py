@@ -1,1 +1,1 @@
-"""When the expressions of a scene switch or are narrow, by interval arithmetic over time."""
+"""Switching times and narrow features of a scene's expressions, by interval arithmetic."""

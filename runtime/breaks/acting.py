@@ -1,4 +1,4 @@
-"""Every expression of a scene that acts on its motion, and what it is to the user."""
+"""Expressions of a scene that act on its motion, with their names for messages."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ from mstmm.scene.tables.members import Hinges
 
 @dataclass(frozen=True)
 class Acting:
-    """One expression.
+    """Expression that acts on the motion of a scene.
 
-    `hinges` are the numbers of the hinges whose own q, u and parameters it names; `spring` is the
-    one whose length it reads.  Of a `drive` the second derivative acts; a `condition` (an event or
-    a release) acts by becoming true.  `inputs` are those it names, signals too, but for those that
-    are `held`: nobody knows before the run what they will be.
+    `what` names its owner in messages.  `hinges` are the indices of the hinges whose q, u and
+    parameters it names; `spring` is the spring whose length it reads.  The second derivative of a
+    `drive` acts on the motion; a `condition` (an event or a release) acts by becoming true.
+    `inputs` are the inputs and signals that it names, except those in `held`, whose values are
+    unknown before the run.
     """
 
     expression: Expression
@@ -35,16 +36,18 @@ class Acting:
 
 
 def acting(scene: Scene, held: Collection[str] = (), inputs: Inputs | None = None) -> list[Acting]:
-    """All that are not constant, in the order of the file; `held` are inputs set during the run
-    besides those that controllers set, `inputs` what all are over time where that is not what the
-    scene says."""
+    """All expressions of a scene that are not constant, in the order of the file.
+
+    `held` are inputs set during the run, in addition to those that controllers set; `inputs` are
+    all inputs over time (by default those of the scene).
+    """
     inputs = scene.channels if inputs is None else inputs
     held = {*held, *scene.controlled}
     return [_with(one, inputs, held) for one in _all(scene) if not one.expression.is_constant]
 
 
 def _with(one: Acting, inputs: Inputs, held: Collection[str]) -> Acting:
-    """The same with the inputs it names, of which those that stand still are constants."""
+    """Copy of an expression with the inputs that it names; constant inputs become constants."""
     used = {n.text: inputs[n.text] for n in one.expression.names if n.text in inputs}
     if not used:
         return one
@@ -89,8 +92,10 @@ def _of_hinge(hinge: HingeTable, what: str, numbers: Sequence[int]) -> Iterator[
 
 
 def owners(one: Acting, hinges: Hinges) -> Iterator[Hinge | None]:
-    """The hinges whose own names an expression means: every one where it reads their q and u, else
-    the first alone, for all."""
+    """Hinges at which an expression must be examined.
+
+    These are all its hinges if it reads their q and u, else only the first; None without hinges.
+    """
     common = ("t", *one.inputs, *one.held)
     own = any(len(n.parts) == 1 and n.text not in common for n in one.expression.names)
     for number in one.hinges if own else one.hinges[:1]:

@@ -1,4 +1,4 @@
-"""Expressions of time over intervals of time: bounds of their terms and of the slopes of those."""
+"""Bounds of the terms of an expression, and of their time derivatives, over intervals of time."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .intervals import EVERYTHING, Interval, point
 
 _ONE, _NONE = point(1.0), point(0.0)
 
-#: The name of time.
+#: Name of time in expressions.
 TIME = "t"
 
 
 @dataclass(frozen=True)
 class Enclosure:
-    """Bounds of a value and of its derivative by t."""
+    """Bounds of a value and of its derivative with respect to t."""
 
     value: Interval
     slope: Interval
@@ -31,14 +31,14 @@ class Enclosure:
 
 
 def of_time(expression: Expression, constants: Mapping[str, float]) -> tuple[list[int], list[int]]:
-    """(terms that depend on t and constants alone, those of them in which t occurs)."""
+    """Split terms: (those that depend on t and constants only, those of them that contain t)."""
     return of_names(expression, constants, (TIME,))
 
 
 def of_names(
     expression: Expression, constants: Mapping[str, float], variables: Collection[str]
 ) -> tuple[list[int], list[int]]:
-    """The same of other names in the place of t, each of which may change."""
+    """Split terms as `of_time` does, with the names `variables` instead of t."""
     alone, moving = set[int](), set[int]()
     for number in sorted(expression.needed):
         term = expression.terms[number]
@@ -61,8 +61,10 @@ def enclose(
     constants: Mapping[str, float],
     leaves: Mapping[str, Enclosure],
 ) -> dict[int, Enclosure]:
-    """Enclosures of `wanted` (arguments before their operations) over cells, in which names that
-    change are `leaves`."""
+    """Enclosures of the terms `wanted` over cells, by index; arguments precede their operations.
+
+    `leaves` are the enclosures of the names that vary.
+    """
     known: dict[int, Enclosure] = {}
     with np.errstate(all="ignore"):
         for number in wanted:
@@ -89,7 +91,7 @@ def _is_known(term: Term, constants: Mapping[str, float]) -> bool:
 
 
 def along_itself(t: Interval) -> Enclosure:
-    """A variable over cells of itself."""
+    """Enclosure of a variable over cells of that variable."""
     return Enclosure(t, _ONE)
 
 
@@ -111,7 +113,7 @@ def _apply(op: str, args: list[Enclosure], exponent: float | None) -> Enclosure:
 
 
 def _power(args: list[Enclosure], exponent: float | None) -> Enclosure:
-    """Powers with a whole exponent, and exp(b log a) for all others."""
+    """Enclosure of a power: a^n for an integer exponent, exp(b log a) for all others."""
     base, other = args
     if exponent is not None and exponent == int(exponent) and abs(exponent) < 2**31:
         n = int(exponent)
@@ -151,7 +153,7 @@ def _extreme(v: list[Interval], d: list[Interval], largest: bool) -> Enclosure:
 
 
 def _atan2(v: list[Interval], d: list[Interval]) -> Enclosure:
-    """Between the angles of the corners where the cell misses the branch cut and the origin."""
+    """Enclosure between the angles of the corners if the cell misses branch cut and origin."""
     y, x = v
     corners = [np.arctan2(b, a) for a in (x.lo, x.hi) for b in (y.lo, y.hi)]
     cut = y.meets_zero & (x.lo <= 0)
@@ -164,7 +166,7 @@ def _atan2(v: list[Interval], d: list[Interval]) -> Enclosure:
 
 
 def _where(v: list[Interval], d: list[Interval]) -> Enclosure:
-    """Where the condition is open the value may jump, and the slope be anything."""
+    """Enclosure of `where`; the slope is unbounded where the condition may switch."""
     open_ = v[0].meets_zero & (v[0].hi > 0)
     slope = v[0].where(d[1], d[2])
     jump = Interval(np.where(open_, -np.inf, slope.lo), np.where(open_, np.inf, slope.hi))
@@ -173,7 +175,7 @@ def _where(v: list[Interval], d: list[Interval]) -> Enclosure:
 
 _Slope = Callable[[Interval, Interval], Interval]
 
-#: Function of one argument -> its bounds, and those of its derivative from argument and value.
+#: Function of one argument -> its bounds, and bounds of its derivative from argument and value.
 _FUNCTIONS: dict[str, tuple[Callable[[Interval], Interval], _Slope]] = {
     "sin": (iv.sin, lambda x, _: iv.cos(x)),
     "cos": (iv.cos, lambda x, _: -iv.sin(x)),

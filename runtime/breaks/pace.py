@@ -1,8 +1,8 @@
-"""How long a step may be so that it cannot pass over a narrow part of an expression of time.
+"""Longest steps that cannot miss a narrow feature of an expression of time.
 
-Cells of time are halved until every function in the expression changes over each of them by no
-more than a part of all its change over the run.  A pulse is then covered by cells as short as it
-is, and the time far from it by long ones; a step may be as long as a few of the cells it is in.
+Cells of time are halved until every function in the expression changes over each cell by at most a
+fraction of its total change over the run.  Short cells then cover a pulse, and long cells the time
+far from it.  A step may span a few of its cells.
 """
 
 from __future__ import annotations
@@ -18,27 +18,31 @@ from mstmm.arrays import Array
 from .enclosures import Enclosure
 from .intervals import Interval
 
-#: A function changes over a cell by no more than this part of its change over the run.
+#: A function changes over a cell by at most this fraction of its change over the run.
 PART = 0.25
 
-#: Cells, and radians of an even oscillation, that a step may span: a pulse is then wider than the
+#: Cells, and radians of a uniform oscillation, that a step may span: a pulse is then wider than the
 #: widest gap between the stages of any method.
 CELLS, TURN = 8.0, 6.0
 
-#: An oscillation is even where its slowest turning is this part of its fastest.
+#: An oscillation is uniform if its lowest rate is at least this fraction of its highest rate.
 _EVEN = 0.5
 
-#: The smallest cell, the smallest around a pole, and the shortest bound, as part of the span.
+#: Smallest cell, smallest cell around a pole, and shortest step limit, as fractions of the span.
 _SMALLEST, _POLE, _SHORTEST = 2.0**-40, 2.0**-6, 2.0**-37
 
-#: A change so small, or so small against the value, is rounding; a cell so long bounds nothing.
+#: Changes up to _TINY, or up to _FLAT of the value, are rounding.  Cells longer than the fraction
+#: _LONG of the span do not limit the step.
 _TINY, _FLAT, _LONG = 1e-290, 1e-9, 1 / 32
 
 
 @dataclass(frozen=True)
 class Watched:
-    """A function in an expression, by the number of its term: its value, or the `slope` of that;
-    `argument` is what turns, for a sine or cosine."""
+    """Function in an expression whose narrow features limit the step.
+
+    `term` is the index of its term; `slope` says whether its value or its derivative is watched;
+    `argument` is the index of the argument of a sine or cosine.
+    """
 
     term: int
     argument: int | None = None
@@ -47,8 +51,10 @@ class Watched:
 
 @dataclass(frozen=True)
 class Pace:
-    """Longest steps (n,) in s from the times `starts` (n,) on; `complete` is False where there were
-    too many cells, which are then all as short as the last ones."""
+    """Longest steps (n,), s, valid from the times `starts` (n,), s, each up to the next one.
+
+    `complete` is False if the limit on the number of cells ended the subdivision.
+    """
 
     starts: Array
     longest: Array
@@ -62,8 +68,10 @@ def pace(
     terms: Terms, watched: Sequence[Watched], start: float, end: float, most: int = 2**16,
     edges: Array | None = None,
 ) -> Pace:  # fmt: skip
-    """Bounds of the steps from start to end (s) that the watched functions ask for, from `most`
-    cells at most.  No cell lies across one of the `edges` (n,), from start to end."""
+    """Longest steps from start to end (s) for the watched functions, from at most `most` cells.
+
+    No cell contains one of the `edges` (n,) in its interior; they ascend from start to end.
+    """
     bare = np.array([start, end]) if edges is None else edges
     a, b = bare[:-1], bare[1:]
     lo, hi, even = _looked_at(terms, watched, a, b)
@@ -91,7 +99,7 @@ def pace(
 def _looked_at(
     terms: Terms, watched: Sequence[Watched], a: Array, b: Array
 ) -> tuple[Array, Array, Array]:
-    """(bounds below, above, longest step of an even oscillation), each (watched, cells)."""
+    """(lower bounds, upper bounds, longest step of a uniform oscillation), each (watched, cells)."""
     known = terms(Interval(a, b))
     lo, hi = np.empty((len(watched), len(a))), np.empty((len(watched), len(a)))
     even = np.full((len(watched), len(a)), np.inf)
@@ -107,7 +115,7 @@ def _looked_at(
 
 
 def _coarse(lo: Array, hi: Array, even: Array, size: Array) -> NDArray[np.bool_]:
-    """(cells,) whether a cell is to be halved; `size` is its part of the span."""
+    """Mask (cells,) of the cells to be halved; `size` is each cell's fraction of the span."""
     finite = np.isfinite(lo) & np.isfinite(hi)
     least = np.min(lo, axis=1, where=finite, initial=np.inf)[:, None]
     most = np.max(hi, axis=1, where=finite, initial=-np.inf)[:, None]
@@ -119,7 +127,7 @@ def _coarse(lo: Array, hi: Array, even: Array, size: Array) -> NDArray[np.bool_]
 
 
 def _joined(starts: Array, longest: Array, complete: bool) -> Pace:
-    """Neighbours with bounds of the same octave share the smaller one."""
+    """Merge neighbouring cells whose limits are in the same octave; the smaller limit holds."""
     octave = np.floor(np.log2(longest, out=np.full(len(longest), np.inf), where=longest < np.inf))
     first = np.append(True, octave[1:] != octave[:-1])
     return Pace(starts[first], np.minimum.reduceat(longest, np.flatnonzero(first)), complete)

@@ -1,8 +1,8 @@
-"""Poles of expressions of time: where a force grows so fast that no motion passes.
+"""Poles of expressions of time: times at which a force grows too fast for a bounded motion.
 
-Between the two times that enclose a pole a run makes one step without an estimate of its error.
+Between the two times that enclose a pole a run makes one step without an error estimate.
 That is right where a force jumps, or grows as slowly as 1/sqrt(t), whose integral is finite.  A
-force that grows like 1/t or faster moves everything beyond all bounds.
+force that grows like 1/t or faster causes an unbounded motion.
 """
 
 from __future__ import annotations
@@ -17,17 +17,20 @@ from .view import View
 #: Operations that have poles.
 _OPERATIONS = frozenset({"div", "pow", "tan"})
 
-#: A pole is looked at from these distances, in widths of its gap, which is no less than so many
-#: spacings of numbers.
+#: Distances from a pole at which the function is compared, in widths of its gap; the width is at
+#: least so many spacings of floating-point numbers.
 _DISTANCES, _SPACINGS = (1.0, 100.0, 10_000.0), 64.0
 
-#: What grows by this factor from distance to distance grows like 1/t^0.9 or faster.
+#: A function that grows by this factor from distance to distance grows like 1/t^0.9 or faster.
 _GROWTH = 50**0.9
 
 
 def poles(view: View, gaps: Array) -> tuple[NDArray[np.bool_], bool]:
-    """Which gaps (n, 2) in time hold a pole of the expression, or of a part of it that depends on
-    time alone; and whether it is one of the whole expression."""
+    """Find the gaps (n, 2), s, that contain a pole of the expression or of a part of it.
+
+    Returns a mask (n,), and whether the whole expression has the poles.  Only parts that depend on
+    time alone are examined.
+    """
     found = np.zeros(len(gaps), bool)
     has_some = any(view.expression.terms[i].op in _OPERATIONS for i in view.moving)
     if not has_some or not len(gaps):

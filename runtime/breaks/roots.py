@@ -1,9 +1,9 @@
-"""Every time at which an expression of time switches: where a margin changes its sign.
+"""Switching times of an expression of time: the sign changes of its margins.
 
-Cells are halved until each holds no root for sure (its bounds, or those from its middle and its
-slope, miss zero) or at most one (its slope keeps one sign), so that no root is missed however
-narrow what it bounds.  A root that is known only
-to rounding is given as the two numbers between which the sign is open.
+Cells are halved until each certainly contains no root (its bounds, or those from its middle and its
+slope, exclude zero) or at most one root (its slope keeps one sign).  No root is missed, however
+narrow the feature that it bounds.  A root known only to rounding is given as the two numbers
+between which the sign is undetermined.
 """
 
 from __future__ import annotations
@@ -21,18 +21,20 @@ from .intervals import Interval, point
 
 Margin = Callable[[Interval], Enclosure]
 
-#: Cells at the start, and the smallest one as part of the span.
+#: Initial number of cells, and the smallest cell as a fraction of the span.
 _FIRST, _SMALLEST = 64, 2.0**-40
 
-#: A bracket as short as this part of the span is closed, however near to zero it lies; doublings
-#: open it again to where the sign is known.
+#: Bisection ends at a bracket of this fraction of the span, however near to zero its times are;
+#: at most so many doublings then widen it until the sign is certain at its ends.
 _CLOSED, _DOUBLINGS = 2.0**-64, 40
 
 
 @dataclass(frozen=True)
 class Roots:
-    """Gaps (n, 2), ascending and apart, that hold every root; `complete` is False where there were
-    too many cells, with `open_from` the first time that is not known."""
+    """Disjoint, ascending gaps (n, 2), s, that together contain every root.
+
+    `complete` is False if there were too many cells; roots after `open_from` (s) may be missing.
+    """
 
     gaps: Array
     complete: bool = True
@@ -40,7 +42,7 @@ class Roots:
 
 
 def roots(margin: Margin, start: float, end: float, most: int = 2**16) -> Roots:
-    """All sign changes of `margin` between start and end (s), from `most` cells at most."""
+    """Find all sign changes of `margin` between start and end (s), with at most `most` cells."""
     edges = np.linspace(start, end, _FIRST + 1)
     a, b = edges[:-1], edges[1:]
     found: list[tuple[Array, Array]] = []
@@ -74,7 +76,7 @@ def _sign(value: Interval) -> NDArray[np.float64]:
 
 
 def _crossed(margin: Margin, a: Array, b: Array, closed: float) -> tuple[Array, Array]:
-    """Gaps around the roots of the cells in which the margin changes its sign, once."""
+    """Gaps around the roots of those cells in which the margin changes its sign once."""
     if not len(a):
         return a, b
     sides = _sign(_at(margin, a)), _sign(_at(margin, b))
@@ -92,7 +94,7 @@ def _crossed(margin: Margin, a: Array, b: Array, closed: float) -> tuple[Array, 
 
 
 def _opened(margin: Margin, t: Array, direction: float) -> Array:
-    """The nearest numbers found on that side at which the sign of the margin is beyond doubt."""
+    """Move times in one direction to the nearest found at which the margin's sign is certain."""
     moved, step = t.copy(), np.spacing(np.abs(t))
     for _ in range(_DOUBLINGS):
         doubtful = ~_at(margin, moved).is_one_sided
@@ -103,7 +105,7 @@ def _opened(margin: Margin, t: Array, direction: float) -> Array:
 
 
 def _merged(a: Array, b: Array) -> Array:
-    """Gaps that touch are one."""
+    """Merge gaps that touch."""
     order = np.argsort(a)
     gaps: list[list[float]] = []
     for left, right in zip(a[order].tolist(), b[order].tolist(), strict=True):

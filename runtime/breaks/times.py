@@ -1,9 +1,8 @@
-"""What a run must know of its expressions of time before it starts: where its steps end, and how
-long they may be.
+"""Map of a run's expressions of time: the times at which steps end, and the longest steps.
 
-A method sees a load only at its stages.  Whatever can be known of loads beforehand is therefore
-looked for over the whole run: every time at which an expression switches (a comparison, `sign`,
-`abs`, `min`, `max`, a pole), and every part so narrow that a step could pass over it.
+A method evaluates a load only at its stages.  All that can be computed of loads in advance is
+therefore determined for the whole run: every time at which an expression switches (a comparison,
+`sign`, `abs`, `min`, `max`, a pole), and every feature so narrow that a step could miss it.
 """
 
 from __future__ import annotations
@@ -27,23 +26,23 @@ from .poles import poles
 from .roots import roots
 from .view import View
 
-#: Part of the run within which two times are one at its ends.
+#: Fraction of the run within which two times are equal at its ends.
 _ROUNDING = 1e-15
-#: Samples of a controller that a run takes at most.
+#: Maximum number of samples of a controller in a run.
 _MOST_SAMPLES = 1_000_000
 
 
 @dataclass(frozen=True)
 class TimeMap:
-    """Where steps end and how long they may be.
+    """Times at which steps end, and longest steps.
 
     Attributes:
         breaks: (n,) s, ascending, from the start to before the end: steps end there.
-        starts, longest: (m,) s: from `starts[i]` on, up to the next, no step is longer.
-        narrowest: what asks for the shortest steps.
+        starts, longest: (m,) s: from `starts[i]` up to the next one no step exceeds `longest[i]`.
+        narrowest: name of the expression that requires the shortest steps.
         pole: the first time (s, a break) at which an effort or a load grows beyond all bounds, so
-            that no motion passes, and which one does, in words.
-        notes: what could not be mapped.
+            that no motion passes, and a sentence that names it.
+        notes: findings about expressions that could not be mapped completely.
     """
 
     breaks: Array
@@ -54,7 +53,7 @@ class TimeMap:
     notes: tuple[Risk, ...] = field(default=())
 
     def too_long(self, step: float) -> Risk | None:
-        """A fixed step that could pass over what a load does; None if it could not."""
+        """Finding if a fixed step (s) could miss a feature of a load, else None."""
         shortest = float(self.longest.min(initial=np.inf))
         if step <= shortest:
             return None
@@ -62,8 +61,8 @@ class TimeMap:
         return Risk(
             "narrow-load", self.narrowest,
             f"the fixed step of {step:g} s is too long for {self.narrowest}, which near "
-            f"t = {at:.6g} s asks for steps of {shortest:.2g} s: what it does may be missed",
-            f"take a step below {shortest:.2g} s, or leave step out", step, shortest, "s",
+            f"t = {at:.6g} s requires steps of {shortest:.2g} s: features may be missed",
+            f"use a step below {shortest:.2g} s, or omit step", step, shortest, "s",
             before=True,
         )  # fmt: skip
 
@@ -75,10 +74,10 @@ def time_map(
     inputs: Inputs | None = None,
     samples: Iterable[float] = (),
 ) -> TimeMap:
-    """The map of all expressions for a run from `start` to `end` (s); `inputs` are what they may
-    name, whose knots are breaks, `samples` times (s) whose multiples are.
+    """Build the map of all expressions for a run from `start` to `end` (s).
 
-    Raises SceneError for a drive that jumps on the way.
+    `inputs` are the inputs that expressions may name; their knots are breaks, as are the multiples
+    of the sample times `samples` (s).  Raises SceneError for a drive that jumps during the run.
     """
     if not end > start:
         return TimeMap(np.zeros(0), np.zeros(0), np.zeros(0))
@@ -93,12 +92,12 @@ def time_map(
 
 
 def _multiples(step: float, start: float, end: float) -> Array:
-    """All whole multiples of a step (s) from `start` to `end`."""
+    """All integer multiples of a step (s) from `start` to `end` (s)."""
     count = (end - start) / step
     if count > _MOST_SAMPLES:
         raise SceneError(
             f"a controller with sample_time = {step:g} s acts {count:.0f} times from t = {start:g} "
-            f"to {end:g} s; a run takes {_MOST_SAMPLES} samples at most: make it in parts"
+            f"to {end:g} s; a run allows at most {_MOST_SAMPLES} samples: split the run"
         )
     first, last = math.floor(start / step), math.ceil(end / step)
     return np.asarray(np.arange(first, last + 1) * step)
@@ -151,7 +150,7 @@ def _mapped(expressions: list[Acting], start: float, end: float, inputs: Inputs)
 def _endless(one: Acting) -> str:
     return (
         f"{one.what} ({_shown(one)}) grows beyond all bounds there, too fast for any motion to "
-        "pass; end the run before, or bound it, such as by min or max"
+        "pass; end the run before that time, or limit it, such as by min or max"
     )
 
 
@@ -159,19 +158,19 @@ def _pole(one: Acting, t: float) -> Risk:
     return Risk(
         "pole", one.what,
         f"a part of {one.what} ({_shown(one)}) grows beyond all bounds at t = {t:.6g} s: unless "
-        "what it multiplies vanishes there, no motion passes",
-        "end the run before, or bound the part, such as by min or max", before=True,
+        "its factor vanishes there, no motion passes",
+        "end the run before that time, or limit the part, such as by min or max", before=True,
     )  # fmt: skip
 
 
 def _around(knots: list[float], start: float, end: float) -> list[tuple[float, float]]:
-    """The numbers before and after each knot within the run."""
+    """Floating-point numbers before and after each knot within the run."""
     inner = [knot for knot in knots if start < knot < end]
     return [(math.nextafter(t, -math.inf), math.nextafter(t, math.inf)) for t in inner]
 
 
 def _inside(times: set[float], start: float, end: float) -> Array:
-    """Ascending; what lies at the start but for rounding is the start, which is a break then."""
+    """Times within the run, ascending; times that equal the start up to rounding become it."""
     at_start, at_end = start + _ROUNDING * (end - start), end - _ROUNDING * (end - start)
     early = start - _ROUNDING * (end - start)
     found = {start if t <= at_start else t for t in times if early <= t < at_end}
@@ -181,8 +180,8 @@ def _inside(times: set[float], start: float, end: float) -> Array:
 def _many_switches(one: Acting, since: float) -> Risk:
     return Risk(
         "switches", one.what,
-        f"{one.what} ({_shown(one)}) switches too often for every switching to end a step: from "
-        f"t = {since:.6g} s on some are passed over", "give max_step, or a shorter run",
+        f"{one.what} ({_shown(one)}) switches too often for a step to end at every switching "
+        f"time: from t = {since:.6g} s on some are missed", "give max_step, or a shorter run",
         before=True,
     )  # fmt: skip
 
@@ -190,8 +189,8 @@ def _many_switches(one: Acting, since: float) -> Risk:
 def _too_fast(one: Acting, longest: float) -> Risk:
     return Risk(
         "narrow-load", one.what,
-        f"{one.what} ({_shown(one)}) changes too often for all of it to be looked at before the "
-        f"run; steps are kept below {longest:.2g} s where it is not known", "give max_step",
+        f"{one.what} ({_shown(one)}) changes too often to be examined completely before the "
+        f"run; steps stay below {longest:.2g} s where it was not examined", "give max_step",
         before=True,
     )  # fmt: skip
 
@@ -202,7 +201,7 @@ def _shown(one: Acting) -> str:
 
 
 def _shortest(paces: list[tuple[Pace, str]]) -> tuple[Array, Array, str]:
-    """All paces as one, and what asks for the shortest step."""
+    """Combine all step limits; also the name of the expression with the shortest limit."""
     finite = [(p, what) for p, what in paces if np.isfinite(p.longest).any()]
     if not finite:
         return np.zeros(0), np.zeros(0), ""

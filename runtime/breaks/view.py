@@ -1,4 +1,4 @@
-"""An expression as functions of one variable: what in it may be narrow, and where it switches."""
+"""Expression as functions of one variable: candidates for narrow features, and its margins."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .intervals import EVERYTHING, Interval, cos
 from .pace import Watched
 from .roots import Margin
 
-#: Cells of an expression at most, and terms in all of them together.
+#: Maximum number of cells of an expression, and of evaluated terms in all cells together.
 _CELLS, _WORK = 2**16, 2**18
 
 _DIFFERENCES = frozenset({"lt", "le", "gt", "ge", "min", "max"})
@@ -25,14 +25,16 @@ _FUNCTIONS = frozenset({
 })  # fmt: skip
 
 
-#: Names of an expression over cells of one variable.
+#: Function from cells of one variable to enclosures of the names in an expression.
 Leaves = Callable[[Interval], Mapping[str, Enclosure]]
 
 
 class View:
-    """One expression as functions over cells of time, or of another of its `names`; of several that
-    `leaves` give over cells of one variable, which is the first.  Of a `drive` the second
-    derivative acts."""
+    """Expression as functions over cells of time, or of another variable.
+
+    The variable is the first of `names`; `leaves` gives the enclosures of all `names` over its
+    cells.  The second derivative of a `drive` acts on the motion.
+    """
 
     def __init__(
         self,
@@ -50,24 +52,26 @@ class View:
         self.most = min(_CELLS, _WORK // max(1, len(self.order)))
 
     def terms(self, t: Interval) -> dict[int, Enclosure]:
-        """Enclosures of all terms that depend on the variable alone."""
+        """Enclosures of all terms that depend on the variable only."""
         return enclose(self.expression.terms, self.order, self.constants, self._leaves(t))
 
     def values(self, number: int, at: Array) -> Array:
-        """(n,) a term at values (n,) of the variable; nan where it has none."""
+        """Values (n,) of a term at values (n,) of the variable; nan where it is undefined."""
         bounds = self.terms(Interval(at, at))[number].value
         with np.errstate(invalid="ignore"):
             return np.broadcast_to((bounds.lo + bounds.hi) / 2, at.shape)
 
     def widest(self) -> list[int]:
-        """Terms that depend on the variable alone and are in no larger one that does."""
+        """Largest terms that depend on the variable only."""
         terms = self.expression.terms
         within = {i for n in self.moving for i in terms[n].args}
         return sorted(self.moving - within)
 
     def watched(self) -> list[Watched]:
-        """The functions that could be narrow: all but sums, products and switches; of a drive,
-        whose second derivative acts, their slopes too."""
+        """Functions that may have narrow features: all but sums, products and switches.
+
+        For a drive, whose second derivative acts, their slopes are included.
+        """
         found = []
         for number in sorted(self.moving):
             term = self.expression.terms[number]
@@ -82,7 +86,10 @@ class View:
         return found
 
     def margins(self) -> list[Margin]:
-        """What changes its sign where the expression switches; straight lines are known exactly."""
+        """Functions that change sign where the expression switches, except linear functions.
+
+        The switching times of linear functions are known exactly (`linear_switches`).
+        """
         lines, terms = self.expression.linear_switches(), self.expression.terms
         once: dict[tuple[bool, str], Margin] = {}
         for number in sorted(self.moving - set(lines)):

@@ -1,1 +1,1 @@
-"""The classical discrete-time method: scenes as its records, motions back to q and u; C in `c/`."""
+"""Classical discrete-time transfer matrix method: scenes to C records, motions to q and u."""

@@ -1,4 +1,4 @@
-"""Along which chains the plain product can eliminate what its hinges leave free."""
+"""Chains along which the plain product of transfer matrices can eliminate free rotations."""
 
 from __future__ import annotations
 
@@ -10,28 +10,29 @@ from ..pack.packed import Packed
 from .known import BALL, ELASTIC_BALL, ELASTIC_PIN, PIN
 from .parts import Part
 
-#: Kind of a hinge -> how it turns freely.
+#: Kind of a hinge -> type of its free rotation.
 _TURNS = {PIN: "pin", ELASTIC_PIN: "pin", BALL: "ball", ELASTIC_BALL: "ball"}
 
 
 def refuse_product(packed: Packed, parts: Sequence[Part]) -> None:
-    """SceneError for chains along which the plain product cannot eliminate the free turns in space.
+    """Raise SceneError for spatial chains whose free rotations the plain product cannot eliminate.
 
-    A hinge that turns freely takes the condition of the next one outward, so they must be alike;
-    in the plane they are.
+    The free rotation of a hinge is eliminated by the condition of the next hinge outboard, so both
+    must be of the same type.  In the plane they always are.
     """
     for place, before in _along_chains(parts):
         needed = _TURNS[parts[before].kind]
         if _TURNS[parts[place].kind] != needed:
             link = packed.topology.links[parts[place].hinge]
             raise SceneError(
-                f'hinge "{packed.scene.hinges.name(link.hinge)}": behind a hinge that turns as a '
-                f"{needed} the plain product needs another of that kind; use method dttmm-classical"
+                f'hinge "{packed.scene.hinges.name(link.hinge)}": outboard of a hinge that rotates '
+                f"as a {needed} the plain product needs another of that kind; use method "
+                "dttmm-classical"
             )
 
 
 def _along_chains(parts: Sequence[Part]) -> Iterator[tuple[int, int]]:
-    """(place, place of the hinge with free turns before it) along chains of first children."""
+    """Pairs (place, place of the previous hinge with free rotation) along first children."""
     before: dict[int, int] = {}
     led: set[int] = set()
     for place, part in enumerate(parts):

@@ -1,8 +1,8 @@
-"""The two forms of the method: parts in space, and those of a scene that lies and moves in a plane.
+"""Spatial and planar form of the classical method.
 
-A form writes parts as records of C, the start of a run as motions, and reads motions as what parts
-do in space.  The matrices of beams have a given number of shapes; those that a beam leaves free
-idle, with a mass and nothing else.
+A form converts parts to C records and the initial state to motions, and it converts motions to the
+movement of parts in space.  The matrices of beams have a fixed number of shapes.  Shapes that a
+beam does not use have a mass, but no stiffness and no coupling.
 """
 
 from __future__ import annotations
@@ -18,18 +18,22 @@ from mstmm.arrays import Array
 from .known import BALL, FIXED, FREE, PIN, refused
 from .parts import Bending, Part
 
-#: Doubles of a motion and where its parts begin (`mstmm_classical_motion`).
+#: Offsets in a motion, and its number of doubles (`mstmm_classical_motion`).
 POSITION, SPEED, RATE, AUXILIARY, AXES, INBOARD, OUTBOARD = 0, 8, 16, 24, 32, 41, 47
 MOTION = 54
 
-#: Parts of a length, or rad, by which a scene may leave its plane.
+#: Relative deviation of lengths, or rad, by which a planar scene may leave its plane.
 _FLAT = 1e-10
 
 
 @dataclass(frozen=True)
 class Moving:
-    """A part at n times: its own point and velocity (n, 3), spin in its axes, axes (n, 3, 3), modal
-    coordinates and their rates (n, k); accelerations and loads where they are known."""
+    """Movement of a part at n times, or at one time without the axis n.
+
+    Position and velocity (n, 3) of its reference point in inertial axes, `spin` (n, 3) in its own
+    axes, `axes` (n, 3, 3), modal coordinates and their rates (n, k).  Accelerations and loads are
+    optional.
+    """
 
     position: Array
     velocity: Array
@@ -44,35 +48,35 @@ class Moving:
 
 
 class Form(ABC):
-    """How parts are written and read."""
+    """Conversion of parts to C records, and of motions to movement in space."""
 
     planar: bool
-    #: Most shapes of a beam, and where modal coordinates begin in a motion.
+    #: Maximum number of shapes of a beam, and index of the first modal coordinate in a motion.
     shapes: int
     first: int
 
     @abstractmethod
     def gravity(self, gravity: Array) -> Array:
-        """Gravity as the records have it."""
+        """Gravity (3,), m/s^2, in the coordinates of the records."""
 
     @abstractmethod
     def record(self, parts: Sequence[Part], k: int) -> dict[str, Array]:
-        """Fields of a part's record, each flat; those that are left out are zero."""
+        """Fields of a part's record, each flat; omitted fields are zero."""
 
     @abstractmethod
     def places(self, bending: Bending) -> list[int]:
-        """Which shapes of the matrix a beam's own ones are."""
+        """Indices of a beam's shapes among those of its matrix."""
 
     @abstractmethod
     def start(self, k: int, at: Moving) -> Array:
-        """(MOTION,) of a part at the start."""
+        """Initial motion (MOTION,) of a part."""
 
     @abstractmethod
     def moving(self, part: Part, k: int, motion: Array) -> Moving:
-        """What a part does, from its motions (n, MOTION)."""
+        """Movement of a part in space, from its motions (n, MOTION)."""
 
     def modal(self, part: Part, sign: float = 1.0) -> dict[str, Array]:
-        """Modal numbers of a beam's record; `sign` is that of its shapes' direction."""
+        """Modal parameters of a beam's record; `sign` is that of the direction of its shapes."""
         bending = part.bending
         if bending is None:
             return {}
@@ -89,7 +93,7 @@ class Form(ABC):
         }  # fmt: skip
 
     def spread(self, part: Part | None, shapes: Array) -> Array:
-        """Columns of a beam's shapes among those of its matrix, flat."""
+        """Columns of a beam's shapes in the layout of its matrix, flat."""
         if part is None or part.bending is None:
             return np.zeros(0)
         found = np.zeros((len(shapes), self.shapes))
@@ -97,14 +101,14 @@ class Form(ABC):
         return found.ravel()
 
     def modal_places(self, part: Part) -> list[int]:
-        """Where a part's own modal coordinates stand in a motion's position."""
+        """Indices of a part's modal coordinates in the position of a motion."""
         if part.bending is None:
             return []
         return [self.first + place for place in self.places(part.bending)]
 
 
 class Spatial(Form):
-    """Parts as they are, of beams one shape along y and one along z."""
+    """Spatial form: beams have one shape along y and one along z."""
 
     planar, shapes, first = False, 2, 6
 
@@ -115,7 +119,7 @@ class Spatial(Form):
                 raise refused(
                     f'"{name}"',
                     "in space its matrices have one shape along y and one along z; three in one "
-                    "direction are for scenes that lie and move in a plane",
+                    "direction need a scene whose parts and motion are in a plane",
                 )
         self.parts = parts
 
@@ -163,10 +167,11 @@ class Spatial(Form):
 
 
 class Planar(Form):
-    """Parts of a scene that is symmetric about a plane and moves in it.
+    """Planar form: a scene that is symmetric about a plane and moves in it.
 
-    `ground` (3, 3) has the plane's axes and its normal as columns, inertial axes; `frames` those of
-    each part in the part's own axes, and `heights` how far its own point lies along the normal.
+    The columns of `ground` (3, 3) are the plane's axes and its normal in inertial axes; `frames`
+    are the same in the axes of each part.  `height` (m) is the position of the plane along the
+    normal.
     """
 
     planar, shapes, first = True, 3, 3
@@ -200,7 +205,7 @@ class Planar(Form):
         }  # fmt: skip
         if part.springs is not None:
             law = np.array(part.springs.law.p)
-            law[4] *= np.sign(axes[2, 2])  # the hinge's y axis in a plane seen from behind
+            law[4] *= np.sign(axes[2, 2])  # the hinge's y axis if its z axis opposes the normal
             found["law"] = law
         direction = part.bending.directions[0] if part.bending is not None else 1
         return found | self.modal(part, float(np.sign(own[direction, 1])))
@@ -241,7 +246,7 @@ class Planar(Form):
 
 
 def full(inertia: Array) -> Array:
-    """(3, 3) from xx xy xz yy yz zz."""
+    """Symmetric matrix (3, 3) from its entries xx xy xz yy yz zz."""
     found = np.zeros((3, 3))
     found[np.triu_indices(3)] = inertia
     return np.asarray(found + found.T - np.diag(np.diag(found)))
@@ -254,7 +259,7 @@ def form_of(
     names: Sequence[str],
     size: float,
 ) -> Form:
-    """The plane's form where there is a plane, else that of space."""
+    """Planar form of a scene if it has a plane, else the spatial form."""
     for normal in _normals(parts, start):
         plane = _plane(parts, start, gravity, normal, size)
         if plane is not None:
@@ -263,7 +268,7 @@ def form_of(
 
 
 def _normals(parts: Sequence[Part], start: Sequence[Moving]) -> Iterator[Array]:
-    """What may be normal to the plane: the axis of a pin, the third direction of a beam."""
+    """Candidates for the normal of the plane: the axis of a pin, the third direction of a beam."""
     for part, at in zip(parts, start, strict=True):
         if part.kind == PIN:
             yield at.axes @ part.end[:, 2]
@@ -276,7 +281,7 @@ def _normals(parts: Sequence[Part], start: Sequence[Moving]) -> Iterator[Array]:
 def _plane(
     parts: Sequence[Part], start: Sequence[Moving], gravity: Array, normal: Array, size: float
 ) -> Planar | None:
-    """The plane normal to a direction, None where the scene leaves it."""
+    """Planar form with the given normal, None if the scene does not stay in that plane."""
     frames = []
     height = float(start[0].position @ normal)
     if abs(gravity @ normal) > _FLAT * np.linalg.norm(gravity):
@@ -292,13 +297,13 @@ def _plane(
 
 
 def _across(normal: Array) -> Array:
-    """A unit vector normal to one."""
+    """A unit vector perpendicular to the given one."""
     x = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
     return np.asarray(x / np.linalg.norm(x))
 
 
 def _lies_in(part: Part, at: Moving, normal: Array, own: Array, height: float, size: float) -> bool:
-    """Whether a part is symmetric about the plane and moves in it."""
+    """True if a part is symmetric about the plane and moves in it."""
     speed = max(float(np.linalg.norm(at.velocity)), size * float(np.linalg.norm(at.spin)))
     turned = full(part.inertia) @ own
     flat = [
@@ -319,6 +324,6 @@ def _lies_in(part: Part, at: Moving, normal: Array, own: Array, height: float, s
 
 
 def _about(part: Part, own: Array) -> bool:
-    """Whether the hinge's z axis is the normal, and no spring rests outside the plane."""
+    """True if the hinge's z axis is the normal and no spring has a rest length along it."""
     rests = part.springs is None or part.springs.law.p[5] == 0
     return rests and bool(abs(part.end[:, 2] @ own) >= 1 - _FLAT)

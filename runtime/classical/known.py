@@ -1,4 +1,4 @@
-"""What the classical discrete-time method has element matrices for; all else is refused by name."""
+"""Elements that the classical discrete-time method supports; others are rejected by name."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ELASTIC, ELASTIC_PIN, ELASTIC_BALL = "ELASTIC", "ELASTIC_PIN", "ELASTIC_BALL"
 
 WAY_OUT = "use another method, such as dop853"
 
-_HINGES = "known are fixed, pin, ball, elastic, and free on the ground"
+_HINGES = "supported are fixed, pin, ball, elastic, and free on the ground"
 
 #: Stiffness or damping about x, y, z -> kind of an elastic hinge.
 _SPRUNG = {
@@ -29,16 +29,16 @@ _SPRUNG = {
 
 @dataclass(frozen=True)
 class Springs:
-    """Springs and dampers of an elastic hinge, and where the run's memory keeps its twist."""
+    """Springs and dampers of an elastic hinge, and the index of its twist in the run's memory."""
 
     law: LawNumbers
     twist: int
 
 
 def hinge_kinds(packed: Packed) -> list[tuple[str, Springs | None]]:
-    """Kind of every body's inboard hinge, by places, with the springs of an elastic one.
+    """Kind of the inboard hinge of every body, by place, with the springs of an elastic one.
 
-    Raises SceneError naming what there is no matrix for.
+    Raises SceneError that names an unsupported element.
     """
     _refuse_loads(packed)
     laws = _laws(packed)
@@ -49,7 +49,7 @@ def hinge_kinds(packed: Packed) -> list[tuple[str, Springs | None]]:
     ]
 
 
-_LOADS = "loads are known as gravity and elastic hinges alone"
+_LOADS = "the only supported loads are gravity and elastic hinges"
 
 
 def _refuse_loads(packed: Packed) -> None:
@@ -57,7 +57,7 @@ def _refuse_loads(packed: Packed) -> None:
     for table, elements, why in (
         ("load", scene.load, _LOADS), ("spring", scene.spring, _LOADS),
         ("bushing", scene.bushing, _LOADS),
-        ("event", scene.events, "its steps neither find events nor act on them"),
+        ("event", scene.events, "its steps neither locate nor process events"),
     ):  # fmt: skip
         for element in elements:
             raise refused(f'{table} "{element.name}"', why)
@@ -67,17 +67,17 @@ def _refuse_loads(packed: Packed) -> None:
 
 
 def refused(what: str, why: str) -> SceneError:
-    """The error for an element of a scene that has no matrix."""
-    return SceneError(f"{what}: method dttmm-classical cannot take it: {why}; {WAY_OUT}")
+    """Error for an element of a scene that has no matrix."""
+    return SceneError(f"{what}: method dttmm-classical does not support it: {why}; {WAY_OUT}")
 
 
 def _laws(packed: Packed) -> dict[int, list[Springs]]:
-    """Laws by places of their bodies; SceneError for one with an effort."""
+    """Laws by places of their bodies; SceneError for a law with an effort."""
     found: dict[int, list[Springs]] = {}
     for run in packed.system.laws:
         for law, body, twist, efforts in run.each():
             if any(place >= 0 for place in efforts):
-                raise refused(_name(packed, body), "efforts have no place in its matrices")
+                raise refused(_name(packed, body), "its matrices contain no efforts")
             found.setdefault(body, []).append(Springs(law, twist))
     return found
 
@@ -95,13 +95,13 @@ def _kind(hinge: Hinge, on_ground: bool, laws: Sequence[Springs]) -> tuple[str, 
         raise refused(what, f"the type {hinge.type} has no matrix; {_HINGES}")
     if kind != FREE and laws:
         raise refused(
-            what, f"a law on a hinge of type {hinge.type} has none; elastic hinges take springs"
+            what, f"a law on a hinge of type {hinge.type} has no matrix; use an elastic hinge"
         )
     if kind != FREE:
         return kind, None
     if not laws:
         if not on_ground:
-            raise refused(what, f"nothing holds the body there; {_HINGES}")
+            raise refused(what, f"the hinge constrains nothing there; {_HINGES}")
         return FREE, None
     if len(laws) != 1 or laws[0].law.kernel != "six":
         raise refused(what, "its friction has no matrix")
@@ -109,7 +109,7 @@ def _kind(hinge: Hinge, on_ground: bool, laws: Sequence[Springs]) -> tuple[str, 
 
 
 def _held(facts: HingeFacts | None) -> str | None:
-    """Kind of a hinge by what it leaves free; None where there is no matrix."""
+    """Kind of a hinge by its free motions; None if there is no matrix."""
     if facts is None or not facts.steady:
         return None
     if facts.welds:
@@ -124,7 +124,7 @@ def _held(facts: HingeFacts | None) -> str | None:
 
 
 def _sprung(what: str, springs: Springs) -> tuple[str, Springs]:
-    """Kind of an elastic hinge by what its springs and dampers hold."""
+    """Kind of an elastic hinge by the directions of its springs and dampers."""
     p = springs.law.p
     if not all(p[k] > 0 or p[6 + k] > 0 for k in range(3)):
         raise refused(what, "it needs springs or dampers along x, y and z")

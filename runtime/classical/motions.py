@@ -1,4 +1,4 @@
-"""Motions of bodies in absolute coordinates: from a state q, u, and back to it."""
+"""Conversion between a state q, u and the motions of bodies in absolute coordinates."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _OPPOSITE = np.array([3, 4, 5, 0, 1, 2])  # force, moment -> moment, force
 
 
 def start_of(engine: Engine, parts: Sequence[Part], t: float, q: Array, u: Array) -> list[Moving]:
-    """What parts do in a state, accelerations and loads of their hinges with it.
+    """Movement of parts in a state, with accelerations and loads of their hinges.
 
-    Raises NumericalFailure where the state cannot be evaluated.
+    Raises NumericalFailure if the state cannot be evaluated.
     """
     memory = engine.start_memory()
     seen = engine.observe(
@@ -48,7 +48,7 @@ def start_of(engine: Engine, parts: Sequence[Part], t: float, q: Array, u: Array
 
 @dataclass(frozen=True)
 class _Section:
-    """Positions, velocities and spins (n, 3) in inertial axes, axes (n, 3, 3)."""
+    """Section of a part: positions, velocities, spins (n, 3) in inertial axes, axes (n, 3, 3)."""
 
     position: Array
     velocity: Array
@@ -57,8 +57,10 @@ class _Section:
 
 
 class States:
-    """q, u and memory of motions, one after the other: angles, quaternions and twists go on from
-    the last ones."""
+    """Conversion of successive motions to q, u and memory.
+
+    Angles, quaternions and twists continue from the last ones converted.
+    """
 
     def __init__(self, packed: Packed, parts: Sequence[Part], form: Form, q: Array) -> None:
         system = packed.system
@@ -69,7 +71,7 @@ class States:
         self.memory = self._memory(q[None])[0]
 
     def of(self, motions: Array) -> tuple[Array, Array, Array]:
-        """q (n, nq), u (n, nu) and memory (n, m) of n motions (n, parts, MOTION)."""
+        """Convert motions (n, parts, MOTION) to q (n, nq), u (n, nu) and memory (n, m)."""
         n = len(motions)
         q, u = np.zeros((n, self.nq)), np.zeros((n, self.nu))
         moving = [self.form.moving(part, k, motions[:, k]) for k, part in enumerate(self.parts)]
@@ -103,7 +105,7 @@ class States:
         return found
 
     def _hinge(self, k: int, moving: list[Moving], q: Array, u: Array, last: Array) -> None:
-        """Coordinates and speeds of the inboard hinge of a part."""
+        """Write coordinates and speeds of the inboard hinge of a part into `q` and `u`."""
         part = self.parts[k]
         outboard = _section(moving[k], np.zeros(3), part.end, np.zeros_like(part.held), part.held)
         inboard = _inboard(part.hung, moving, len(q))
@@ -129,7 +131,7 @@ def _inboard(hung: Hung, moving: list[Moving], n: int) -> _Section:
 
 
 def _section(at: Moving, point: Array, turn: Array, shapes: Array, slopes: Array) -> _Section:
-    """A section of a part that lies at `point`, turned by `turn`, at rest."""
+    """Section of a part whose position is `point` and whose rotation is `turn` at rest."""
     lever = np.einsum("nij,nj->ni", at.axes, point + at.eta @ shapes.T)
     bent, tangent = _turns(at.eta @ slopes.T)
     spin = np.einsum("nij,nj->ni", at.axes, at.spin)
@@ -142,7 +144,7 @@ def _section(at: Moving, point: Array, turn: Array, shapes: Array, slopes: Array
 
 
 def _turns(vectors: Array) -> tuple[Array, Array]:
-    """exp(v~) and T (n, 3, 3) with the spin T dv/dt in the axes before the turn."""
+    """Rotations exp(v~) and tangents T (n, 3, 3); T dv/dt is the spin in the axes before it."""
     cross = np.zeros((len(vectors), 3, 3))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         cross[:, k, j], cross[:, j, k] = vectors[:, i], -vectors[:, i]
@@ -156,7 +158,7 @@ def _turns(vectors: Array) -> tuple[Array, Array]:
 
 
 def _angle(rotation: Array, last: Array) -> Array:
-    """Angles (n, 1) about z that go on from the last one."""
+    """Angles (n, 1) about z, unwrapped from the last one."""
     wrapped = np.arctan2(
         rotation[:, 1, 0] - rotation[:, 0, 1], rotation[:, 0, 0] + rotation[:, 1, 1]
     )
@@ -164,7 +166,7 @@ def _angle(rotation: Array, last: Array) -> Array:
 
 
 def _quaternion(rotation: Array, last: Array) -> Array:
-    """Unit quaternions (n, 4), w first, each on the side of the one before."""
+    """Unit quaternions (n, 4), w first, each with the sign nearest to the previous one."""
     r = rotation
     trace = np.trace(r, axis1=1, axis2=2)
     skew = np.stack(

@@ -1,7 +1,7 @@
-"""Bodies of a scene as the classical method takes them: one part per rigid body or beam.
+"""Bodies of a scene as parts of the classical method: one part per rigid body or beam.
 
-A rigid body has the internal frame of the engine.  A beam has its own axes, and its origin where it
-is held; the nodes by which the engine sweeps it (floating frame, sections) are one part here.
+A rigid body has the internal frame of the engine.  A beam has its own axes, with the origin at its
+inboard end; the nodes that represent it in the engine (floating frame, sections) are one part here.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..pack.flexible.expansion import HELD
 from ..pack.packed import Packed
 from .known import Springs, hinge_kinds, refused
 
-#: Largest share of a length that is rounding.
+#: Largest distance from the axis of a beam that is rounding, m.
 _NOTHING = 1e-12
 
 
@@ -30,8 +30,11 @@ def _none(rows: int) -> Array:
 
 @dataclass(frozen=True)
 class Bending:
-    """Shapes of a beam, in the order of its modal coordinates from q and u on: directions (1: y,
-    2: z), int rho phi and int rho x phi (n,), matrices (n, n)."""
+    """Shapes of a beam, in the order of its modal coordinates, which begin at indices `q` and `u`.
+
+    `directions` (n,) are 1 for y, 2 for z; `shift` is int rho phi, `moment` int rho x phi (n,);
+    mass, stiffness and damping matrices are (n, n).
+    """
 
     directions: tuple[int, ...]
     shift: Array
@@ -50,8 +53,11 @@ class Bending:
 
 @dataclass(frozen=True)
 class Hung:
-    """What a body hangs on: part `parent` (-1: the ground) with hinge point (3) and axes (3, 3) at
-    rest in its frame, where its shapes displace by `shapes` and turn by `slopes` (3, n)."""
+    """Attachment of a body to the part `parent` (-1: the ground).
+
+    Hinge point (3,) and hinge axes `turn` (3, 3) at rest in the frame of the parent, whose shapes
+    displace that point by `shapes` (3, n) and rotate it by `slopes` (3, n).
+    """
 
     parent: int
     point: Array
@@ -62,11 +68,11 @@ class Hung:
 
 @dataclass(frozen=True)
 class Part:
-    """A body with its inboard hinge.
+    """Body with its inboard hinge.
 
-    `hinge` is the place in the engine's tree whose inboard hinge it is, `frame` the body's axes and
-    origin there.  `end` (3, 3) are the hinge's axes on the body itself at rest, turned by its own
-    shapes as `held` (3, n) says.
+    `hinge` is the place of the hinge in the engine's tree, `frame` the axes and origin of the body
+    there.  `end` (3, 3) are the hinge's axes on the body at rest; the body's shapes rotate them by
+    `held` (3, n).
     """
 
     hinge: int
@@ -83,12 +89,12 @@ class Part:
 
     @property
     def parent(self) -> int:
-        """Part that it hangs on, -1 for the ground."""
+        """Index of the part that carries it, -1 for the ground."""
         return self.hung.parent
 
 
 def parts_of(packed: Packed) -> list[Part]:
-    """The parts of a scene, parents first.  SceneError for what there is no matrix for."""
+    """Parts of a scene, parents first.  SceneError for an unsupported element."""
     parts = list(_Parts(packed))
     carried: dict[int, int] = {}
     for part in parts:
@@ -117,7 +123,7 @@ class _Parts:
             if not self.expanded.is_node(name):
                 self.owner[place] = (len(self.origins), None)
                 yield self._rigid(place)
-            elif name not in passages:  # held by a hinge of the scene
+            elif name not in passages:  # its inboard hinge is one of the scene
                 beam = name.removesuffix(f"/{HELD}")
                 body = self.expanded.bodies[beam]
                 port = body.ports[self.expanded.held[beam]]
@@ -152,7 +158,7 @@ class _Parts:
         _, rotation, origin = self._node(parent)
         if np.abs(origin + rotation @ point).max() > _NOTHING:
             hinge = self.packed.scene.hinges.name(self.packed.topology.links[place].hinge)
-            raise refused(f'hinge "{hinge}"', "it lies beside the axis of a beam")
+            raise refused(f'hinge "{hinge}"', "it is not on the axis of a beam")
         position = port.position - self.origins[owner]
         return Hung(owner, position, port.rotation @ rotation @ turn, port.phi, port.theta)
 
@@ -173,7 +179,7 @@ class _Parts:
         )  # fmt: skip
 
     def _floating(self, body: ModalBody, port: ModalPort) -> Probe:
-        """Axes of a beam, and the point of its floating frame where it is held at rest."""
+        """Axes of a beam, and the point of its floating frame at its inboard end at rest."""
         own = self.packed.placements[body.name]
         x, y, z = (float(entry) for entry in port.position)
         axes = tuple(np.array(own.rotation).T.ravel().tolist())
@@ -181,19 +187,19 @@ class _Parts:
 
 
 def _bending(body: ModalBody, port: ModalPort, packed: Packed) -> Bending:
-    """Shapes of a beam.  SceneError for what the matrices of beams leave out."""
+    """Shapes of a beam.  SceneError for features that the matrices of beams do not contain."""
     what = f'"{body.name}"'
     if body.shapes is None:
-        raise refused(what, "of flexible bodies beams alone have matrices")
+        raise refused(what, "beams are the only flexible bodies with matrices")
     data = body.shapes.data
     if body.shapes.stiffening:
         raise refused(what, "its matrices are linear in the deflection; set stiffening = false")
     if body.points or body.drag is not None or data.rotary:
-        raise refused(what, "quadrature, viscous drag and rotary inertia have no place in them")
+        raise refused(what, "its matrices contain no quadrature, viscous drag or rotary inertia")
     if any(name[0] not in "yz" for name in body.modes):
-        raise refused(what, "twist and axial shapes have no place in its matrices")
+        raise refused(what, "its matrices contain no twist and axial shapes")
     if np.any(port.phi):
-        raise refused(what, "its frame does not stay at its held end; use tangent or chord")
+        raise refused(what, "its frame does not stay at its inboard end; use tangent or chord")
     d = np.array(["xyz".index(name[0]) for name in body.modes], dtype=np.int64)
     k, slots = np.arange(len(d)), packed.layout.modal[body.name]
     moment = body.E[0, d, k] - port.position[0] * body.C[d, k]

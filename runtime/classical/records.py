@@ -1,4 +1,4 @@
-"""A scene's parts as the C records of the classical discrete-time method, and their steps."""
+"""C records of a scene's parts for the classical discrete-time method, and its stepper."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ from .forms import MOTION, Form
 from .parts import Part
 from .schemes import Scheme
 
-#: Corrections at which iterations end, and gaps at which a hinge is lost, as part of the size of
-#: the scene or in rad; loads that the product may leave at a free tip, as part of the largest.
+#: Corrections at which iterations end, and position gaps at which a step fails, relative to the
+#: size of the scene or in rad; loads that the product may leave at a free tip, relative to the
+#: largest load.
 TOLERANCE, GAP, ACCURACY = 1e-10, 1e-2, 1e-6
 
 
 class Stepper:
-    """The C stepper of a scene's parts in one form, from a motion of theirs (n, MOTION) on.
+    """C stepper of a scene's parts in one form, from initial motions (n, MOTION).
 
-    `turning` False leaves out the tangent operator of the turns in space, to show what it is for.
+    `turning=False` omits the tangent operator of spatial rotations, to show its effect.
     """
 
     def __init__(
@@ -68,7 +69,7 @@ class Stepper:
 
 
 def _tree(bodies: Records, parents: Sequence[int]) -> None:
-    """Parents, first children and their next ones."""
+    """Write the tree into the records: parent, first child and next sibling of each body."""
     child, following = [-1] * len(parents), [-1] * len(parents)
     last: dict[int, int] = {}
     for place, parent in enumerate(parents):
@@ -83,7 +84,7 @@ def _tree(bodies: Records, parents: Sequence[int]) -> None:
 
 
 def size_of(parts: Sequence[Part]) -> float:
-    """Largest distance of hinges on one body, or of a mass centre from its hinge, m."""
+    """Size of a scene, m: largest distance of hinges on a body, or of a mass centre from a hinge."""
     places = [hypot(*part.hung.point) for part in parts]
     centres = [hypot(*part.first) / part.mass for part in parts if part.mass > 0]
     found = max([*places, *centres]) or 1.0

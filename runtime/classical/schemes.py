@@ -1,4 +1,4 @@
-"""Time maps of the classical discrete-time method by their names.
+"""Integration schemes of the classical discrete-time method, by name.
 
 With auxiliary accelerations a (Arnold, Bruls, Multibody Syst. Dyn. 18 (2007) 185-202):
 
@@ -16,7 +16,7 @@ from mstmm.errors import SceneError
 
 @dataclass(frozen=True)
 class Scheme:
-    """Numbers of a time map; `theta` above 1 makes longer steps and goes back (Wilson)."""
+    """Parameters of a scheme; with `theta` > 1 a longer step is interpolated back (Wilson)."""
 
     alpha_m: float
     alpha_f: float
@@ -26,29 +26,37 @@ class Scheme:
 
 
 def newmark(gamma: float) -> Scheme:
-    """Newmark, J. Eng. Mech. Div. 85 (1959); gamma = 1/2 is the trapezoidal rule."""
+    """Newmark scheme: J. Eng. Mech. Div. 85 (1959); gamma = 1/2 is the trapezoidal rule."""
     return Scheme(0.0, 0.0, (gamma + 0.5) ** 2 / 4, gamma)
 
 
 def hht(alpha: float) -> Scheme:
-    """Hilber, Hughes, Taylor, Earthq. Eng. Struct. Dyn. 5 (1977); alpha from 0 to 1/3 damps."""
+    """HHT scheme: Hilber, Hughes, Taylor, Earthq. Eng. Struct. Dyn. 5 (1977).
+
+    alpha from 0 to 1/3 adds damping.
+    """
     return Scheme(0.0, alpha, (1 + alpha) ** 2 / 4, 0.5 + alpha)
 
 
 def generalised_alpha(radius: float) -> Scheme:
-    """Chung, Hulbert, J. Appl. Mech. 60 (1993); `radius` is that of unresolved vibrations, 0 to
-    1."""
+    """Generalised-alpha scheme: Chung, Hulbert, J. Appl. Mech. 60 (1993).
+
+    `radius`, 0 to 1, is the spectral radius at infinity (unresolved vibrations).
+    """
     alpha_m, alpha_f = (2 * radius - 1) / (radius + 1), radius / (radius + 1)
     gamma = 0.5 + alpha_f - alpha_m
     return Scheme(alpha_m, alpha_f, (gamma + 0.5) ** 2 / 4, gamma)
 
 
 def wilson(theta: float) -> Scheme:
-    """Wilson, Farhoomand, Bathe, Earthq. Eng. Struct. Dyn. 1 (1973): linear acceleration."""
+    """Wilson-theta scheme: linear acceleration.
+
+    Wilson, Farhoomand, Bathe, Earthq. Eng. Struct. Dyn. 1 (1973).
+    """
     return Scheme(0.0, 0.0, 1 / 6, 0.5, theta)
 
 
-#: Name -> maker, its number where none is given, the numbers it takes and what they are called.
+#: Name -> constructor, default, range and name of its parameter.
 SCHEMES: dict[str, tuple[Callable[[float], Scheme], float, tuple[float, float], str]] = {
     "generalised-alpha": (generalised_alpha, 0.8, (0.0, 1.0), "radius"),
     "hht": (hht, 0.05, (0.0, 1 / 3), "alpha"),
@@ -60,14 +68,14 @@ DEFAULT = "generalised-alpha"
 
 
 def scheme_of(text: str) -> Scheme:
-    """The scheme of "name" or "name:number", such as "hht:0.3".
+    """Scheme of a text "name" or "name:number", such as "hht:0.3".
 
-    Raises SceneError naming those that exist, or the numbers that one takes.
+    Raises SceneError that lists the existing schemes, or the range of the parameter.
     """
     name, colon, given = (text or DEFAULT).partition(":")
     if name not in SCHEMES:
         known = ", ".join(SCHEMES)
-        raise SceneError(f'scheme "{text}" does not exist; known are {known}, as in hht:0.3')
+        raise SceneError(f'scheme "{text}" does not exist; use one of {known}, as in hht:0.3')
     make, usual, (least, most), called = SCHEMES[name]
     try:
         number = float(given) if colon else usual

@@ -1,1 +1,1 @@
-"""What the operating system gives: files, locks, processes and interrupts."""
+"""Services of the operating system: files, locks, processes and interrupts."""

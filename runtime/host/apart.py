@@ -1,7 +1,7 @@
-"""Long work of compiled libraries in a process of its own, which an interrupt ends at once.
+"""Run long calls of compiled libraries in a separate process that an interrupt ends at once.
 
-A library that keeps Python's lock until it is done, as a sparse factorisation does, lets no signal
-through: an interrupt would wait for its end, and so would whatever shows that something goes on.
+A library that holds Python's global lock until it returns, such as a sparse factorisation, blocks
+signals: an interrupt and every progress display would wait for its end.
 """
 
 from __future__ import annotations
@@ -35,11 +35,12 @@ with open(sys.argv[2], "wb") as file:
 
 
 def apart(what: str, work: Callable[..., Outcome], *arguments: Any) -> Outcome:
-    """work(*arguments), done by another Python that is killed when this one is interrupted.
+    """Compute work(*arguments) in another Python process that an interrupt of this one kills.
 
-    `work` is a function of a module, and it, its arguments and what it gives or raises go through
-    `pickle`.  Within an embedded Python, which cannot start another one, it is called right here.
-    Raises EnvironmentFailure, naming `what` is computed, if the process comes to a violent end.
+    `work` is a function of a module; it, its arguments and its result or exception are pickled.
+    An embedded Python, which cannot start another process, calls it directly.
+    Raises EnvironmentFailure with `what`, the name of the computed quantity, if the process crashes
+    or is killed.
     """
     if not sys.executable:
         return work(*arguments)
@@ -60,11 +61,11 @@ def apart(what: str, work: Callable[..., Outcome], *arguments: Any) -> Outcome:
 
 def _last_line(said: str) -> str:
     lines = said.strip().splitlines()
-    return lines[-1] if lines else "without a word"
+    return lines[-1] if lines else "no message"
 
 
 def _gone(what: str, how: str) -> EnvironmentFailure:
     return EnvironmentFailure(
-        f"{what}: the process that computed it ended before its time ({how}); where memory ran "
-        "out, take a coarser mesh"
+        f"{what}: the process that computed it ended unexpectedly ({how}); if memory ran out, use "
+        "a coarser mesh"
     )

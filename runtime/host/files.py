@@ -1,4 +1,4 @@
-"""Reading files that are files, and writing them so that a reader never sees half of one."""
+"""Read regular files, and write files atomically so that no reader sees an incomplete one."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .lock import held_by_nobody, locked
 
 
 def path_of(given: Any) -> Path:
-    """The path that a name or a path-like object is; SceneError for anything else."""
+    """Convert a name or a path-like object to a path; SceneError for anything else."""
     try:
         return Path(given)
     except TypeError:
@@ -24,18 +24,18 @@ def path_of(given: Any) -> Path:
 
 
 def refuse_special(path: Path, where: str) -> None:
-    """SceneError for a folder, a device or a named pipe, which a reader would wait on for ever.
+    """Raise SceneError for a folder, a device or a named pipe, which could block a reader forever.
 
-    A file that is missing is left to whoever opens it.
+    A missing file passes: opening it raises its own error.
     """
-    if os.path.exists(path) and not os.path.isfile(path):  # False where a folder is closed to us
+    if os.path.exists(path) and not os.path.isfile(path):  # exists: False without access rights
         raise SceneError(f"{where}: {path} is not a regular file; give the path of one")
 
 
 def read_arrays(path: Path) -> dict[str, Any]:
     """All arrays of an .npz file by name.
 
-    Raises FileNotFoundError, and ValueError with a reason for what is no such file or damaged.
+    Raises FileNotFoundError, and ValueError with a reason if the file is damaged or no .npz file.
     """
     import numpy as np
 
@@ -44,17 +44,17 @@ def read_arrays(path: Path) -> dict[str, Any]:
             return {name: file[name] for name in file.files}
     except FileNotFoundError:
         raise
-    except Exception as error:  # of a dozen kinds, for bytes that nobody wrote
+    except Exception as error:  # damaged bytes cause a dozen kinds of exceptions
         raise ValueError(str(error) or type(error).__name__) from error
 
 
-#: How the seal of a file begins; the hash of all before it follows.
+#: Prefix of a file's seal; the hash of all bytes before the seal follows.
 _SEAL = b"\nmstmm sha256 "
 _SEALED = len(_SEAL) + 64
 
 
 def seal(path: Path) -> None:
-    """Append the hash of a file to it.  Readers of formats that know where they end ignore it."""
+    """Append a file's hash to the file; readers of formats that store their own length ignore it."""
     with path.open("rb") as file:
         found = hashlib.file_digest(file, "sha256").hexdigest()
     with path.open("ab") as file:
@@ -62,9 +62,9 @@ def seal(path: Path) -> None:
 
 
 def seal_is_broken(path: Path) -> bool:
-    """True if a file ends with a seal and is not what was sealed; False also without a seal.
+    """True if the seal at the end of a file contradicts its content; False without a seal.
 
-    Libraries that read binary formats may crash or hang on damaged files, and cannot be caught.
+    Libraries that read binary formats may crash or hang on damaged files, where no exception helps.
     """
     size = path.stat().st_size - _SEALED
     if size < 0:
@@ -85,18 +85,19 @@ def seal_is_broken(path: Path) -> bool:
 #: Bytes read at a time.
 _PART_OF_FILE = 2**20
 
-#: What is being written lies beside its place, PART, with a LOCK that ends with the writer.
+#: An unfinished file, PART, is in the folder of its target, with a LOCK that ends with the writer.
 _MARK, _LOCK, _PART = ".mstmm-", ".lock", ".part"
 
-#: A sweeper holds a lock for less than this, s.
+#: Time limit for a lock, s; a process that removes old files holds one for less.
 _PATIENCE = 5.0
 
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path` that takes its name, safely on the disk, when the block ends
-    well.  What killed writers left in that folder is swept first.
+    """Yield a temporary file that replaces `path` when the block ends without an exception.
 
+    It is in the same folder and is synchronised to the disk before it replaces the old file.
+    Leftovers of killed writers in that folder are removed first.
     Raises EnvironmentFailure, with the old file untouched, if anything cannot be written.
     """
     try:
@@ -113,15 +114,17 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file so that the old one stays whole until the new one is on the disk; a link of
-    this name is replaced, not followed.  EnvironmentFailure where it cannot be written."""
+    """Write a text file atomically: the old one stays complete until the new one is on the disk.
+
+    A link of this name is replaced, not followed.  EnvironmentFailure if it cannot be written.
+    """
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 @contextlib.contextmanager
 def _aside(folder: Path) -> Iterator[Path]:
-    """Name of a file to be written; the lock is made before that file and removed after it."""
+    """Yield the name of a temporary file; its lock is made before the file and removed after it."""
     lock = folder / f"{_MARK}{secrets.token_hex(8)}{_LOCK}"
     part = lock.with_suffix(_PART)
     try:
@@ -135,7 +138,7 @@ def _aside(folder: Path) -> Iterator[Path]:
 
 
 def sweep(folder: Path) -> None:
-    """Remove what killed writers left in a folder.  Never raises OSError."""
+    """Remove the temporary files of killed writers from a folder.  Never raises OSError."""
     with contextlib.suppress(OSError):
         for lock in [*folder.glob(f"{_MARK}*{_LOCK}")]:
             with contextlib.suppress(OSError), held_by_nobody(lock) as abandoned:

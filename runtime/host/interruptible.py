@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM while something runs that must not be cut off just anywhere."""
+"""Handle Ctrl-C and SIGTERM in code that must not be interrupted at an arbitrary point."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ import threading
 import time
 from typing import Any
 
-#: Signals that ask a run to end with what it has.
+#: Signals upon which a run ends with the samples that it has.
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 
-#: Seconds in which an interrupted run has to come to an end.
+#: Seconds within which an interrupted run must end.
 PATIENCE = 5.0
 
 
 class Interrupt:
-    """Whether a signal has come since a block began: true from then on, and who asks has heard."""
+    """Flag that is true once a signal has arrived in a block; testing it acknowledges the signal."""
 
     def __init__(self) -> None:
         self.heard, self._came = False, False
 
     def come(self) -> None:
-        """A signal is here."""
+        """Record that a signal has arrived."""
         self._came = True
 
     def __bool__(self) -> bool:
@@ -29,18 +29,18 @@ class Interrupt:
         return self._came
 
 
-#: What the blocks that the main thread is in are told by.
+#: Flags of the blocks that the main thread is in, outermost first.
 _open: list[Interrupt] = []
 
 
 class interruptible:
-    """Ctrl-C and SIGTERM are told instead of ending anything, so that no sample is lost.
+    """Context that records Ctrl-C and SIGTERM in a flag instead of ending the program.
 
-    Within another such block both are told: what ends for another reason while a signal comes does
-    not hide it from who has more to do.  Where nobody has heard of it by the end of the outermost
-    one, the signal comes again then: a program of many short runs ends by it, too.  A signal that
-    this process was told to ignore (nohup, a script's background job) stays ignored.
-    Where nobody has asked for PATIENCE, the next signal is a KeyboardInterrupt.
+    A signal sets the flags of all nested blocks, so that an inner block that ends for another
+    reason does not hide it from the outer one.  If no flag has been tested by the end of the
+    outermost block, the signal is raised again: a program of many short runs ends by it, too.
+    A signal that this process ignores (nohup, a script's background job) stays ignored.
+    If no flag is tested for PATIENCE, the next signal raises KeyboardInterrupt.
     """
 
     def __enter__(self) -> Interrupt:
@@ -48,7 +48,7 @@ class interruptible:
         self._before: list[tuple[signal.Signals, Any]] = []
         self._here = threading.get_ident() == threading.main_thread().ident
         if self._here:
-            if not _open:  # else the outermost one's handler tells all
+            if not _open:  # else the handler of the outermost block sets all flags
                 self._handle()
             _open.append(self._told)
         return self._told
@@ -72,7 +72,7 @@ class interruptible:
                 if previous is not None and previous is not signal.SIG_IGN:
                     self._before.append((which, previous))
                     signal.signal(which, self._note)
-        except BaseException:  # a signal that came between
+        except BaseException:  # a signal that arrived between two of these lines
             self._restore()
             raise
 

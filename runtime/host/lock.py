@@ -1,7 +1,8 @@
-"""A lock between processes, by the operating system: it ends with its owner, however that ends.
+"""Lock between processes, by the operating system: it ends with its owner, even a killed one.
 
-It saves work and never guards correctness: what is built goes into a folder of its own and is
-renamed when it is whole.  So whoever waits too long, or meets a file system without locks, builds.
+It saves work and never guards correctness: a build happens in a separate folder, which is renamed
+when it is complete.  After a timeout, or on a file system without locks, the caller therefore
+builds without the lock.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-#: Pause between two tries, s.
+#: Pause between two attempts, s.
 _PAUSE = 0.02
 
 _HELD = (errno.EAGAIN, errno.EACCES)
@@ -23,9 +24,9 @@ _HELD = (errno.EAGAIN, errno.EACCES)
 
 @contextlib.contextmanager
 def locked(path: Path, timeout: float) -> Iterator[str]:
-    """Hold the lock file `path`; waits at most `timeout` s for its owner.
+    """Hold the lock file `path` in a block; waits at most `timeout` s for its owner.
 
-    Yields "", or a remark on why the lock is not held.  The file says who holds it.
+    Yields "", or the reason that the lock is not held.  The file names the process that holds it.
     """
     handle, remark = _acquired(path, timeout)
     try:
@@ -39,7 +40,7 @@ def locked(path: Path, timeout: float) -> Iterator[str]:
 
 @contextlib.contextmanager
 def held_by_nobody(path: Path) -> Iterator[bool]:
-    """True, with the lock held, if nobody holds it (or the file is not there)."""
+    """Yield True, with the lock held, if no process holds it (or the file does not exist)."""
     try:
         handle = os.open(path, os.O_RDWR | os.O_CLOEXEC)
     except FileNotFoundError:
@@ -59,7 +60,7 @@ def _acquired(path: Path, timeout: float) -> tuple[int | None, str]:
     while True:
         handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         got = _try(handle)
-        if got and os.fstat(handle).st_nlink > 0:  # else: somebody tidied the file away meanwhile
+        if got and os.fstat(handle).st_nlink > 0:  # else: another process removed the file
             _sign(handle)
             return handle, ""
         owner = "" if got else _owner(handle)
@@ -73,7 +74,7 @@ def _acquired(path: Path, timeout: float) -> tuple[int | None, str]:
 
 
 def _try(handle: int) -> bool | None:
-    """True if the lock is ours now, False if another's, None where there are no locks."""
+    """True if this process has the lock now, False if another has it, None without locks."""
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
@@ -82,7 +83,7 @@ def _try(handle: int) -> bool | None:
 
 
 def _sign(handle: int) -> None:
-    """Leave who we are, for the message of those who wait; a full disk does not matter."""
+    """Write the identity of this process for the message of waiting ones; ignore a full disk."""
     since = time.strftime("%Y-%m-%d %H:%M:%S")
     text = json.dumps({"pid": os.getpid(), "host": os.uname().nodename, "since": since})
     with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""Another program, run so that it cannot outlive or outwait us."""
+"""Run another program with a time limit, so that it cannot outlive this process."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from pathlib import Path
 #: Bytes of a program's output that are kept; the rest is read and dropped.
 _KEPT = 20_000
 
-#: Waits until nobody can write to its input any more (we are gone, whatever took us), and takes its
-#: process group along.
+#: Waits until its input is closed, which happens whenever this process ends, and then kills its
+#: process group.
 _WATCHDOG = "read -r end; kill -s KILL 0"
 
-#: Where the system does not announce the end of a process: pause between two looks, s.
+#: Pause between two checks, s, where the system does not signal the end of a process.
 _PAUSE = 0.01
 
 
 class Hanging(Exception):
-    """The program did not end within its time; it and all it started were killed."""
+    """The program did not end within its time limit; it and its child processes were killed."""
 
 
 @dataclass(frozen=True)
 class Ended:
-    """Exit code of a program, -n where signal n ended it, and the beginning of what it said."""
+    """Exit code of a program, -n if signal n ended it, and the beginning of its output."""
 
     code: int
     said: str
 
     def signal(self) -> str:
-        """Name of the signal that ended it."""
+        """Name of the signal that ended the program."""
         known = -self.code in set(signal.Signals)
         return signal.Signals(-self.code).name if known else f"signal {-self.code}"
 
@@ -43,13 +43,12 @@ class Ended:
 def run(command: Sequence[str], folder: Path, timeout: float, **environment: str) -> Ended:
     """Run `command` in `folder` for at most `timeout` s, with changes to the environment.
 
-    The program gets a process group with a watchdog; whenever it does not end by itself and well
-    (time, Ctrl-C, a failure), the whole group is killed, so that no compiler pass goes on writing;
-    so it is when this process is killed.  Raises Hanging, and OSError if the program cannot be
-    started.
+    The program gets a process group with a watchdog.  Unless it ends normally, the whole group is
+    killed (time limit, Ctrl-C, failure, this process killed), so that no compiler pass continues to
+    write.  Raises Hanging, and OSError if the program cannot be started.
     """
-    # A pipe, for the disk may be full; we stop reading when the program itself has ended, for a
-    # grandchild could keep the pipe open for ever.
+    # Use a pipe because the disk may be full.  Stop reading when the program itself has ended
+    # because a grandchild could keep the pipe open forever.
     reader, writer = os.pipe()
     try:
         os.set_blocking(reader, False)
@@ -76,8 +75,10 @@ def run(command: Sequence[str], folder: Path, timeout: float, **environment: str
 
 @contextlib.contextmanager
 def _watched_group() -> Iterator[int]:
-    """Number of a process group that is killed if this process ends inside the block, whenever that
-    is: the watchdog is in it before anybody else.  0, a group of one's own, without a watchdog."""
+    """Yield the number of a process group that is killed if this process ends inside the block.
+
+    The watchdog joins the group before the program.  0, a new group, if no watchdog can start.
+    """
     reader, writer = os.pipe()
     with contextlib.ExitStack() as ends:
         ends.callback(os.close, writer)
@@ -92,12 +93,12 @@ def _watched_group() -> Iterator[int]:
         finally:
             os.close(reader)
         ends.callback(dog.wait)
-        ends.callback(dog.kill)  # before it can see the end of its input
+        ends.callback(dog.kill)  # before it can read the end of its input
         yield dog.pid
 
 
 def _said_until_the_end(process: subprocess.Popen[bytes], reader: int, timeout: float) -> bytes:
-    """What the program writes; Hanging if it does not end in time."""
+    """Output of the program until it ends; raises Hanging if it does not end in time."""
     said = bytearray()
     deadline = time.monotonic() + timeout
     poll = select.poll()
@@ -107,7 +108,7 @@ def _said_until_the_end(process: subprocess.Popen[bytes], reader: int, timeout: 
             left = deadline - time.monotonic()
             ready = {handle for handle, _ in poll.poll(max(0.0, min(left, announced)) * 1000)}
             if reader in ready and not _take(reader, said):
-                poll.unregister(reader)  # all have closed it: nothing more to come
+                poll.unregister(reader)  # all writers have closed it: the output is complete
             if process.poll() is not None:
                 _take(reader, said)
                 return bytes(said)
@@ -117,7 +118,7 @@ def _said_until_the_end(process: subprocess.Popen[bytes], reader: int, timeout: 
 
 @contextlib.contextmanager
 def _announced_end(process: subprocess.Popen[bytes], poll: select.poll) -> Iterator[float]:
-    """Let `poll` wake up when the process ends; yields the longest pause to make in between, s."""
+    """Wake `poll` when the process ends; yields the longest pause between two checks, s."""
     try:
         handle = os.pidfd_open(process.pid)
     except (AttributeError, OSError):  # not on this system
@@ -131,9 +132,9 @@ def _announced_end(process: subprocess.Popen[bytes], poll: select.poll) -> Itera
 
 
 def _take(reader: int, said: bytearray) -> bool:
-    """Read what is there; False when the other side is closed."""
+    """Read the available output; False when all writers have closed the pipe."""
     with contextlib.suppress(BlockingIOError):
-        for _ in range(64):  # then look at the clock again: some programs never stop talking
+        for _ in range(64):  # then check the time again: some programs never stop writing
             chunk = os.read(reader, 65536)
             if not chunk:
                 return False

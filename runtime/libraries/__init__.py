@@ -1,1 +1,1 @@
-"""Compiled libraries: compilers, the cache, building, testing and opening them."""
+"""Compiled libraries: compilers, cache, build, test and loading."""

@@ -1,7 +1,7 @@
-"""Libraries made once and used by many processes: look, lock, build aside, test, rename.
+"""Build of libraries that many processes share: look up, lock, build, test, rename.
 
-Used by the cache of fused libraries and by the store of users' elements; both hand over a place (a
-folder to be) and an `Order`.
+Used by the cache of fused libraries and by the store of user-defined elements.  Both pass a place
+(the folder to be created) and an `Order`.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from . import toolchain
 from .entry import Damaged, Entry
 from .toolchain import Compiler
 
-#: Folders in which something is being built start so.
+#: Prefix of folders in which a library is being built.
 UNFINISHED = ".building-"
 
-#: Lock files end so.
+#: Suffix of lock files.
 LOCK = ".lock"
 
-#: What is younger than this, s, is taken for being built even if its lock is free.
+#: A folder younger than this, s, counts as being built even if its lock is free.
 _FRESH = 60.0
 
-#: What the loader says where the file system lets nothing be executed.
+#: Message of the loader on a file system without execute permission.
 _NOEXEC = "failed to map segment"
 _DOCTOR = "see mstmm doctor"
 
@@ -41,12 +41,13 @@ _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 @dataclass(frozen=True)
 class Order:
-    """What to build: `name` is the library's stem, `key` says all that decides its content.
+    """Description of a library to build.
 
-    `sources` makes the texts, file name -> text, and runs only when a library is built; files that
-    end in .c are compiled together with `flags`, of which those in `optional` are left out where
-    the compiler does not know them.  `symbols` must be found in the library.
-    `variable` names the environment variable by which a user moves the folder.
+    `name` is the stem of the library's file name, `key` identifies all that decides its content.
+    `sources` generates the texts, file name -> text, and runs only when a library is built.  Files
+    that end in .c are compiled together with `flags`; flags in `optional` are omitted if the
+    compiler does not support them.  The library must export `symbols`.
+    `variable` names the environment variable by which a user chooses the folder.
     """
 
     name: str
@@ -61,10 +62,10 @@ class Order:
 
 @dataclass(frozen=True)
 class Built:
-    """A library ready to be opened.
+    """Library that is ready to be loaded.
 
-    `how` is "cached" or "compiled"; `seconds` is what the compiler took, then or now; `note` is ""
-    or one line worth telling (a damaged library was replaced).
+    `how` is "cached" or "compiled"; `seconds` is the compile time, s, also of a cached library;
+    `note` is "" or a line for the user (a damaged library was replaced).
     """
 
     path: Path
@@ -75,7 +76,7 @@ class Built:
 
 
 def found(place: Path, key: str) -> Built | None:
-    """The library at `place`, None if there is none.  Damaged if it is there and not right."""
+    """Find the library at `place`, None if there is none.  Raises Damaged if its check fails."""
     entry = entries.read(place, key)
     if entry is None:
         return None
@@ -88,15 +89,15 @@ def _built(entry: Entry, how: str, note: str) -> Built:
     return Built(entry.library, str(entry.about["key"]), how, seconds, note)
 
 
-#: Failures of this process: a compiler that hangs is waited for once.
+#: Failed builds of this process: each fails at once when repeated, without a second timeout.
 _failed: dict[tuple[Path, str, Compiler], str] = {}
 
 
 def fetched(place: Path, order: Order, timeout: float) -> Built:
-    """The library at `place`, built if it is missing or damaged.
+    """Get the library at `place`; build it if it is missing or damaged.
 
-    Raises EnvironmentFailure, one line with a way out, if it cannot be built; nothing is left
-    behind then, and this process does not try the same with the same compiler again.
+    Raises EnvironmentFailure, one line with a remedy, if it cannot be built.  All files are removed
+    then, and this process does not repeat the build with the same compiler.
     """
     built, _ = _look(place, order.key)
     if built is not None:
@@ -115,7 +116,7 @@ def fetched(place: Path, order: Order, timeout: float) -> Built:
 
 
 def _look(place: Path, key: str) -> tuple[Built | None, str]:
-    """The library, and what is wrong with it."""
+    """Library at `place` or None, and the damage of an entry there, or ""."""
     try:
         return found(place, key), ""
     except Damaged as damage:
@@ -126,12 +127,12 @@ def _fetched_alone(place: Path, order: Order, compiler: Compiler, timeout: float
     from ..host.lock import locked
 
     with locked(place.parent / f".{place.name}{LOCK}", timeout) as remark:
-        built, damage = _look(place, order.key)  # by the one we waited for
+        built, damage = _look(place, order.key)  # perhaps built by the previous owner of the lock
         if built is not None:
             return built
         notes = [remark] if remark else []
         if damage:
-            notes.append(f"the library {place.name} was built again: {damage}")
+            notes.append(f"the library {place.name} was rebuilt: {damage}")
         with _workshop(place.parent) as folder:
             entry = _made(folder, order, compiler, timeout)
             return _built(_moved(entry, place), "compiled", "; ".join(notes))
@@ -139,7 +140,7 @@ def _fetched_alone(place: Path, order: Order, compiler: Compiler, timeout: float
 
 @contextlib.contextmanager
 def _workshop(parent: Path) -> Iterator[Path]:
-    """A folder in the place's own file system, gone in the end; locked as long as we live."""
+    """Yield a temporary folder in the file system of `parent`, locked until the block ends."""
     import tempfile
 
     from ..host.lock import locked
@@ -155,7 +156,7 @@ def _workshop(parent: Path) -> Iterator[Path]:
 
 
 def _made(folder: Path, order: Order, compiler: Compiler, timeout: float) -> Entry:
-    """Write, compile, test and describe, all inside `folder`."""
+    """Write, compile and test a library and write its description, all inside `folder`."""
     from . import self_test
 
     work = folder.parent / "work"
@@ -173,8 +174,8 @@ def _made(folder: Path, order: Order, compiler: Compiler, timeout: float) -> Ent
     if wrong:
         way_out = f"set {order.variable} to another folder" if _NOEXEC in wrong else _DOCTOR
         raise EnvironmentFailure(
-            f"what the C compiler {compiler.command[0]} made of {sources[0].name} cannot be used: "
-            f"{wrong}; {way_out}"
+            f"the library that the C compiler {compiler.command[0]} built from {sources[0].name} "
+            f"cannot be used: {wrong}; {way_out}"
         )
     entries.keep_text(folder, texts)
     about = {
@@ -187,7 +188,7 @@ def _made(folder: Path, order: Order, compiler: Compiler, timeout: float) -> Ent
 
 
 def _moved(entry: Entry, place: Path) -> Entry:
-    """Give a finished entry its place by one rename; what was there, damaged, goes first."""
+    """Move a finished entry to its place by one rename; a damaged entry there is removed first."""
     for attempt in range(3):
         try:
             os.rename(entry.folder, place)
@@ -195,30 +196,30 @@ def _moved(entry: Entry, place: Path) -> Entry:
         except OSError as error:
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
                 raise
-        # Somebody without the lock was faster, or a damaged entry is in the way.
+        # Another process without the lock was faster, or a damaged entry is there.
         with contextlib.suppress(Damaged):
             there = entries.read(place, str(entry.about["key"]))
             if there is not None:
                 return there
         with contextlib.suppress(FileNotFoundError):
             os.rename(place, entry.folder.parent / f"replaced{attempt}")
-    raise OSError(errno.EBUSY, "other processes keep writing there")
+    raise OSError(errno.EBUSY, "other processes write there repeatedly")
 
 
 def _unwritable(place: Path, order: Order, error: OSError) -> str:
     if error.errno in _NO_ROOM:
         return (
-            f"there is no room for a compiled library in {place.parent} ({error.strerror}); "
-            f"make room, or set {order.variable} to a folder with room"
+            f"no disk space for a compiled library in {place.parent} ({error.strerror}); "
+            f"free space, or set {order.variable} to a folder with space"
         )
     return (
         f"nothing can be written to {place.parent} ({error.strerror}); "
-        f"set {order.variable} to a folder of your own"
+        f"set {order.variable} to a folder that you own"
     )
 
 
 def remove(place: Path) -> int:
-    """Remove an entry so that it is gone at once; returns its bytes.  Never raises OSError."""
+    """Remove an entry atomically; returns its size in bytes.  Never raises OSError."""
     import tempfile
 
     size = tree_size(place)
@@ -233,7 +234,7 @@ def remove(place: Path) -> int:
 
 
 def remove_leftovers(parent: Path, age: float = _FRESH) -> int:
-    """Remove what killed processes left unfinished; returns how many there were."""
+    """Remove unfinished builds of killed processes; returns their number."""
     from ..host.lock import held_by_nobody
 
     count = 0
@@ -249,7 +250,7 @@ def remove_leftovers(parent: Path, age: float = _FRESH) -> int:
 
 
 def tree_size(folder: Path) -> int:
-    """Bytes of the files in a folder and below."""
+    """Total size in bytes of the files in a folder and its subfolders."""
     total = 0
     for place, _, names in os.walk(folder):
         for name in names:

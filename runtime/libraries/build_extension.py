@@ -1,12 +1,12 @@
-"""Builds `mstmm.generated._kernels` from the C of several rooms; also reads its declarations.
+"""Build `mstmm.generated._kernels` from the C of several packages, and read its declarations.
 
 setup.py executes this file inside pip's build isolation, where mstmm cannot be imported: it uses
 the standard library, cffi and the headers of numpy, and paths relative to the project's root.
 
-The C is generated (elements and kernels) and written by hand (the engine, the integration).  What
-Python may call is written once, in the headers of both, between the markers `/* cdef begin */` and
-`/* cdef end */`: plain declarations, no preprocessor lines but integer `#define`s.  A header's own
-`#include "other.h"` lines decide the order.
+The C is generated (elements and kernels) and written by hand (engine, integration).  The
+declarations for Python are in the headers, between the markers `/* cdef begin */` and
+`/* cdef end */`: plain declarations, no preprocessor lines except integer `#define`s.  The
+`#include "other.h"` lines of a header decide the order.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ from cffi import FFI
 
 GENERATED = Path("generated")
 
-#: Folders of C that the module is built from, and a folder of which it includes text.
+#: Folders with the C of the module, and a folder whose text that C includes.
 FOLDERS = (
     GENERATED, Path("runtime/engine/c"), Path("runtime/integrate/c"), Path("runtime/classical/c"),
     Path("runtime/engine/states/c"),
 )  # fmt: skip
 PASTED = Path("templates")
-#: The unit that others are part of, which are not compiled by themselves.
+#: Unit that includes other .c files, which are not compiled separately.
 PASSES = Path("runtime/engine/c/passes.c")
 
 MODULE = "mstmm.generated._kernels"
 
 # -ffp-contract=off: a * b + c is rounded twice on every machine, so results do not depend on
 # whether it has fused multiply-add, and the error bounds of the checks (one rounding per operation
-# of the IR) hold.  -fno-math-errno: sqrt is one instruction; no value changes.  -g0: what a Python
-# was built with asks for debugging information, which is nine tenths of the module's size.
+# of the IR) hold.  -fno-math-errno: sqrt is one instruction; no value changes.  -g0: the flags of
+# Python's own build request debugging information, nine tenths of the module's size.
 COMPILE_ARGS = (
     "-std=c17", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-g0",
 )  # fmt: skip
 WARNING_ARGS = ("-Wall", "-Wextra", "-Wno-unused-parameter")
 
-#: The string in the module that tells the C text it was compiled from.
+#: String in the module that identifies the C text from which it was compiled.
 BUILT_FROM = "mstmm_built_from"
 
 _BLOCK = re.compile(r"/\* cdef begin \*/(.*?)/\* cdef end \*/", re.DOTALL)
@@ -48,9 +48,9 @@ _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 
 
 def headers(folders: Sequence[Path]) -> list[Path]:
-    """The headers of `folders`, each after those it includes; by name where that leaves a choice.
+    """Headers of `folders`, each after the headers that it includes, otherwise sorted by name.
 
-    ValueError for a name that stands in two folders, and for headers that include each other.
+    ValueError for a name in two folders, and for headers that include each other.
     """
     named: dict[str, Path] = {}
     for header in (header for folder in folders for header in sorted(folder.glob("*.h"))):
@@ -61,7 +61,7 @@ def headers(folders: Sequence[Path]) -> list[Path]:
 
     def visit(header: Path, including: tuple[Path, ...]) -> None:
         if header in including:
-            raise ValueError(f"{header} includes itself by way of {including[-1]}")
+            raise ValueError(f"{header} includes itself through {including[-1]}")
         if header in ordered:
             return
         for name in _INCLUDE.findall(header.read_text()):
@@ -74,7 +74,7 @@ def headers(folders: Sequence[Path]) -> list[Path]:
 
 
 def cdef(header: Path) -> str:
-    """The declarations that `header` offers to Python; ValueError where a marker has no partner."""
+    """Declarations of `header` for Python; ValueError if the markers do not pair up."""
     text = header.read_text()
     blocks = _BLOCK.findall(text)
     if not len(blocks) == text.count("/* cdef begin */") == text.count("/* cdef end */"):
@@ -83,9 +83,9 @@ def cdef(header: Path) -> str:
 
 
 def built_from(root: Path) -> str:
-    """SHA-256 of the C in the folders below `root`; "" where there is no manifest of the generated.
+    """SHA-256 of the C in the folders below `root`; "" without a manifest of the generated C.
 
-    The manifest tells the generated text by hashes of its own; the rest is read.
+    The manifest contains hashes of the generated text; the other files are read.
     """
     manifest = root / GENERATED / "manifest.json"
     if not manifest.is_file():
@@ -97,18 +97,18 @@ def built_from(root: Path) -> str:
 
 
 def written_by_hand(root: Path) -> list[Path]:
-    """The C below `root` that is not generated, folder by folder, by name."""
+    """C files below `root` that are not generated, by folder and name."""
     folders = [root / folder for folder in FOLDERS if folder != GENERATED]
     paths = [path for folder in folders for path in sorted(folder.glob("*.[ch]"))]
     return [*paths, *sorted((root / PASTED).glob("*.c"))]
 
 
 def ffibuilder() -> FFI:
-    """The extension module of the prebuilt kernels; called by setup.py, in the project's root."""
+    """Define the extension module of the prebuilt kernels; for setup.py, in the project's root."""
     import numpy as np  # its headers, when the module is built
 
     if not any(GENERATED.glob("*.c")):
-        raise FileNotFoundError(f"{GENERATED}/ holds no C source; run `python -m mstmm generate`")
+        raise FileNotFoundError(f"no C source in {GENERATED}/; run `python -m mstmm generate`")
     sources = [source for folder in FOLDERS for source in sorted(folder.glob("*.c"))]
     part = _INCLUDE.findall(PASSES.read_text()) if PASSES.is_file() else ()
     found, parts = headers(FOLDERS), [source for source in sources if source.name in part]

@@ -1,9 +1,9 @@
-"""The cache of compiled libraries: one entry per content, shared by all processes of a user.
+"""Cache of compiled libraries: one entry per content, shared by all processes of a user.
 
-The key is a hash of everything that decides the machine code: what the text is made from, the
-flags, the compiler (its file, not its answer: no process runs on a hit), the processor, the
-platform, mstmm.  So nothing in here is ever out of date; what is not asked for any more is removed
-when the cache grows beyond its limit.
+The key is a hash of everything that decides the machine code: the sources of the text, the flags,
+the compiler (its file, not its version output: a hit runs no process), the processor, the platform,
+mstmm.  No entry can therefore be out of date.  When the cache exceeds its limit, the least recently
+used entries are removed.
 """
 
 from __future__ import annotations
@@ -33,20 +33,22 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a library is made of.
+    """Recipe of a compiled library.
 
     Args:
         name: readable stem of its files, such as "fused".
-        identity: everything that decides the text, known without printing it: hashes of the
+        identity: everything that decides the text, available without generating it: hashes of the
             structure, of the generator and the kernels, the ABI of the descriptor, scalar type,
             lanes.
-        sources: makes the text, file name -> content, for a key that the text may carry; runs
-            only when a library is built.  Files that end in .c are compiled, others lie beside.
-        flags: of the compiler, besides -fPIC and -shared.
-        optional: those of the flags that make code faster and may be left out where the compiler
-            does not know them.
-        symbols: names that the library must export.  If it exports `int mstmm_self_test(void)` as
-            well, that is called once after the build, in a process of its own: 0 if all is right.
+        sources: generates the text, file name -> content, for a key that the text may contain;
+            runs only when a library is built.  Files that end in .c are compiled, others are only
+            written to the same folder.
+        flags: of the compiler, in addition to -fPIC and -shared.
+        optional: flags that make code faster and are omitted if the compiler does not support
+            them.
+        symbols: names that the library must export.  If it also exports
+            `int mstmm_self_test(void)`, that is called once after the build, in a separate
+            process; 0 is success.
     """
 
     name: str
@@ -58,7 +60,7 @@ class Recipe:
 
 
 def find(recipe: Recipe) -> Built | None:
-    """The library if it is in the cache and whole; nothing is compiled.  Never raises."""
+    """Find a valid library in the cache without compiling, else None.  Never raises."""
     try:
         place, order = _placed(recipe)
         return found(place, order.key)
@@ -67,14 +69,14 @@ def find(recipe: Recipe) -> Built | None:
 
 
 def library(recipe: Recipe, *, timeout: float | None = None) -> Built:
-    """The library of a recipe, from the cache or built now.
+    """Library of a recipe, from the cache or newly built.
 
     `timeout` limits the compiler, s (300 by default, $MSTMM_COMPILE_TIMEOUT overrides the default).
-    Raises EnvironmentFailure, one line with a way out: no compiler; one that fails, hangs or is
-    killed; a cache folder that cannot be written, is not ours, or is full;
-    a $MSTMM_CACHE_SIZE that is no size.
+    Raises EnvironmentFailure, one line with a remedy: no compiler; one that fails, hangs or is
+    killed; a cache folder that cannot be written, belongs to another user, or is full;
+    an invalid $MSTMM_CACHE_SIZE.
     """
-    limit()  # a wrong one is told before a compiler runs
+    limit()  # report an invalid limit before a compiler runs
     place, order = _placed(recipe)
     built = fetched(place, order, toolchain.time_limit() if timeout is None else timeout)
     if built.how == "compiled":
@@ -91,13 +93,12 @@ def opened(
     known: Built | None = None,
     timeout: float | None = None,
 ) -> tuple[T, Built]:
-    """`opener(path, key)` of the recipe's library; one that it refuses is built again, once.
+    """Open the library of a recipe with `opener(path, key)`; rebuild it once if that fails.
 
-    `known` is what `find` has just found of it, which is not looked for again.
+    `known` is the result of a preceding `find`, which saves a second search.
 
-    The opener raises OSError (it cannot be loaded) or EnvironmentFailure (its ABI number or key
-    are not the expected ones) after closing what it opened.  Raises EnvironmentFailure if the
-    library built afresh is refused too.
+    The opener raises OSError (it cannot be loaded) or EnvironmentFailure (unexpected ABI number or
+    key) after closing the library.  Raises EnvironmentFailure if the rebuilt library fails too.
     """
     built = library(recipe, timeout=timeout) if known is None else known
     try:
@@ -114,7 +115,7 @@ def opened(
 
 
 def _placed(recipe: Recipe) -> tuple[Path, Order]:
-    """Where the library of a recipe lies, and how it is made."""
+    """Place of the library of a recipe in the cache, and its build order."""
     about = {
         "identity": dict(sorted(recipe.identity.items())),
         "flags": list(recipe.flags),

@@ -1,12 +1,12 @@
-"""One compiled library on disk: a folder with the library, its description and its C text.
+"""Cache entry of one compiled library: a folder with the library, its description and C text.
 
     fused-0123456789abcdef.../
         fused.so        the library
-        entry.json      key, SHA-256 of the library, what it was made of and by which compiler
-        fused.c.gz      the text, to look at; nothing reads it
+        entry.json      key, SHA-256 of the library, its recipe and compiler
+        fused.c.gz      the text, for the user; no code reads it
 
-The folder appears by one rename when all of it is written, so half an entry cannot be met; what
-was cut or changed afterwards is found by the checksum before anything is loaded.
+The folder appears by one rename when it is complete, so that no process reads an incomplete entry.
+The checksum detects later damage before anything is loaded.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ ABOUT = "entry.json"
 
 
 class Damaged(Exception):
-    """An entry that is not what its description says; the text says how, in a few words."""
+    """Entry that contradicts its description; the message says how."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A library whose checksum was right when it was read, and its description."""
+    """Library whose checksum was correct when it was read, and its description."""
 
     folder: Path
     about: dict[str, Any]
@@ -45,9 +45,9 @@ class Entry:
 
 
 def read(folder: Path, key: str | None = None) -> Entry | None:
-    """The entry in `folder`, None if there is none.
+    """Read and verify the entry in `folder`, None if there is none.
 
-    Raises Damaged if it is not whole, or if it is not the entry of `key` (where that is given).
+    Raises Damaged if it is damaged, or if it is not the entry of `key` (if given).
     """
     about = _described(folder)
     if about is None:
@@ -83,14 +83,14 @@ def _described(folder: Path) -> dict[str, Any] | None:
     if any(not isinstance(about.get(name), kind) for name, kind in expected.items()):
         raise Damaged("its description is incomplete")
     if Path(about["library"]).name != about["library"]:
-        raise Damaged("its description names a file elsewhere")
+        raise Damaged("its description names a file in another folder")
     return about
 
 
 def read_private(path: Path) -> bytes:
-    """The content of a regular file that nobody else may write to.
+    """Read a regular file that no other user may write to.
 
-    Raises Damaged for another file or a link, OSError where it cannot be read.
+    Raises Damaged for any other file or a link, OSError if it cannot be read.
     """
     if not is_private(os.lstat(path)):
         raise Damaged(f"others may write to {path.name}, or it is a link")
@@ -102,7 +102,7 @@ def read_private(path: Path) -> bytes:
 
 
 def write(folder: Path, library: str, about: Mapping[str, Any]) -> Entry:
-    """Describe the library that lies in `folder`.  Raises OSError."""
+    """Write the description of the library in `folder`.  Raises OSError."""
     content = (folder / library).read_bytes()
     described = {
         "format": FORMAT, "library": library, "bytes": len(content),
@@ -114,7 +114,7 @@ def write(folder: Path, library: str, about: Mapping[str, Any]) -> Entry:
 
 
 def keep_text(folder: Path, sources: Mapping[str, str]) -> None:
-    """Leave the C text, compressed.  Raises OSError."""
+    """Write the C text, compressed, into `folder`.  Raises OSError."""
     import gzip
 
     for name, text in sources.items():
@@ -123,6 +123,6 @@ def keep_text(folder: Path, sources: Mapping[str, str]) -> None:
 
 
 def used(entry: Entry) -> None:
-    """Note that the entry was used now: the least recently used ones are removed first."""
-    with contextlib.suppress(OSError):  # a cache that can only be read serves just as well
+    """Record that the entry is used now: the least recently used entries are removed first."""
+    with contextlib.suppress(OSError):  # a read-only cache is sufficient
         os.utime(entry.folder / ABOUT)

@@ -1,8 +1,8 @@
-"""Where compiled libraries are kept, and why nobody else can put one there.
+"""Folder of compiled libraries, and the checks that no other user can write to it.
 
-What lies in this folder, or in the store of users' elements, is loaded into the process.  So the
-folder belongs to the user who runs it and nobody else may write to it; anything else is refused,
-with the way out.
+Libraries in this folder, or in the store of user-defined elements, are loaded into the process.
+The folder must therefore belong to the user, and no other user may write to it.  Any other folder
+is rejected, with a remedy.
 """
 
 from __future__ import annotations
@@ -15,31 +15,31 @@ from mstmm.errors import EnvironmentFailure
 
 VARIABLE = "MSTMM_CACHE"
 
-#: Megabytes that the cache may hold; $MSTMM_CACHE_SIZE overrides.
+#: Maximum size of the cache, megabytes; $MSTMM_CACHE_SIZE overrides it.
 LIMIT_VARIABLE = "MSTMM_CACHE_SIZE"
 DEFAULT_LIMIT = 512.0
 
-#: The user who may put a library where all can read it.
+#: User who may write libraries to folders that all can read.
 _ROOT = 0
 
-_WAY_OUT = f"set {VARIABLE} to a folder of your own"
+_WAY_OUT = f"set {VARIABLE} to a folder that you own"
 
 
 def folder() -> Path:
-    """The cache: $MSTMM_CACHE, or the user's cache folder.  EnvironmentFailure without a home."""
+    """Cache folder: $MSTMM_CACHE, or the user's.  EnvironmentFailure without a home folder."""
     named = os.environ.get(VARIABLE)
     if named:
         return Path(named).absolute()
     import platformdirs
 
     place = Path(platformdirs.user_cache_path("mstmm"))
-    if not place.is_absolute():  # no home folder: "~/.cache" would land where we happen to be
+    if not place.is_absolute():  # no home folder: "~/.cache" would be in the current folder
         raise EnvironmentFailure(f"this user has no home folder for a cache; {_WAY_OUT}")
     return place
 
 
 def limit() -> int:
-    """Bytes that the cache may hold.  EnvironmentFailure if the variable is no number."""
+    """Maximum size of the cache in bytes.  EnvironmentFailure if the variable is no number."""
     text = os.environ.get(LIMIT_VARIABLE)
     try:
         megabytes = float(text) if text else DEFAULT_LIMIT
@@ -53,9 +53,10 @@ def limit() -> int:
 
 
 def private_folder() -> Path:
-    """The cache, made if it is missing (0700), and checked.
+    """Cache folder, created if it is missing (mode 0700), and checked.
 
-    Raises EnvironmentFailure if it cannot be made, is not ours, or others may write to it.
+    Raises EnvironmentFailure if it cannot be created, belongs to another user, or others may write
+    to it.
     """
     place = folder()
     try:
@@ -83,24 +84,24 @@ def objection(
     place: Path, status: os.stat_result, what: str = "cache", way_out: str = _WAY_OUT,
     owners: tuple[int, ...] = (),
 ) -> str:  # fmt: skip
-    """Why a folder is no place for libraries; "" if it is one.  `owners` are trusted like us."""
+    """Reason to reject a folder for libraries, or "".  `owners` are further trusted users."""
     if not stat.S_ISDIR(status.st_mode):
         return f"the {what} {place} is not a folder; {way_out}"
     if status.st_uid not in (os.geteuid(), *owners):
         return (
             f"the {what} folder {place} belongs to user {status.st_uid}, you are user "
-            f"{os.geteuid()}: what it holds could be anybody's; {way_out}"
+            f"{os.geteuid()}: its content cannot be trusted; {way_out}"
         )
     if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
         return (
             f"others may write to the {what} folder {place} (mode "
-            f"{stat.S_IMODE(status.st_mode):04o}); chmod 700 it after a look, or {way_out}"
+            f"{stat.S_IMODE(status.st_mode):04o}); inspect it and chmod 700 it, or {way_out}"
         )
     return ""
 
 
 def parent_objection(place: Path, what: str, way_out: str) -> str:
-    """Why somebody else could put another folder into the place of one; "" if nobody can."""
+    """Reason that other users could replace a folder, or ""."""
     for parent in place.resolve().parents:
         status = parent.stat()
         shared = status.st_mode & stat.S_IWOTH and not status.st_mode & stat.S_ISVTX
@@ -113,7 +114,7 @@ def parent_objection(place: Path, what: str, way_out: str) -> str:
 
 
 def is_private(status: os.stat_result) -> bool:
-    """Whether a file or folder, no link, is ours or root's and closed to other writers."""
+    """True for a file or folder, no link, of this user or root that no other user may write to."""
     kept = stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)
     ours = status.st_uid in (os.geteuid(), _ROOT)
     return kept and ours and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)

@@ -1,4 +1,4 @@
-"""What -march=native sees of this machine: a library built for one processor may crash another."""
+"""Processor features that -march=native uses: a library for one processor may crash on another."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 from functools import cache
 from pathlib import Path
 
-#: Lines of /proc/cpuinfo that stay as they are while the machine runs: x86, then ARM, then others.
+#: Lines of /proc/cpuinfo that do not change while the machine runs: x86, then ARM, then others.
 _LASTING = (
     "vendor_id", "cpu family", "model", "model name", "stepping", "flags",
     "CPU implementer", "CPU architecture", "CPU variant", "CPU part", "CPU revision", "Features",
@@ -16,9 +16,9 @@ _LASTING = (
 
 @cache
 def features(source: Path = Path("/proc/cpuinfo")) -> dict[str, str]:
-    """Model and features of the first processor; the host's name where the system keeps silent.
+    """Model and features of the first processor; the host name if the system does not list them.
 
-    With the host's name no two machines share a library, which is slow and safe.
+    With the host name no two machines share a library, which is slow and safe.
     """
     found = _first_block(source)
     if not {"flags", "Features", "isa", "features"} & found.keys():
@@ -28,7 +28,7 @@ def features(source: Path = Path("/proc/cpuinfo")) -> dict[str, str]:
 
 def _first_block(source: Path) -> dict[str, str]:
     try:
-        with source.open("rb", buffering=0) as file:  # one read: each processor costs time
+        with source.open("rb", buffering=0) as file:  # one read: every listed processor costs time
             text = file.read(16384)
     except OSError:
         return {}

@@ -1,6 +1,6 @@
-"""A new library is opened in a process of its own first: what crashes there crashes nobody.
+"""Test of a new library in a separate process, so that a crash does not end this one.
 
-0  opens, has its symbols, and its own test, if it brings one, returned 0
+The process returns 0 if the library opens, has its symbols, and its self-test, if any, returns 0.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..host.process import Hanging, run
 
-#: Name of the function `int (void)` that a library may export: 0 if all is right.
+#: Name of the self-test `int (void)` that a library may export; 0 is success.
 OWN_TEST = "mstmm_self_test"
 
 _TIMEOUT = 60.0
@@ -24,12 +24,12 @@ for name in sys.argv[2:]:
     getattr(library, name)
 test = getattr(library, {OWN_TEST!r}, None)
 if test is not None and test() != 0:
-    sys.exit("its own test found it wrong")
+    sys.exit("its self-test failed")
 """
 
 
 def problem(library: Path, symbols: Sequence[str]) -> str:
-    """What is wrong with a library, in a few words; "" if nothing is, or if it cannot be tried."""
+    """Reason that a library cannot be used, or ""; also "" if no test process can be started."""
     if not sys.executable:  # Python inside another program
         return ""
     try:

@@ -1,4 +1,4 @@
-"""The C compiler: found, told apart from others, and run on generated text.  Nothing else is."""
+"""C compiler: find it, identify it, and compile generated text; no other program is run."""
 
 from __future__ import annotations
 
@@ -19,27 +19,26 @@ from mstmm.errors import EnvironmentFailure
 if TYPE_CHECKING:
     from ..host.process import Ended
 
-#: Seconds of wall time after which a compiler is taken for hanging, and the variable that says
-#: otherwise.
+#: Wall time, s, after which a compilation is stopped, and the variable that overrides it.
 TIMEOUT, TIMEOUT_VARIABLE = 300.0, "MSTMM_COMPILE_TIMEOUT"
 
-#: What a full disk, a used-up quota and a limit on files are called.
+#: Messages for a full disk, an exhausted quota and a file size limit.
 _NO_ROOM = (
     "No space left on device", "Disk quota exceeded", "File too large", "File size limit exceeded",
 )  # fmt: skip
 
-#: How gcc and clang say that they do not know an option.
+#: Messages of gcc and clang for an unknown option.
 _UNKNOWN = re.compile("unknown argument|unrecognized|unsupported option|not supported")
 
-#: Variables by which gcc and clang find other headers and libraries.
+#: Environment variables that change the headers and libraries that gcc and clang use.
 _VARIABLES = ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "COMPILER_PATH", "GCC_EXEC_PREFIX")
 
-_INSTALL = "install one (apt-get install gcc) or name one by the variable CC"
+_INSTALL = "install one (apt-get install gcc) or set the variable CC"
 
 
 @dataclass(frozen=True)
 class Compiler:
-    """A C compiler: how it is called, and what tells it from another or an updated one."""
+    """C compiler: its command, and the data that distinguish it from another or an updated one."""
 
     command: tuple[str, ...]
     path: str
@@ -47,7 +46,7 @@ class Compiler:
     modified: int
 
     def identity(self) -> dict[str, str]:
-        """All that may change what it makes of a text, without asking it (no process is run)."""
+        """All data that may change the compiler's output, read without running a process."""
         set_here = {name: os.environ[name] for name in _VARIABLES if os.environ.get(name)}
         return {
             "command": shlex.join(self.command), "path": self.path, "size": str(self.size),
@@ -56,7 +55,7 @@ class Compiler:
 
 
 def compiler() -> Compiler:
-    """The compiler: $CC, else gcc, cc or clang.  EnvironmentFailure if there is none."""
+    """Find the C compiler: $CC, else gcc, cc or clang.  EnvironmentFailure if there is none."""
     try:
         wanted = shlex.split(os.environ.get("CC") or "")
     except ValueError:
@@ -65,7 +64,7 @@ def compiler() -> Compiler:
         program = shutil.which(words[0])
         if program is not None:
             return _identified((os.path.abspath(program), *words[1:]))
-    missing = f"CC names {wanted[0]}, which is not there" if wanted else "no gcc, cc or clang"
+    missing = f"CC names {wanted[0]}, which does not exist" if wanted else "no gcc, cc or clang"
     raise EnvironmentFailure(f"no C compiler found ({missing}); {_INSTALL}")
 
 
@@ -75,7 +74,7 @@ def _identified(command: tuple[str, ...]) -> Compiler:
         status = os.stat(path)
     except OSError as error:
         raise EnvironmentFailure(
-            f"the C compiler {path} cannot be looked at ({error.strerror}); {_INSTALL}"
+            f"the C compiler {path} cannot be examined ({error.strerror}); {_INSTALL}"
         ) from None
     return Compiler(command, path, status.st_size, status.st_mtime_ns)
 
@@ -88,7 +87,7 @@ def _libc() -> str:
 
 
 def time_limit() -> float:
-    """Seconds of wall time that a compiler may take, the variable's or 300."""
+    """Maximum wall time of a compilation, s: that of the variable, or 300."""
     text = os.environ.get(TIMEOUT_VARIABLE)
     if not text:
         return TIMEOUT
@@ -98,14 +97,14 @@ def time_limit() -> float:
         value = -1.0
     if not 0 < value < 1e6:
         raise EnvironmentFailure(
-            f"{TIMEOUT_VARIABLE}={text!r}: expected the longest time of a compilation in s, "
+            f"{TIMEOUT_VARIABLE}={text!r}: expected the maximum time of a compilation in s, "
             "such as 300"
         )
     return value
 
 
 def version(found: Compiler, folder: Path) -> str:
-    """First line of what `--version` answers, asked in `folder`."""
+    """First line of the output of `--version`, run in `folder`."""
     from ..host.process import Hanging, run
 
     try:
@@ -123,7 +122,7 @@ def library_suffix() -> str:
 
 @dataclass(frozen=True)
 class Compilation:
-    """What a successful compiler took, s, and the flags it was given in the end."""
+    """Wall time of a successful compilation, s, and the flags that it used."""
 
     seconds: float
     flags: tuple[str, ...]
@@ -135,10 +134,10 @@ def build(
 ) -> Compilation:  # fmt: skip
     """Compile `sources`, all in one folder, into the shared library `target`.
 
-    Those of `flags` that are in `optional` too are left out if the compiler does not know them.
-    Everything the compiler writes, its temporary files too, lies in that folder: whoever removes
-    it leaves nothing behind.  Raises EnvironmentFailure, one line, if the compiler cannot be run,
-    fails, is killed, does not end within `timeout` s, or leaves no library.
+    Flags that are also in `optional` are omitted if the compiler does not support them.  All files
+    of the compiler, also temporary ones, are in that folder, so that its removal removes them all.
+    Raises EnvironmentFailure, one line, if the compiler cannot be run, fails, is killed, does not
+    end within `timeout` s, or writes no library.
     """
     begin = time.perf_counter()
     kept = tuple(flags)
@@ -152,14 +151,14 @@ def build(
         raise EnvironmentFailure(_reason(found, ended, sources[0].name))
     if not target.is_file() or target.stat().st_size == 0:
         raise EnvironmentFailure(
-            f"the C compiler {found.command[0]} reported success and left no library; "
+            f"the C compiler {found.command[0]} reported success but wrote no library; "
             "see mstmm doctor"
         )
     return Compilation(time.perf_counter() - begin, kept)
 
 
 def _unknown(ended: Ended, optional: Sequence[str]) -> set[str]:
-    """The optional flags that a failed compiler names in a complaint about options."""
+    """Optional flags that a failed compiler names in a message about unknown options."""
     complaints = [line for line in ended.said.splitlines() if _UNKNOWN.search(line)]
     named = {word.strip("'\"`‘’;,") for line in complaints for word in line.split()}
     return named & set(optional) if ended.code != 0 else set()
@@ -187,12 +186,12 @@ def _compiled(
 
 
 def _reason(found: Compiler, ended: Ended, source: str) -> str:
-    """One line on why a compiler failed."""
+    """Reason that a compilation failed, one line with a remedy."""
     program = found.command[0]
     if any(text in ended.said for text in _NO_ROOM) or ended.code == -signal.SIGXFSZ:
         return (
-            f"the C compiler {program} found no room on the disk; make room, or take another "
-            "folder (MSTMM_CACHE; of own elements MSTMM_KERNELS)"
+            f"the C compiler {program} found no space on the disk; free space, or choose another "
+            "folder (MSTMM_CACHE; for user-defined elements MSTMM_KERNELS)"
         )
     if ended.code < 0:
         hint = " (too little memory?)" if -ended.code == signal.SIGKILL else ""

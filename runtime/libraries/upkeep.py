@@ -1,4 +1,4 @@
-"""Looking after the cache: what is in it, is it whole, what can go."""
+"""Maintenance of the cache of libraries: list, verify and remove entries."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .build import LOCK, UNFINISHED, remove, remove_leftovers, tree_size
 from .entry import Damaged
 from .folder import limit
 
-#: What was used within this time, s, is being opened by somebody and stays.
+#: Entries used within this time, s, are kept: a process may be about to load them.
 _IN_USE = 60.0
 
 
 @dataclass(frozen=True)
 class Listed:
-    """An entry as a list shows it: size in bytes, time of last use in s since 1970."""
+    """Listed entry: size in bytes, time of last use in s since 1970, problem or ""."""
 
     folder: Path
     bytes: int
@@ -38,7 +38,7 @@ def _folders(parent: Path) -> Iterator[Path]:
 
 
 def listed(parent: Path) -> list[Listed]:
-    """All entries, the last used first; each is read and its checksum verified."""
+    """List all entries, the most recently used first, and verify each by its checksum."""
     found = []
     for folder in _folders(parent):
         problem, about = "", {}
@@ -48,7 +48,7 @@ def listed(parent: Path) -> list[Listed]:
                 continue
             about = entry.about
             if not folder.name.endswith(str(about["key"])[:32]):
-                problem = "its name is that of another key"
+                problem = "its folder is named after another key"
         except Damaged as damage:
             problem = str(damage)
         found.append(Listed(folder, tree_size(folder), _last_used(folder), problem, about))
@@ -63,13 +63,15 @@ def _last_used(folder: Path) -> float:
 
 
 def unfinished(parent: Path) -> int:
-    """How many builds are under way, or were cut off and not yet tidied away."""
+    """Number of builds in progress, or interrupted and not yet removed."""
     return sum(1 for _ in parent.glob(f"{UNFINISHED}*"))
 
 
 def tidy(parent: Path, keep: Path) -> None:
-    """After a build: leftovers of killed processes go, and the least recently used entries
-    beyond the limit.  `keep` stays.  Never raises."""
+    """Remove leftovers of killed processes, and the least recently used entries above the limit.
+
+    `keep` is the new entry, which is never removed.  Never raises OSError.
+    """
     remove_leftovers(parent)
     allowed = limit()
     sizes = {place: (_last_used(place), tree_size(place)) for place in _folders(parent)}
@@ -85,8 +87,8 @@ def tidy(parent: Path, keep: Path) -> None:
 def clean(parent: Path, unused: float = 0.0) -> tuple[int, int]:
     """Remove entries not used for `unused` s, leftovers and idle locks.
 
-    Returns how many entries went, and their bytes.  What other processes are building stays, and
-    what they have opened keeps working.
+    Returns the number of removed entries and their bytes.  Builds of other processes are kept, and
+    libraries that they have loaded remain usable.
     """
     count = size = 0
     now = time.time()

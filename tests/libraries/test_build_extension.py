@@ -101,7 +101,7 @@ def test_headers_of_one_name_are_refused(tmp_path: Path) -> None:
 def test_headers_that_include_each_other_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.h").write_text('#include "b.h"\n')
     (tmp_path / "b.h").write_text('#include "a.h"\n')
-    with pytest.raises(ValueError, match=r"a\.h includes itself by way of .*b\.h"):
+    with pytest.raises(ValueError, match=r"a\.h includes itself through .*b\.h"):
         headers([tmp_path])
 
 
