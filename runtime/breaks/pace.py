@@ -99,7 +99,7 @@ def pace(
 def _looked_at(
     terms: Terms, watched: Sequence[Watched], a: Array, b: Array
 ) -> tuple[Array, Array, Array]:
-    """(lower bounds, upper bounds, longest step of a uniform oscillation), each (watched, cells)."""
+    """Lower bounds, upper bounds, longest steps of uniform oscillations, each (watched, cells)."""
     known = terms(Interval(a, b))
     lo, hi = np.empty((len(watched), len(a))), np.empty((len(watched), len(a)))
     even = np.full((len(watched), len(a)), np.inf)

@@ -84,7 +84,7 @@ def _tree(bodies: Records, parents: Sequence[int]) -> None:
 
 
 def size_of(parts: Sequence[Part]) -> float:
-    """Size of a scene, m: largest distance of hinges on a body, or of a mass centre from a hinge."""
+    """Size of a scene, m: largest distance of hinges on a body, or of mass centre and hinge."""
     places = [hypot(*part.hung.point) for part in parts]
     centres = [hypot(*part.first) / part.mass for part in parts if part.mass > 0]
     found = max([*places, *centres]) or 1.0

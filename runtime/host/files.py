@@ -54,7 +54,7 @@ _SEALED = len(_SEAL) + 64
 
 
 def seal(path: Path) -> None:
-    """Append a file's hash to the file; readers of formats that store their own length ignore it."""
+    """Append a file's hash to the file; readers of formats with a stored length ignore it."""
     with path.open("rb") as file:
         found = hashlib.file_digest(file, "sha256").hexdigest()
     with path.open("ab") as file:

@@ -15,7 +15,7 @@ PATIENCE = 5.0
 
 
 class Interrupt:
-    """Flag that is true once a signal has arrived in a block; testing it acknowledges the signal."""
+    """Flag that becomes true when a signal arrives; testing it acknowledges the signal."""
 
     def __init__(self) -> None:
         self.heard, self._came = False, False

@@ -1,1 +1,1 @@
-"""The time integration in C: settings, methods and the hold on its loop."""
+"""Time integration in C: settings, methods and the Python driver of its loop."""

@@ -1,8 +1,8 @@
-"""A time integration from Python: a thin hold on the C loop of `c/integrate.c`.
+"""Python driver of the time integration loop in `c/integrate.c`.
 
-`Run` owns the arrays of a run and translates its numbers into words.  It knows nothing of
-mechanics: the system is a `mstmm_system` that the caller has filled, so that a scene, a test
-system in C or a few cffi call-backs are all the same to it.
+`Run` owns the arrays of a run and converts its status to messages.  It is independent of mechanics:
+the system is a `mstmm_system` that the caller has filled, such as a scene, a test system in C or a
+few cffi call-backs.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _SAMPLE_DOUBLES = 2**19  # of one buffer, about 4 MB
 _ARGUMENTS = {
     1: "the sizes of state, events or memory",
     2: "the times: both finite, t_end not before t_start",
-    3: "the tolerances or steps: absolute tolerances above zero, nothing negative, "
+    3: "the tolerances or steps: absolute tolerances above zero, no negative value, "
     "and a method with an error estimate unless the step is fixed",
     4: "the breaks and the starts of bounds: finite and strictly increasing",
     5: "the output times: finite, strictly increasing and within the run",
@@ -36,9 +36,9 @@ _ARGUMENTS = {
 
 
 class Status(IntEnum):
-    """Why the C loop came back; negative values are failures (`MSTMM_*` of the C header).
+    """Reason that the C loop returned; negative values are failures (`MSTMM_*` of the C header).
 
-    CAME_TO_REST is not of C: an event stopped the run because its bounces follow ever faster.
+    CAME_TO_REST does not exist in C: an event stopped the run because its bounces accumulate.
     """
 
     RUNNING = 0
@@ -66,10 +66,10 @@ _STATUS = {int(status): status for status in Status}
 
 @dataclass(frozen=True)
 class Samples:
-    """Rows of a run.
+    """Samples of a run, as rows of arrays.
 
     Attributes:
-        t: (m,) times; equal neighbours stand just before and just after an event.
+        t: (m,) times, s; equal neighbours are just before and just after an event.
         y: (m, n_state).
         memory: (m, n_memory).
         event: (m,) 0; -(i + 1) just before and i + 1 just after event i changed the state.
@@ -82,7 +82,7 @@ class Samples:
 
     @staticmethod
     def joined(parts: Sequence[Samples]) -> Samples:
-        """All rows of `parts` (at least one) in one object."""
+        """Join the rows of `parts` (at least one)."""
         return Samples(
             np.concatenate([p.t for p in parts]),
             np.concatenate([p.y for p in parts]),
@@ -93,7 +93,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Failure:
-    """What stopped a run: numbers for whoever turns them into the name of an element."""
+    """Failure that stopped a run, with the indices from which its message is written."""
 
     status: Status
     time: float
@@ -104,22 +104,23 @@ class Failure:
 
 @dataclass(frozen=True)
 class Statistics:
-    """What a run has done so far.
+    """Counts and error estimates of a run so far.
 
     Attributes:
         steps, rejected, evaluations, events: counts; evaluations are calls of the right-hand side.
-        smallest_step, largest_step: of steps not cut short by a break, an event or the end (s).
+        smallest_step, largest_step: of steps not shortened by a break, an event or the end (s).
         sum_local_error: sum over all steps of the RMS local error estimate, in the units of y.
-            Not the error of the result, which may be larger by any factor.
+            The error of the result may be larger by any factor.
         sum_scaled_error: the same in units of the tolerance.  Both None without an estimate.
         stiffness_index: last estimate of h |lambda|; largest_stiffness_index its maximum.
         stability_limited: True if at least fifty steps, and a tenth of all, were about as long as
-            stability allows: an explicit method suits the system badly, or the fixed step is long.
-        stability_limited_steps: how many steps were.
-        crossings: how often a step ended where an expression of the state switches.
-        residuals, tangents, solves, iterations: what implicit methods asked of the system, and
+            stability permits: the system is stiff for an explicit method, or the fixed step is
+            long.
+        stability_limited_steps: number of these steps.
+        crossings: number of steps that ended where an expression of the state switches.
+        residuals, tangents, solves, iterations: evaluations of the system by implicit methods, and
             iterations of Newton's method.
-        laws_tangents: how many of the tangents were made of inertia and laws alone.
+        laws_tangents: number of approximate tangents, from inertia and laws only.
     """
 
     steps: int
@@ -143,26 +144,26 @@ class Statistics:
 
 
 class Run:
-    """One time integration, advanced in slices.
+    """Time integration that the caller advances in slices.
 
     Args:
-        ffi, lib: a cffi pair that knows the declarations of `c/integrate.h`.
+        ffi, lib: a cffi pair with the declarations of `c/integrate.h`.
         system: `mstmm_system *`, filled; kept alive by the run.
         tableau: the method, see `mstmm.runtime.integrate.steppers`.
-        settings: how the run is made; its method is `tableau`.
+        settings: times, tolerances and steps of the run; its method is `tableau`.
         y0: (n_state,).
-        atol: absolute tolerance of every component, (n_error,), above zero; that of the settings
-            unless given.
-        breaks: strictly increasing times at which the right-hand side is not smooth.  Steps end
-            there; the right-hand side never sees a break itself but the number before or after.
-        bounds: (starts, longest): from each start on, the first at or before t_start, no adaptive
+        atol: absolute tolerance of every component, (n_error,), above zero; by default that of the
+            settings.
+        breaks: strictly increasing times (s) at which the right-hand side is not smooth.  Steps end
+            there; the right-hand side is evaluated at the numbers before and after a break only.
+        bounds: (starts, longest), s: from each start, the first at or before t_start, no adaptive
             step is longer.
-        pole: the break at which the right-hand side has a pole, where the run ends, and what has
-            it, in words.
+        pole: the break (s) at which the right-hand side has a pole, where the run ends, and a
+            sentence that names the pole.
         capacity: rows of the sample buffer, at least 2.
 
     Raises:
-        SceneError: if an argument makes no sense.
+        SceneError: if an argument is invalid.
     """
 
     def __init__(
@@ -191,16 +192,16 @@ class Run:
     def begin(
         self, tableau: Tableau, settings: Settings, y0: ArrayLike, atol: ArrayLike | None = None
     ) -> None:
-        """Stand at the start of a run, which may be another one: by another method or to other
-        tolerances, over the same times with the same samples.  What was not taken is dropped."""
+        """Start the run, or start it again with another method or other tolerances.
+
+        Times and output times remain those of the construction; samples not yet taken are lost.
+        """
         self._refuse_unsuited(tableau)
         system, run = self._system, self._run
         if settings.tangent == "laws" and not system.implicit.laws:
-            raise SceneError('tangent = "laws": this system has none by laws alone')
+            raise SceneError('tangent = "laws": this system has no approximate tangent by laws')
         if settings.step is not None and not settings.step > 0.0:
-            raise SceneError(
-                f"step = {settings.step!r}: a fixed step is a time above zero, in seconds"
-            )
+            raise SceneError(f"step = {settings.step!r}: expected a time above zero, in s")
         self.tableau, run.tableau = tableau, c_tableau(self._ffi, tableau)
         run.t_start, run.t_end, run.rtol = settings.t_start, settings.t_end, settings.rtol
         run.fixed_step = 0.0 if settings.step is None else settings.step
@@ -224,18 +225,18 @@ class Run:
         if tableau.implicit and not at:
             raise SceneError(
                 f'method "{tableau.name}" is implicit and needs a tangent of the equations of '
-                "motion, which this system has not; take an explicit method such as dop853"
+                "motion, which this system does not have; use an explicit method such as dop853"
             )
         if at:
             check_size(tableau, at.n_q + at.n_u)
 
     def _room(self, tableau: Any) -> Any:
-        """Workspace for a method; it lives as long as what is returned."""
+        """Workspace for a method; it exists as long as the returned object."""
         size = self._lib.mstmm_workspace_size(self._system, tableau)
         return self._ffi.from_buffer("double[]", np.empty(max(size, 1)))
 
     def _doubles(self, array: ArrayLike) -> Any:
-        """`double *` to a contiguous copy, which lives as long as what is returned."""
+        """`double *` to a contiguous copy, which exists as long as the returned object."""
         return self._ffi.from_buffer("double[]", np.array(array, dtype=np.float64, order="C"))
 
     def _outputs(self, run: Any, output_times: ArrayLike | None) -> None:
@@ -258,11 +259,11 @@ class Run:
         run.sample_event = self._ffi.from_buffer("int64_t[]", self._event)
 
     def advance(self, wall: float = 0.1, steps: int = 0) -> Status:
-        """Goes on for `wall` seconds or to the end.  Full buffers are emptied on the way.
+        """Advance the run for `wall` seconds or to its end, emptying full buffers.
 
         Args:
-            wall: seconds; infinite for no limit.
-            steps: comes back, too, when the run has made so many steps in all; 0 for no limit.
+            wall: wall time, s; infinite for no limit.
+            steps: also return when the run has made so many steps in total; 0 for no limit.
 
         Returns:
             RUNNING, FINISHED, STOPPED or a failure; never BUFFER_FULL.
@@ -287,7 +288,7 @@ class Run:
         self, breaks: ArrayLike, bounds: tuple[ArrayLike, ArrayLike],
         pole: tuple[float, str] | None = None,
     ) -> None:  # fmt: skip
-        """Breaks, bounds and pole, as at the making, to look out for from now on instead."""
+        """Replace breaks, bounds and pole, with the meanings of the constructor."""
         rows = [np.atleast_1d(np.array(x, dtype=np.float64)) for x in (breaks, *bounds)]
         stops, starts, longest = (self._ffi.from_buffer("double[]", row) for row in rows)
         end = self._ffi.NULL if pole is None else self._doubles([pole[0]])
@@ -296,19 +297,20 @@ class Run:
         self._lib.mstmm_run_map(self._run, *self._mapped)
 
     def take_over(self, other: Run) -> None:
-        """Stand where another run of the same settings does, and look out for the same times."""
+        """Take over state, breaks, bounds and pole of another run with the same settings."""
         self._mapped, self._run.t_end = other._mapped, other._run.t_end
         self.pole = other.pole
         self._lib.mstmm_run_map(self._run, *self._mapped)
         self.restore(other.state())
 
     def call_back(self, signs: int, look: int = 0, short_step: float = 0.0) -> None:
-        """Have `advance` come back between steps, with `asked`.
+        """Make `advance` return between steps, with `asked` True.
 
         Args:
-            signs: when so many of the last steps spoke for another kind of method: of explicit
-                methods those as long as stability allows, of implicit ones those below short_step.
-            look: when so many steps have been made in all.  For both, 0 is never.
+            signs: return when so many of the last steps favoured another kind of method: with
+                explicit methods steps as long as stability permits, with implicit ones steps below
+                short_step.
+            look: return when so many steps have been made in total.  For both, 0 is never.
             short_step: s.
         """
         self._run.sign_steps, self._run.look_steps = signs, look
@@ -316,40 +318,40 @@ class Run:
 
     @property
     def steps(self) -> int:
-        """How many steps have been made."""
+        """Number of steps made."""
         return int(self._run.count.steps)
 
     @property
     def asked(self) -> bool:
-        """Whether the last `advance` came back for what `call_back` asked for."""
+        """True if the last `advance` returned because of `call_back`."""
         return bool(self._run.count.asked)
 
     @property
     def no_step(self) -> bool:
-        """Whether the run failed because its method finds no step from where it stands."""
+        """True if the run failed because its method finds no valid step from the current state."""
         return bool(self._run.count.no_step)
 
     @property
     def signs(self) -> int:
-        """How many of the last steps spoke for another kind of method."""
+        """Number of the last steps that favoured another kind of method."""
         return int(self._run.count.sign)
 
     @property
     def last_step(self) -> float:
-        """Length of the last step in s."""
+        """Length of the last step, s."""
         return float(self._run.real.h)
 
     def change(self, tableau: Tableau) -> None:
-        """Go on by another method from where the run stands between two steps, or failed for want
-        of one.  Counts, samples, events and, but for a failure, the length of the next step go on.
+        """Continue with another method from the current state, between steps or after `no_step`.
 
-        Raises SceneError within a step, and for methods or runs of fixed steps.
+        Counts, samples, events and, except after a failure, the length of the next step are kept.
+        Raises SceneError within a step, and for methods or runs with fixed steps.
         """
         self._refuse_unsuited(tableau)
         c_method = c_tableau(self._ffi, tableau)
         space = self._room(c_method)
         if self._lib.mstmm_run_change(self._run, c_method, space):
-            raise SceneError(f'method "{tableau.name}" cannot take this run over')
+            raise SceneError(f'method "{tableau.name}" cannot continue this run')
         self.tableau, self._space = tableau, space
 
     def _drain(self) -> None:
@@ -374,25 +376,25 @@ class Run:
         return self._samples[0]
 
     def take(self) -> Samples:
-        """All samples not yet taken, which are then forgotten here (for writing as they come)."""
+        """Return all samples not yet taken and remove them here (for writing during the run)."""
         samples = self.samples
         self._samples = []
         return samples
 
     @property
     def status(self) -> Status:
-        """What the last `advance` returned."""
+        """Status that the last `advance` returned."""
         status = _STATUS[self._run.count.status]
         return Status.RUNNING if status is Status.BUFFER_FULL else status
 
     @property
     def t(self) -> float:
-        """Time of the current (after a failure: the last good) state, in seconds."""
+        """Time of the current (after a failure: the last valid) state, s."""
         return float(self._run.real.t)
 
     @property
     def y(self) -> Array:
-        """The current (after a failure: the last good) state, a copy of shape (n_state,)."""
+        """Copy of the current (after a failure: the last valid) state (n_state,)."""
         n = self._system.n_state
         pointer = self._lib.mstmm_run_y(self._run)
         data = self._ffi.buffer(pointer, n * 8)
@@ -400,7 +402,7 @@ class Run:
 
     @property
     def failure(self) -> Failure | None:
-        """What went wrong, None if nothing did."""
+        """Failure of the run, None without one."""
         if self.status >= 0:
             return None
         c = self._run.count
@@ -438,25 +440,28 @@ class Run:
 
     @property
     def unseen(self) -> tuple[int, float] | None:
-        """(event, or switch behind the events, time in s): the first that may have been missed."""
+        """First event or switch that may have been missed: (index, time in s), or None.
+
+        Indices of switches follow those of the events.
+        """
         c = self._run.count
         return (int(c.unseen), float(self._run.real.unseen_time)) if c.unseen >= 0 else None
 
     @property
     def chatter(self) -> tuple[int, float] | None:
-        """(switch, time in s): the last one that switched without end and is not watched since."""
+        """Last switch no longer watched because it chattered: (index, time in s), or None."""
         c = self._run.count
         return (int(c.chatter), float(self._run.real.chatter_time)) if c.chatter >= 0 else None
 
     def fits(self, samples: Samples) -> bool:
-        """True if the rows of `samples` have the sizes of this run's."""
+        """True if the rows of `samples` have the sizes of this run."""
         return samples.y.shape[1:] == (self._system.n_state,) and samples.memory.shape[1:] == (
             self._system.n_memory,
         )
 
     @property
     def event(self) -> int:
-        """Number of the event that fired last; -1 for none."""
+        """Index of the event that fired last; -1 for none."""
         return int(self._run.count.event)
 
     def message(
@@ -465,12 +470,12 @@ class Run:
         events: Sequence[str] | None = None,
         cause: str = "",
     ) -> str:
-        """The status as a sentence.
+        """Status as a sentence.
 
         Args:
             components: a name per component of y.
             events: a name per event.
-            cause: what is known to have made the numbers fail.
+            cause: known cause of a failure, "" if unknown.
         """
         fail = self.failure
         if self.pole is not None and self.status is Status.POLE:
@@ -487,8 +492,10 @@ class Run:
         )
 
     def state(self) -> dict[str, Array | Integers]:
-        """The run as plain arrays {"real", "integer"}: everything a new process needs to continue
-        bit for bit, given the same problem (samples already written are not part of it)."""
+        """State of the run as plain arrays {"real", "integer"}, from which it can be continued.
+
+        A new process with the same problem continues bit for bit; samples are not part of it.
+        """
         real = np.zeros(self._lib.mstmm_run_pack_reals(self._run))
         integer = np.zeros(self._lib.mstmm_run_pack_integers(self._run), dtype=np.int64)
         self._lib.mstmm_run_pack(
@@ -499,7 +506,7 @@ class Run:
         return {"real": real, "integer": integer}
 
     def restore(self, state: Mapping[str, Array | Integers]) -> None:
-        """Puts the run where `state()` was taken.  Samples in hand are dropped.
+        """Restore a state that `state()` returned.  Samples not yet taken are lost.
 
         Raises:
             SceneError: if the state belongs to a run of other sizes or another method.
@@ -529,8 +536,10 @@ def failure_text(
     cause: str = "",
     implicit: bool = False,
 ) -> str:
-    """One sentence for each failure, with a way out where there is one that fits the kind of
-    method; names as in `message`."""
+    """Message for a failure, with a remedy that suits the kind of method, if there is one.
+
+    Names as in `Run.message`.
+    """
     what = _name("component", -1 if fail.component is None else fail.component, components)
     event = _name("event", -1 if fail.event is None else fail.event, events)
     at = f"at t = {fail.time:.9g} s"
@@ -550,20 +559,20 @@ def failure_text(
         Status.FIRE_FAILED: f"{event} failed {at} (code {fail.code})",
         Status.TOO_MANY_STEPS: f"more steps than allowed {at}"
         if not fail.code
-        else f"no end in sight {at}: at the pace of the last steps the run would take more than "
-        "1e10 of them; the motion sticks where the right-hand side jumps, or is too "
+        else f"no end in sight {at}: with the last step lengths the run would need more than "
+        "1e10 steps; the motion sticks where the right-hand side jumps, or is too "
         f"{pace} for the tolerance; max_steps, if given, is the only limit",
         Status.TANGENT_FAILED: f"the equations of motion have no regular tangent {at} (code "
         f"{fail.code}): the motion may be singular there, or leave an unstable position faster "
         "than the step allows; " + (cause or "a smaller step may help")
         if fail.code
-        else f"a step from t = {fail.time:.9g} s would leave nothing but rounding of its fastest "
-        "motion; take a shorter step, or see whether a stiffness or damping is far too large",
+        else f"a step from t = {fail.time:.9g} s would lose its fastest motion to rounding; use a "
+        "shorter step, or check whether a stiffness or damping is far too large",
         Status.NOT_CONVERGED: f"Newton's iteration does not converge {at}: {what} still changes; "
         + (cause or "a smaller step, or a Rosenbrock method such as rodas4p2, may help"),
-        Status.LET_THROUGH: f"{event} holds, and the motion goes on into it {at}: it throws back "
-        "what comes to it, not what lies on it; what lies still needs a stop that carries it "
-        "(law.limits with a stiffness)",
+        Status.LET_THROUGH: f"{event} holds, and the motion continues into it {at}: a bounce "
+        "reverses an approaching motion but supports nothing at rest; a resting contact needs a "
+        "stop with stiffness (law.limits with a stiffness)",
         Status.POLE: f"a pole {at}: {cause}",
         Status.EVENT_CHATTER: f"{event} fires without end {at}",
         Status.BAD_ARGUMENT: f"check {_ARGUMENTS.get(fail.code, 'the arguments')}",

@@ -1,4 +1,4 @@
-"""What a run that was asked for an error reached, and which runs that took."""
+"""Achieved error of a run with a target error, and the runs that were needed."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from mstmm.risk import Risk
 
 @dataclass(frozen=True)
 class Attempt:
-    """One run on the way.
+    """Run that was made to achieve a target error.
 
     Attributes:
         method: as in `simulate`.
         rtol, atol: its tolerances.
-        apart: how far it is from the last run, which is about its error; None for the last one, and
-            for a run that did not reach the end.
+        apart: distance from the last run, which is about its error; None for the last run, and for
+            a run that did not reach the end.
         evaluations: calls of the right-hand side, and of the residual by implicit methods.
         cpu_s: processor time, s.
-        failure: why it is no use, "" if it is.
+        failure: reason that its result cannot be used, or "".
     """
 
     method: str
@@ -34,16 +34,17 @@ class Attempt:
 
 @dataclass(frozen=True)
 class ReachedError:
-    """The error of a run that was asked for one.
+    """Achieved error of a run with a target error.
 
     Attributes:
-        asked: largest error wanted.
-        estimate: largest error expected over the samples; None where nothing is known of it.
-        of, unit, scaling: what it is an error of, as in a chart; unit "1" for parts.
-        method, rtol, atol: of the run that was kept.
-        found: how the estimate was made.
-        why: what kept the run from what was asked, "" if nothing did.
-        runs: all runs that it took, in their order.
+        asked: target error.
+        estimate: largest expected error over the samples; None if unknown.
+        of, unit, scaling: quantities of the error, its unit ("1" if relative) and its scaling, as
+            in a chart.
+        method, rtol, atol: of the run whose result is used.
+        found: method of the estimate.
+        why: reason that the target was not met, or "".
+        runs: all runs that were made, in order.
     """
 
     asked: float
@@ -60,7 +61,7 @@ class ReachedError:
 
     @property
     def met(self) -> bool:
-        """True where the estimate is at most what was asked."""
+        """True if the estimate is at most the target error."""
         return self.estimate is not None and self.estimate <= self.asked
 
     @property
@@ -70,13 +71,13 @@ class ReachedError:
 
     @property
     def risk(self) -> Risk | None:
-        """That what was asked is not met, and why; None where it is."""
+        """Finding that the target error is not met, with the reason; None if it is met."""
         if self.met:
             return None
         reached = "not known" if self.estimate is None else f"{_with(self.estimate, self.unit)}"
         return Risk(
             "wanted-error", self.of,
-            f"the error of {self.of} asked for, {_with(self.asked, self.unit)}, is not reached: "
+            f"the target error of {self.of}, {_with(self.asked, self.unit)}, is not reached: "
             f"the estimate is {reached}, because {self.why}", self._remedy, self.estimate,
             self.asked, self.unit,
         )  # fmt: skip
@@ -86,11 +87,11 @@ class ReachedError:
         shorter = "simulate a shorter time"
         if self.estimate is None:
             return shorter
-        return f"ask for {_with(self.estimate, self.unit)} or more, or {shorter}"
+        return f"request {_with(self.estimate, self.unit)} or more, or {shorter}"
 
     @property
     def warning(self) -> str:
-        """The same as a sentence; "" where it is met."""
+        """That finding as a sentence; "" if the target is met."""
         return "" if self.risk is None else str(self.risk)
 
     def to_dict(self) -> dict[str, Any]:
@@ -99,10 +100,10 @@ class ReachedError:
 
     def __str__(self) -> str:
         if self.estimate is None:
-            return f"not known, {_with(self.asked, self.unit)} asked for"
+            return f"not known, {_with(self.asked, self.unit)} requested"
         return (
-            f"{_with(self.estimate, self.unit)} of {self.of} ({_with(self.asked, self.unit)} asked "
-            f"for): {self.found}"
+            f"{_with(self.estimate, self.unit)} of {self.of} ({_with(self.asked, self.unit)} "
+            f"requested): {self.found}"
         )
 
 
@@ -111,7 +112,7 @@ def _with(value: float, unit: str) -> str:
 
 
 def from_dict(data: Mapping[str, Any] | None) -> ReachedError | None:
-    """What `to_dict` gave.  TypeError or KeyError where that is something else."""
+    """Read the data that `to_dict` writes.  TypeError or KeyError for anything else."""
     if data is None:
         return None
     numbers = [data[key] for key in ("asked", "rtol", "atol")]
@@ -120,7 +121,7 @@ def from_dict(data: Mapping[str, Any] | None) -> ReachedError | None:
         numbers += [] if row["apart"] is None else [row["apart"]]
     numbers += [] if data["estimate"] is None else [data["estimate"]]
     if not all(isinstance(x, (int, float)) for x in numbers):
-        raise TypeError("an error that was reached holds something that is no number")
+        raise TypeError("the record of an achieved error contains a value that is no number")
     runs = tuple(Attempt(**row) for row in rows)
     kept = {key: value for key, value in data.items() if key not in ("met", "cpu_s", "runs")}
     return ReachedError(**kept, runs=runs)

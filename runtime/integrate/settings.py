@@ -1,4 +1,4 @@
-"""How a run is made, and the one place where that is checked, whichever integrator runs it."""
+"""Settings of a run, and their validation for all integrators."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from mstmm.errors import SceneError
 
 from .steppers import AUTO, AUTO_EXPLICIT, TANGENTS, check_radius, check_tangent
 
-#: Absolute tolerances below this are this: squares of errors against them must not overflow.
+#: Smaller absolute tolerances are raised to this: squares of scaled errors must not overflow.
 _LEAST = 1e-100
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a run is made: times in s, `step` for fixed steps, else `rtol` and `atol`.
+    """Settings of a run: times in s, `step` for fixed steps, else `rtol` and `atol`.
 
-    `first_step`, `min_step` and `max_step` (s) are chosen by the loop where they are 0, and
-    `max_steps` is 0 for as many as it takes.  `radius` is the spectral radius, 0 to 1, that
-    generalised alpha leaves to infinitely fast motion, None for its usual one.  `scheme` and
-    `iterations` (most linear solutions a step) are for the methods dttmm-classical.  `tangent` is
-    what implicit methods linearise by, one of `steppers.TANGENTS`.
+    The loop chooses `first_step`, `min_step` and `max_step` (s) if they are 0; `max_steps` 0 is no
+    limit.  `radius` is the spectral radius at infinity, 0 to 1, of generalised alpha, None for its
+    default.  `scheme` and `iterations` (maximum number of linear solutions per step) are for the
+    methods dttmm-classical.  `tangent` is the tangent of implicit methods, one of
+    `steppers.TANGENTS`.
     """
 
     t_end: float
@@ -49,15 +49,15 @@ class Settings:
 
     @property
     def first_method(self) -> str:
-        """The method by which the run begins."""
+        """Method with which the run starts."""
         return AUTO_EXPLICIT if self.method == AUTO else self.method
 
 
 def times_of(output_times: ArrayLike | Sequence[float] | None) -> tuple[float, ...] | None:
-    """Output times (s) as a tuple, of one number too.
+    """Output times (s) as a tuple, also from a single number.
 
-    Raises SceneError for times that do not increase and for a lone whole number, which could be
-    a number of samples.
+    Raises SceneError for times that do not increase and for a single integer, which could be a
+    number of samples.
     """
     if output_times is None:
         return None
@@ -65,9 +65,9 @@ def times_of(output_times: ArrayLike | Sequence[float] | None) -> tuple[float, .
     if found.ndim == 0 and np.asarray(output_times).dtype.kind in "iu":
         n = int(found)
         raise SceneError(
-            f"output_times = {n}: expected times in s, found a whole number, which may be a time "
+            f"output_times = {n}: expected times in s, found an integer, which may be a time "
             f"or a number of samples; write [{n:.1f}] for one sample at {n} s, or "
-            f"numpy.linspace(t_start, t_end, {max(n, 2)}) for even samples"
+            f"numpy.linspace(t_start, t_end, {max(n, 2)}) for equally spaced samples"
         )
     if found.ndim > 1:
         raise SceneError(f"output_times have shape {found.shape}, expected (n,): times in s")
@@ -83,9 +83,9 @@ def times_of(output_times: ArrayLike | Sequence[float] | None) -> tuple[float, .
 
 
 def checked(settings: Settings) -> Settings:
-    """The settings as plain finite numbers.
+    """Validate settings and convert them to plain finite numbers.
 
-    Raises SceneError naming the first that makes no sense.
+    Raises SceneError that names the first invalid one.
     """
     t_start = real("t_start", settings.t_start, "a time in s")
     t_end = real("t_end", settings.t_end, "a time in s, not before t_start")
@@ -95,15 +95,15 @@ def checked(settings: Settings) -> Settings:
     word_of("scheme", settings.scheme, "a name such as hht:0.3")
     if settings.method == AUTO and settings.step is not None:
         raise SceneError(
-            f'step = {settings.step!r}: method "{AUTO}" chooses its steps; leave step out, or name '
-            "a method"
+            f'step = {settings.step!r}: method "{AUTO}" chooses its steps; omit step, or name a '
+            "method"
         )
     _times_within(settings.output_times, t_start, t_end)
     longest = settings.max_step
     if settings.step is not None and _longest(longest):
         raise SceneError(
-            f"max_step = {longest!r}: bounds steps that the method chooses, but step = "
-            f"{settings.step!r} fixes them all; leave one of the two out"
+            f"max_step = {longest!r}: limits steps that the method chooses, but step = "
+            f"{settings.step!r} fixes all steps; omit one of the two"
         )
     return replace(
         settings,
@@ -125,7 +125,7 @@ def checked(settings: Settings) -> Settings:
 
 
 def _longest(value: float) -> float:
-    """The longest step, 0 for no limit."""
+    """Longest step, s, 0 for no limit."""
     if isinstance(value, Real) and value in (0, np.inf):
         return 0.0
     return _above_zero("max_step", value, "a time above zero in s, or 0 for no limit")
@@ -151,7 +151,7 @@ def _above_zero(name: str, value: float, expected: str) -> float:
 
 
 def _times_within(times: tuple[float, ...] | None, t_start: float, t_end: float) -> None:
-    """SceneError for output times outside the run."""
+    """Raise SceneError for output times outside the run."""
     if times and (times[0] < t_start or times[-1] > t_end):
         raise SceneError(
             f"output_times from {times[0]:g} to {times[-1]:g} s: expected times between "

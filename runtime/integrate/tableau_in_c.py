@@ -1,4 +1,4 @@
-"""A method's coefficients as the C loop reads them."""
+"""Coefficients of a method as the C struct of the integration loop."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .steppers.implicit import Alpha, Implicit, Rosenbrock
 
 @cache
 def c_tableau(ffi: Any, tableau: Tableau) -> Any:
-    """`mstmm_tableau *` of a method; it and what it points to live as long as the program."""
+    """`mstmm_tableau *` of a method; it and its arrays exist until the program ends."""
     t, kept = ffi.new("mstmm_tableau *"), list[Any]()
 
     def doubles(array: Array) -> Any:

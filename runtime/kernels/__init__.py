@@ -1,1 +1,1 @@
-"""Kernels that can be called: prebuilt, of the user's store, on the tape, by numpy, fused."""
+"""Callable kernels: prebuilt, from the user's store, interpreted, evaluated by numpy, fused."""

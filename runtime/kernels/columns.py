@@ -1,4 +1,4 @@
-"""A library of derivatives, opened: tangent kernels of one scene, many directions side by side."""
+"""Loaded library of derivatives: tangent kernels of one scene for many directions at a time."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class _Library(ctypes.Structure):
 
 
 def open_columns(path: Path, key: str) -> ColumnsLibrary:
-    """Open a library of derivatives that was built under `key`.
+    """Open a library of derivatives that was built with `key`.
 
-    Raises EnvironmentFailure if it cannot be loaded or is another one; then it is closed again.
+    Raises EnvironmentFailure, with the library closed, if it cannot be loaded or has another key.
     """
     way_out = "remove it: mstmm cache clean"
     try:
@@ -55,12 +55,12 @@ def open_columns(path: Path, key: str) -> ColumnsLibrary:
         import _ctypes
 
         _ctypes.dlclose(loaded._handle)
-        raise EnvironmentFailure(f"{path} is not the library of derivatives meant; {way_out}")
+        raise EnvironmentFailure(f"{path} is not the expected library of derivatives; {way_out}")
     return ColumnsLibrary(loaded, found)
 
 
 class ColumnsLibrary:
-    """The tangent kernels of one library, by their number.  Safe to call from several threads."""
+    """Tangent kernels of one library, by index.  Safe to call from several threads."""
 
     def __init__(self, loaded: ctypes.CDLL, found: _Library) -> None:
         self._loaded = loaded
@@ -69,8 +69,8 @@ class ColumnsLibrary:
     def run(self, kernel: int, inputs: Sequence[Array], directions: Array) -> Array:
         """Derivatives (states, n, width_out) along directions (states or 1, n, width_in).
 
-        `inputs` are p, t, q, u, memory, efforts, (states or 1, width) each and contiguous; what has
-        one row is shared by all states.
+        `inputs` are p, t, q, u, memory, efforts, each contiguous, (states or 1, width); an array
+        with one row is shared by all states.
         """
         found = self._kernels[kernel]
         rows = np.ascontiguousarray(directions)

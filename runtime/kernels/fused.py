@@ -1,4 +1,4 @@
-"""A fused library, opened: the compiled accelerations of one scene, for one state and for many."""
+"""Loaded fused library: the compiled accelerations of one scene, for one state or a batch."""
 
 from __future__ import annotations
 
@@ -20,12 +20,11 @@ Codes = NDArray[np.int32]
 
 
 def open_library(path: Path, key: str) -> FusedLibrary:
-    """Open a library that was built under `key`.
+    """Open a fused library that was built with `key`.
 
-    The cache has compared its checksum before: loaders crash on files that were cut short.  Raises
-    EnvironmentFailure if the file cannot be loaded (missing, no library, made for another
-    machine), is no fused library, has another ABI number, or carries another key; then it is
-    closed again.
+    The cache must have verified its checksum: loaders crash on truncated files.  Raises
+    EnvironmentFailure, with the library closed, if the file cannot be loaded (missing, no library,
+    built for another machine), is no fused library, or has another ABI number or key.
     """
     try:
         loaded = ctypes.CDLL(os.fspath(path), mode=os.RTLD_NOW | os.RTLD_LOCAL)
@@ -41,7 +40,7 @@ def open_library(path: Path, key: str) -> FusedLibrary:
 
 
 def _descriptor(loaded: ctypes.CDLL, path: Path, key: str) -> Any:
-    """`const mstmm_fused *` of a loaded library; EnvironmentFailure if it is not the one meant."""
+    """`const mstmm_fused *` of a loaded library; EnvironmentFailure if it is another library."""
     ffi, _ = prebuilt.module()
     try:
         start = ctypes.c_int.in_dll(loaded, SYMBOL)
@@ -49,7 +48,7 @@ def _descriptor(loaded: ctypes.CDLL, path: Path, key: str) -> Any:
         raise EnvironmentFailure(
             f"{path} is no fused library: it has no {SYMBOL}; remove it: mstmm cache clean"
         ) from None
-    # The ABI number comes first in every layout, so that it can be read before the rest is.
+    # The ABI number is the first field of every layout, so that it can be read before the others.
     if start.value != ABI:
         raise EnvironmentFailure(
             f"{path} was built for layout {start.value}, this mstmm has {ABI}; "
@@ -72,9 +71,9 @@ def _close(loaded: ctypes.CDLL) -> None:
 
 
 class FusedLibrary:
-    """The functions of one fused library.  Safe to call from several threads.
+    """Functions of one fused library.  Safe to call from several threads.
 
-    `failures[code - 1]` is (reason, element, code) of a guard code, as the looped engine has them;
+    `failures[code - 1]` is (reason, element, code) of a guard code, as in the looped engine;
     `descriptor` is `const mstmm_fused *` of the prebuilt module.
     """
 
@@ -96,7 +95,7 @@ class FusedLibrary:
     def evaluate(
         self, p: Array, t: float, q: Array, u: Array, memory: Array, efforts: Array
     ) -> tuple[int, Array, Array]:
-        """(code, qdot, udot) of one state; contiguous arrays of the library's sizes."""
+        """Evaluate (code, qdot, udot) of one state; contiguous arrays of the library's sizes."""
         call = Call(self, p)
         call.t[0], call.q[:], call.u[:] = t, q, u
         call.memory[: self.n_memory], call.efforts[:] = memory[: self.n_memory], efforts
@@ -116,9 +115,9 @@ class FusedLibrary:
         """Fill udot (n, nu), and qdot (n, nq) if given, for n states; returns their codes (n,).
 
         q (n, nq), u (n, nu), efforts (n, nu) or None; t (n,) or (1,), p (n, np) or (np,), memory
-        (n, m) or (m,) with m at least n_memory: one row serves all states.  The numbers of a state
-        depend on no other state; those of a state with a code mean nothing.  All arrays are
-        contiguous.
+        (n, m) or (m,) with m at least n_memory: one row is shared by all states.  The result of a
+        state depends on no other state; that of a state with a nonzero code is invalid.  All arrays
+        are contiguous.
         """
         n, null = len(q), self.ffi.NULL
         codes = np.zeros(n, dtype=np.int32)
@@ -141,9 +140,9 @@ class FusedLibrary:
 
 
 class Call:
-    """One state's arrays with their pointers made once; write q, u, ... and call it.
+    """Arrays of one state with prepared pointers: write q, u, ... and call the object.
 
-    Not for several threads at a time: every thread makes its own.
+    Not thread-safe: every thread needs its own.
     """
 
     def __init__(self, library: FusedLibrary, p: Array) -> None:
@@ -162,5 +161,5 @@ class Call:
         )  # fmt: skip
 
     def __call__(self) -> int:
-        """Fill qdot and udot; returns 0, or a guard code and then nothing in them is meant."""
+        """Fill qdot and udot; returns 0, or a guard code, with which their content is invalid."""
         return int(self._function(*self._pointers))

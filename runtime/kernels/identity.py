@@ -1,4 +1,4 @@
-"""Which kernels a compiled scene runs on, in one number."""
+"""Fingerprint of the kernels that a compiled scene uses."""
 
 from __future__ import annotations
 

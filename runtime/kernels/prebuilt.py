@@ -1,4 +1,4 @@
-"""The prebuilt kernels: the compiled module, opened once, and its elements by kind and name."""
+"""Prebuilt kernels: the compiled module, loaded once, and its elements by kind and name."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..libraries.build_extension import BUILT_FROM, built_from
 
 @dataclass(frozen=True)
 class Element:
-    """One compiled element as its descriptor states it; `functions` by kernel name."""
+    """Compiled element as its descriptor states it; `functions` by kernel name."""
 
     kind: str
     name: str
@@ -30,22 +30,22 @@ class Element:
     guards: dict[str, dict[int, str]]
     descriptor: Any
     tape: Tape | None = None  # hinge kernel of an element without a library
-    slope_tape: Tape | None = None  # and its derivative
-    declared: tuple[Param, ...] = ()  # parameters of a user's element, with bounds and defaults
+    slope_tape: Tape | None = None  # derivative of that kernel
+    declared: tuple[Param, ...] = ()  # parameters of a user-defined element, bounds and defaults
     hash: str = ""  # of its definition
-    spec: ElementSpec | None = None  # that, of one that a scene makes itself
+    spec: ElementSpec | None = None  # definition, of an element that a scene generates itself
     owner: Any = None  # keeps the library or the arrays of the descriptor alive
 
 
 @cache
 def module() -> tuple[Any, Any]:
-    """(ffi, lib) of the compiled kernels.  EnvironmentFailure if they are missing or stale."""
+    """Load (ffi, lib) of the compiled kernels.  EnvironmentFailure if missing or out of date."""
     try:
         kernels: Any = import_module("mstmm.generated._kernels")
     except ImportError as error:
         raise EnvironmentFailure(
             f"the compiled kernels cannot be loaded ({error}); give the process more memory, or "
-            "install mstmm again: "
+            "reinstall mstmm: "
             "pip install -e . (a C compiler is needed)"
         ) from error
     _refuse_stale(kernels)
@@ -53,15 +53,15 @@ def module() -> tuple[Any, Any]:
 
 
 def _refuse_stale(kernels: Any) -> None:
-    """The module must come from the C text beside it: after an update it may be an older one."""
+    """Reject a module that was not built from the installed C text, as after an update."""
     try:
         found = text(kernels.ffi, getattr(kernels.lib, BUILT_FROM))
-    except AttributeError:  # before modules told
+    except AttributeError:  # an older module without this string
         found = ""
     if found != built_from(Path(str(files("mstmm")))):
         raise EnvironmentFailure(
-            f"the compiled kernels {kernels.__file__} belong to another version of mstmm; build "
-            "them again: pip install -e . in the checkout, or pip install --force-reinstall mstmm "
+            f"the compiled kernels {kernels.__file__} belong to another version of mstmm; rebuild "
+            "them: pip install -e . in the checkout, or pip install --force-reinstall mstmm "
             "(a C compiler is needed)"
         )
 
@@ -77,7 +77,7 @@ def describe(ffi: Any, descriptor: Any) -> Element:
     if descriptor.abi != abi.ABI:
         raise EnvironmentFailure(
             f"element {name!r} was built for layout {descriptor.abi}, this mstmm has {abi.ABI}; "
-            "generate it again: mstmm generate FILE"
+            "regenerate it: mstmm generate FILE"
         )
     functions, guards = {}, {}
     for i in range(descriptor.n_kernels):
@@ -103,7 +103,7 @@ def elements() -> dict[tuple[str, str], Element]:
 
 
 def element(kind: str, name: str) -> Element:
-    """A prebuilt element.  ElementError if there is none of that name."""
+    """Prebuilt element by kind and name.  ElementError if there is none."""
     try:
         return elements()[kind, name]
     except KeyError:

@@ -1,7 +1,7 @@
-"""Calls of C at the least cost: what stays the same is handed over once, rows at each call.
+"""Prepared calls of C with the lowest overhead: only rows of numbers are passed at each call.
 
-The module that makes them lies in the library of the compiled kernels, beside the one that cffi
-writes; its text is runtime/engine/states/c/prepared.c.
+Their extension module is in the library of the compiled kernels, next to the module written by
+cffi; its text is runtime/engine/states/c/prepared.c.
 """
 
 from __future__ import annotations
@@ -19,15 +19,17 @@ _NAME = "mstmm.generated._prepared"
 
 
 class Call(Protocol):
-    """Rows of doubles in, a number (a float) before them where the call has one; a new array out,
-    or several.  None where what is given is anything else, or where C gives up: then the general
-    way serves, or says what is wrong."""
+    """Prepared call: rows of doubles in, one or several new arrays out.
+
+    A call that is `numbered` has a float before the rows.  Returns None for any other arguments and
+    for a failure in C: the caller then uses the general call, which reports what is wrong.
+    """
 
     def __call__(self, *given: Any) -> Any: ...
 
 
 def nothing(*given: Any) -> None:
-    """The call that always leaves it to the general way."""
+    """Return None, so that the caller uses the general call."""
     return
 
 
@@ -41,12 +43,12 @@ def prepared(
     released: bool = False,
     kept: object = None,
 ) -> Call:
-    """A call of a function of C, by its name, on a record.
+    """Prepare a call of the C function of that name on a record.
 
-    `widths` are those of the rows, `shapes` those of the answers.  A number comes first where it is
-    `numbered`; where it is `optional` the last row may be None.  Other threads run meanwhile where
-    it is `released`: then each needs a record of its own; otherwise one serves all.  `kept` is what
-    the record points to.
+    `widths` are the widths of the rows, `shapes` the shapes of the results.  With `numbered` a
+    number precedes the rows; with `optional` the last row may be None.  With `released` other
+    threads run during the call, and each thread needs its own record; otherwise one record serves
+    all.  `kept` is the memory to which the record points.
     """
     ffi, lib = prebuilt.module()
 

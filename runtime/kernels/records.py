@@ -1,4 +1,4 @@
-"""Arrays of C records held by numpy: filled one by one through cffi, or column by column."""
+"""Arrays of C structs in numpy memory: filled one by one through cffi, or column by column."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ T = TypeVar("T")
 
 
 class Records:
-    """`count` records of a C struct, zero at first, in one block of memory.
+    """Array of `count` records of a C struct, initially zero, in one block of memory.
 
-    `array` is what cffi sees (`array[3].parent = 2`); `column` is one field of all of them.
+    `array` is its cffi view (`array[3].parent = 2`); `column` is one field of all records.
     """
 
     def __init__(self, ffi: Any, struct: str, count: int) -> None:
@@ -30,7 +30,7 @@ class Records:
         self._fields = dict(ffi.typeof(struct).fields)
 
     def column(self, name: str) -> NDArray[Any]:
-        """A field of all records, writable: whole numbers, or addresses of pointers."""
+        """Writable view of a field of all records: integers, or addresses of pointers."""
         field = self._fields[name]
         kind: Any = _WHOLE.get(field.type.cname, np.uintp)
         return np.ndarray(
@@ -38,23 +38,23 @@ class Records:
         )  # fmt: skip
 
     def write(self, name: str, values: Integers) -> None:
-        """Fill a column.  SceneError where its numbers do not fit the C type."""
+        """Fill a column.  SceneError if its numbers do not fit the C type."""
         column = self.column(name)
         if len(values) and int(values.max()) > np.iinfo(column.dtype).max:
             raise SceneError(
-                f"the scene has {self.count} bodies, more than the engine counts ({name}); "
-                "make it smaller"
+                f"the scene has {self.count} bodies, more than the engine supports ({name}); "
+                "use fewer bodies"
             )
         column[:] = values
 
     def copy(self, places: slice, prototypes: Records, which: Integers) -> None:
-        """Records `places` become copies of the prototypes of these numbers."""
+        """Copy the prototypes with indices `which` into the records `places`."""
         whole = np.dtype((np.void, self.numbers.shape[1]))
         self.numbers[places].view(whole)[:, 0] = prototypes.numbers.view(whole)[:, 0][which]
 
 
 class Lookup(Mapping[str, T]):
-    """Something of every body or hinge by its name, made from its number when asked for."""
+    """Mapping from names of bodies or hinges to values computed from their index on access."""
 
     def __init__(self, members: Members[Any], get: Callable[[int], T]) -> None:
         self.members, self.get_number = members, get

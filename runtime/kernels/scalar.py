@@ -1,4 +1,4 @@
-"""One kernel, compiled in float, double or quadruple precision, called with numpy arrays."""
+"""Kernel compiled in float, double or quadruple precision, called with numpy arrays."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from mstmm.ir import KernelIR
 
 
 class ScalarKernel:
-    """A kernel in one scalar type.
+    """Kernel in one scalar type.
 
-    Arrays have the shapes of the ports; in quadruple precision with one more axis of length 2
-    behind them: the high and the low double of each value, which is their exact sum (`fractions`).
+    Arrays have the shapes of the ports.  In quadruple precision they have an additional last axis
+    of length 2: the high and the low double of each value, which is their exact sum (`fractions`).
     """
 
     def __init__(self, kernel: KernelIR, scalar: str, path: Path) -> None:
-        """Raises EnvironmentFailure if the library cannot be loaded."""
+        """Load the library; raises EnvironmentFailure if that fails."""
         self.kernel, self.scalar = kernel, scalar
         self._type = SCALARS[scalar]
         try:
@@ -40,11 +40,11 @@ class ScalarKernel:
     def __call__(
         self, inputs: Mapping[str, ArrayLike], start: Mapping[str, ArrayLike] | None = None
     ) -> tuple[int, dict[str, NDArray[Any]]]:
-        """(guard code or 0, outputs by name) for inputs by name.
+        """Evaluate (guard code or 0, outputs by name) for inputs by name.
 
-        In quadruple precision an input may also be given in doubles alone (without the last axis).
-        `start` holds what the arrays of outputs hold beforehand, for those that accumulate; zero
-        otherwise.  Raises ValueError for an input that is missing or of a wrong shape.
+        In quadruple precision an input may also be given in doubles (without the last axis).
+        `start` contains the initial values of outputs that accumulate, zero by default.
+        Raises ValueError for an input that is missing or of a wrong shape.
         """
         given = []
         for port in self.kernel.inputs:
@@ -59,7 +59,7 @@ class ScalarKernel:
         return code, outputs
 
     def _array(self, name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[Any]:
-        """A contiguous array of its own, with the axis of parts in quadruple precision."""
+        """Contiguous copy of an array, with the additional axis in quadruple precision."""
         parts = self._type.parts
         whole = (*shape, parts) if parts > 1 else shape
         if value is None:

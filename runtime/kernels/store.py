@@ -1,7 +1,7 @@
-"""The user's kernel store: elements generated from files outside the package, one folder each.
+"""User's kernel store: elements generated from files outside the package, one folder each.
 
-A folder `hinge_knee/` holds the stored element (JSON), its C text and, where a compiler was found,
-an entry with its library (`entry.py`), built and checked as those of the cache are.  Loading reads
+A folder `hinge_knee/` contains the stored element (JSON), its C text and, if a compiler was found,
+an entry with its library (`entry.py`), built and checked like those of the cache.  Loading reads
 these files and executes none of the definitions.  Hinges without a library are interpreted from
 their IR.
 """
@@ -40,15 +40,15 @@ from .prebuilt import Element
 
 Key = tuple[str, str]
 
-_ROOT = (0,)  # may put a store where all can read it
-#: What a definition that is kept is called; reading a scene never runs it.
+_ROOT = (0,)  # user who may own a store that all can read
+#: File name of a stored definition; reading a scene never executes it.
 DEFINITION = "definition.py"
 _WHAT = "kernel store"
-_WAY_OUT = "set MSTMM_KERNELS to a folder of your own"
+_WAY_OUT = "set MSTMM_KERNELS to a folder that you own"
 
 
 def folder() -> Path:
-    """The store: $MSTMM_KERNELS, or a folder of the user's."""
+    """Folder of the store: $MSTMM_KERNELS, or the user's data folder."""
     named = os.environ.get("MSTMM_KERNELS")
     if named:
         return Path(named)
@@ -62,11 +62,11 @@ def _place(key: Key) -> Path:
 
 
 def _trusted(place: Path) -> None:
-    """EnvironmentFailure if somebody else may have put something into a folder of the store.
+    """Raise EnvironmentFailure if other users could have written to a folder of the store.
 
-    What lies there becomes equations and code of this process.
+    Its files become equations and code of this process.
     """
-    with suppress(OSError):  # not there: nothing to trust
+    with suppress(OSError):  # the folder does not exist: nothing to check
         for each in (folder(), place):
             problem = objection(each, os.stat(each), _WHAT, _WAY_OUT, _ROOT)
             problem = problem or parent_objection(each, _WHAT, _WAY_OUT)
@@ -75,10 +75,11 @@ def _trusted(place: Path) -> None:
 
 
 def keep(spec: ElementSpec, files: dict[str, str]) -> tuple[Path, str]:
-    """Write a generated element (`files`: name -> C text) and compile it.
+    """Write a generated element (`files`: name -> C text) into the store and compile it.
 
-    Returns its folder and a sentence on how it will run.  Raises EnvironmentFailure if the folder
-    cannot be written, or if a body or force element cannot be compiled.
+    Returns its folder and a phrase that says whether it is compiled or interpreted.  Raises
+    EnvironmentFailure if the folder cannot be written, or if a body or force element cannot be
+    compiled.
     """
     place = _place((spec.kind, spec.name))
     _trusted(place)
@@ -107,8 +108,10 @@ def keep(spec: ElementSpec, files: dict[str, str]) -> tuple[Path, str]:
 
 
 def definition(key: Key) -> Path:
-    """The file from which an element of the store was generated.  ElementError where none is kept
-    or others may have written it."""
+    """File from which an element of the store was generated.
+
+    ElementError if there is none or other users could have written it.
+    """
     place = _place(key)
     _trusted(place)
     try:
@@ -116,13 +119,13 @@ def definition(key: Key) -> Path:
     except (OSError, Damaged) as error:
         raise ElementError(
             f"{key[0]}_{key[1]}: the kernel store has no definition of it ({error}); show its file "
-            "instead: mstmm show MY_FILE.py, or generate it again"
+            "instead: mstmm show MY_FILE.py, or regenerate it"
         ) from None
     return place / DEFINITION
 
 
 def _replaces(place: Path, spec: ElementSpec) -> str:
-    """A remark if another definition of this name is in the store."""
+    """Remark for messages if another definition of this name is in the store, else ""."""
     try:
         earlier = element_from_json((place / "element.json").read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
@@ -132,7 +135,7 @@ def _replaces(place: Path, spec: ElementSpec) -> str:
     return f", replacing another definition of {spec.kind} {spec.name}"
 
 
-#: Flags of users' kernels: those of the prebuilt ones, with the descriptor in sight.
+#: Flags of user-defined kernels: those of the prebuilt ones, but with an exported descriptor.
 _FLAGS = tuple(flag for flag in COMPILE_ARGS if flag != "-fvisibility=hidden")
 
 
@@ -141,7 +144,7 @@ def _library_place(spec: ElementSpec) -> Path:
 
 
 def _order(spec: ElementSpec) -> Order:
-    """How the library is made of the texts in the store, now or when it was found damaged."""
+    """Build order of an element's library from the texts in the store."""
     place = _place((spec.kind, spec.name))
     decides = " ".join((spec.hash(), str(abi.ABI), *_FLAGS))
 
@@ -152,7 +155,7 @@ def _order(spec: ElementSpec) -> Order:
         except (OSError, Damaged) as error:
             why = getattr(error, "strerror", None) or error
             raise EnvironmentFailure(
-                f"{place} lacks its C text ({why}); generate it again: mstmm generate FILE"
+                f"{place} lacks its C text ({why}); regenerate it: mstmm generate FILE"
             ) from None
 
     return Order(
@@ -168,7 +171,7 @@ def _remove_old(place: Path, current: Path) -> None:
 
 
 def specs() -> dict[Key, ElementSpec]:
-    """Every element in the store; files that cannot be read are passed over."""
+    """All elements in the store; files that cannot be read are skipped."""
     found: dict[Key, ElementSpec] = {}
     for path in sorted(folder().glob("*/element.json")):
         _trusted(path.parent)
@@ -181,7 +184,7 @@ def specs() -> dict[Key, ElementSpec]:
 
 
 def spec(key: Key) -> ElementSpec | None:
-    """One element of the store, None if it is not there.  ElementError if its file is damaged."""
+    """Element of the store by kind and name, or None.  ElementError if its file is damaged."""
     path = _place(key) / "element.json"
     if not path.is_file():
         return None
@@ -193,25 +196,22 @@ def _read(path: Path) -> ElementSpec:
     try:
         return element_from_json(read_private(path).decode())
     except Damaged as damage:
-        raise EnvironmentFailure(
-            f"{path}: {damage}; generate it again: mstmm generate FILE"
-        ) from None
+        raise EnvironmentFailure(f"{path}: {damage}; regenerate it: mstmm generate FILE") from None
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         said = f"{type(error).__name__}: {error}"
         raise ElementError(
-            f"{path}: the stored element is damaged ({said}); "
-            "generate it again: mstmm generate FILE"
+            f"{path}: the stored element is damaged ({said}); regenerate it: mstmm generate FILE"
         ) from error
 
 
 @cache
 def opened(key: Key, content: str) -> Element:
-    """The element of the store with this hash, ready to be called."""
+    """Open the element of the store with the hash `content` for calls."""
     stored = spec(key)
     assert stored is not None and stored.hash() == content
     try:
         element = _compiled(stored)
-    except EnvironmentFailure:  # damaged, and it cannot be built again
+    except EnvironmentFailure:  # damaged, and it cannot be rebuilt
         if stored.kind != "hinge":
             raise
         element = None
@@ -226,9 +226,9 @@ def opened(key: Key, content: str) -> Element:
 
 
 def _compiled(stored: ElementSpec) -> Element | None:
-    """The element from its library, None if there is none.
+    """Element from its compiled library, None if there is none.
 
-    A library that is damaged or does not open (of another machine) is built again from its text.
+    A library that is damaged or cannot be opened (of another machine) is rebuilt from its text.
     """
     place, order = _library_place(stored), _order(stored)
     try:
@@ -243,7 +243,7 @@ def _from_library(stored: ElementSpec, library: Path) -> Element:
     separate = cffi.FFI()
     separate.cdef(abi.cdef(registry=False))
     symbol = abi.element_symbol(stored.kind, stored.name)
-    separate.cdef(f"extern mstmm_element {symbol};")  # cffi reads no constant this way
+    separate.cdef(f"extern mstmm_element {symbol};")  # without const: cffi cannot read it otherwise
     try:
         lib = separate.dlopen(str(library))
         pointer: Any = separate.addressof(lib, symbol)  # type: ignore[arg-type]
@@ -285,7 +285,7 @@ def _interpreted(stored: ElementSpec) -> Element:
 
 
 def needed(scene: Scene) -> list[Key]:
-    """Types of a scene that are not built in."""
+    """Types of a scene that are not built in, sorted."""
     elements = prebuilt.elements()
     return sorted(
         key
@@ -295,7 +295,7 @@ def needed(scene: Scene) -> list[Key]:
 
 
 def known(keys: Iterable[Key]) -> tuple[dict[Key, Element], dict[Key, ElementSpec]]:
-    """Elements and definitions of the store for these types, those that there are."""
+    """Load those elements and definitions of these types that are in the store."""
     elements: dict[Key, Element] = {}
     definitions: dict[Key, ElementSpec] = {}
     for key in keys:
@@ -308,8 +308,10 @@ def known(keys: Iterable[Key]) -> tuple[dict[Key, Element], dict[Key, ElementSpe
 
 
 def recognised(stored: ElementSpec) -> ElementSpec:
-    """The same, told to run as a built-in hinge if it has the kernel of one: those are compiled,
-    and the sweep has more to offer them."""
+    """Element that runs as a built-in hinge if it has the same kernel, else the element itself.
+
+    Built-in hinges are compiled, and the sweep has specialised code for them.
+    """
     mine = stored.facts
     if mine is None:
         return stored

@@ -1,4 +1,4 @@
-"""A KernelIR run by the interpreter that is always there: arrays in, arrays out, no compiler."""
+"""Kernel on the bytecode interpreter, which needs no compiler: arrays in, arrays out."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from . import prebuilt
 
 
 def c_tape(ffi: Any, tape: Tape, kept: list[Any]) -> Any:
-    """`mstmm_tape *`; its arrays are added to `kept`, which must outlive it."""
+    """Convert a tape to `mstmm_tape *`; its arrays are added to `kept`, which must outlive it."""
     arrays = {
         "input_lengths": ffi.new("int[]", list(tape.input_lengths) or [0]),
         "constants": ffi.new("real[]", list(tape.constants) or [0.0]),
@@ -33,7 +33,7 @@ def c_tape(ffi: Any, tape: Tape, kept: list[Any]) -> Any:
 
 
 class TapeKernel:
-    """One kernel of fixed size as a tape.  One thread at a time."""
+    """Kernel of fixed size as a tape.  Not thread-safe."""
 
     def __init__(self, kernel: KernelIR) -> None:
         self._ffi, self._lib = prebuilt.module()
@@ -55,8 +55,11 @@ class TapeKernel:
         return found
 
     def run(self, values: Mapping[str, Array]) -> tuple[int, dict[str, Array]]:
-        """(code, outputs): 0, or the code of the guard that failed; the outputs are views that
-        the next run overwrites.  Inputs that are not given keep their last values (0 at first)."""
+        """Evaluate (code, outputs); the code is 0, or that of the guard that failed.
+
+        The outputs are views that the next run overwrites.  Omitted inputs keep their last values
+        (initially 0).
+        """
         for name, array in self._inputs.items():
             if name in values:
                 array[: len(values[name])] = values[name]

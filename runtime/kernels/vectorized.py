@@ -1,7 +1,7 @@
-"""Kernels evaluated with numpy over many points at once: for results, not for the integration.
+"""Kernels evaluated with numpy for many points at once: for results, not for the integration.
 
-Every value carries two axes behind those of the points, one for each loop of a run-time sized
-kernel; outside the loops they have the length 1.  So a loop is one array operation.
+Every value has two last axes after those of the points, one for each loop of a kernel whose size is
+given at run time; outside the loops they have length 1.  A loop is then one array operation.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from mstmm.ir.replay import Replay
 
 
 def evaluate(kernel: KernelIR, inputs: Mapping[str, ArrayLike], n: int = 0) -> dict[str, Array]:
-    """Outputs of a kernel in doubles, for any number of points at once.
+    """Evaluate the outputs of a kernel in doubles, for any number of points at once.
 
-    `inputs[port]` has the port's shape behind any number of leading axes, which are broadcast
-    against those of the other inputs and lead every output; `n` is the run-time size of a kernel
-    that has one.  An output that accumulates holds the increment; what is never stored is 0.
-    Raises NumericalFailure where a guard or a pivot fails at any point, ValueError for a missing
+    `inputs[port]` has the port's shape after any number of leading axes, which are broadcast
+    against those of the other inputs and precede every output; `n` is the run-time size of a kernel
+    that has one.  An output that accumulates contains the increment; entries never stored are 0.
+    Raises NumericalFailure if a guard or a pivot fails at any point, ValueError for a missing
     input or one that does not end in its port's shape.
     """
     with np.errstate(all="ignore"):
@@ -47,7 +47,7 @@ def evaluate(kernel: KernelIR, inputs: Mapping[str, ArrayLike], n: int = 0) -> d
 
 
 class _Axes(Replay):
-    """One evaluation, every loop an axis."""
+    """Evaluation of a kernel with an array axis for every loop."""
 
     def __init__(self, kernel: KernelIR, inputs: Mapping[str, ArrayLike], n: int) -> None:
         super().__init__(kernel, _OPERATIONS, n)
@@ -57,7 +57,7 @@ class _Axes(Replay):
         self.results: dict[str, Array] = {
             port.name: np.zeros((*lead, *self._shape(port))) for port in kernel.outputs
         }
-        #: What can be read: inputs, and outputs that are complete.
+        #: Arrays that statements read: inputs, and complete outputs.
         self.arrays = given | self.results
 
     def _shape(self, port: Port) -> tuple[int, ...]:
@@ -85,12 +85,12 @@ class _Axes(Replay):
         if product is not None:
             return product
         value: Array = self.inside(statement)
-        # A value that is the same for all has the length 1 there.
+        # A value that is equal for all indices has length 1 there.
         alike = value.shape[axis] == 1
         return np.asarray(value * self.n if alike else value.sum(axis=axis, keepdims=True))
 
     def _product(self, statement: Sum, axis: int) -> Array | None:
-        """The sum where it is a vector of every point times a matrix that is the same for all."""
+        """Sum as a matrix product if it is a vector per point times a common matrix, else None."""
         (inner, *more) = statement.body
         if more or not isinstance(inner, Assign) or inner.op != "mul":
             return None
@@ -136,7 +136,7 @@ class _Axes(Replay):
             self._by_rows(solve)
 
     def _by_rows(self, solve: Solve) -> None:
-        """LU with row exchange, point by point in LAPACK; pivots are judged by what it leaves."""
+        """Solve by LU with row exchange, per point in LAPACK; fails only for a zero pivot."""
         a, b = self.arrays[solve.matrix], self.arrays[solve.right]
         alone = len(self.ports[solve.port].shape) == 1
         try:
@@ -146,7 +146,7 @@ class _Axes(Replay):
         self.results[solve.port][...] = found[..., 0] if alone else found
 
     def _by_diagonal(self, solve: Solve) -> None:
-        """L D L^T without pivoting, from the lower half of the matrix, for all points at once."""
+        """Solve by L D L^T without pivoting from the lower triangle, for all points at once."""
         a = self.arrays[solve.matrix]
         a = np.tril(a) + np.swapaxes(np.tril(a, -1), -1, -2)
         rest, lower = a.copy(), np.zeros_like(a)
@@ -179,12 +179,12 @@ def _slices(index: tuple[int | str, ...]) -> tuple[Any, ...]:
 
 
 def _true(value: Array) -> NDArray[np.bool_]:
-    """Neither zero nor NaN."""
+    """Mask of the values that are neither zero nor nan."""
     return np.abs(value) > 0
 
 
 def _function(row: Operation) -> Callable[..., Array]:
-    """The function of arrays; numpy takes a NaN for true, and its truths are no numbers."""
+    """Array function of an operation; unlike in numpy, nan is false and results are floats."""
     function, asked = getattr(np, row.numpy), row.conditions
 
     def call(*args: Array) -> Array:

@@ -94,7 +94,7 @@ def test_another_library_is_refused(cache: Path, monkeypatch: pytest.MonkeyPatch
     model = mstmm.compile(mstmm.Scene(**data))
     model.derivatives(q, u)
     (path,) = [p for p in cache.rglob("*.so") if hasattr(ctypes.CDLL(str(p)), SYMBOL)]
-    with pytest.raises(EnvironmentFailure, match="is not the library of derivatives meant"):
+    with pytest.raises(EnvironmentFailure, match="is not the expected library of derivatives"):
         open_columns(path, "another key")
     with pytest.raises(EnvironmentFailure, match="cannot be loaded"):
         open_columns(cache / "nothing.so", "key")

@@ -68,16 +68,16 @@ def test_methods_in_turn_keep_events_outputs_and_breaks(lab: Lab, case: str) -> 
 
 def test_a_change_is_refused_where_it_makes_no_sense(lab: Lab) -> None:
     fixed = bouncing(lab).run("rk4", 1.2, START, step=0.01)
-    with pytest.raises(SceneError, match='"dop853" cannot take this run over'):
+    with pytest.raises(SceneError, match='"dop853" cannot continue this run'):
         fixed.change(get("dop853"))
     adaptive = bouncing(lab).run("dop853", 1.2, START)
-    with pytest.raises(SceneError, match='"rk4" cannot take this run over'):
+    with pytest.raises(SceneError, match='"rk4" cannot continue this run'):
         adaptive.change(get("rk4"))
     without = lab.problem("harmonic", 2, 1.0).run("dop853", 1.2, START)
     with pytest.raises(SceneError, match="needs a tangent"):
         without.change(get("rodas4p2"))
     assert without.advance(60.0) is Status.FINISHED
-    with pytest.raises(SceneError, match="cannot take this run over"):
+    with pytest.raises(SceneError, match="cannot continue this run"):
         without.change(get("dopri5"))
 
 
@@ -149,5 +149,5 @@ def test_a_run_without_a_next_step_goes_on_by_another_method(lab: Lab) -> None:
     assert run.y == pytest.approx(wanted.y, abs=1e-6)
     limited = lab.mechanism("pendulum", 20.0, 0.5).run("rodas5p", 1.5, start, max_steps=5)
     assert limited.advance(60.0) is Status.TOO_MANY_STEPS and not limited.no_step
-    with pytest.raises(SceneError, match="cannot take this run over"):
+    with pytest.raises(SceneError, match="cannot continue this run"):
         limited.change(get("dop853"))

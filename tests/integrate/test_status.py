@@ -200,7 +200,7 @@ def test_arguments_that_make_no_sense_are_named(lab: Lab) -> None:
         ({"t_start": math.nan}, "the times"),
         ({"atol": 0.0}, "absolute tolerances above zero"),
         ({"rtol": -1.0}, "tolerances or steps"),
-        ({"step": 0.0}, "a fixed step is a time above zero"),
+        ({"step": 0.0}, "expected a time above zero"),
         ({"breaks": [0.5, 0.5]}, "strictly increasing"),
         ({"breaks": [math.nan]}, "strictly increasing"),
         ({"output_times": [0.5, 0.2]}, "the output times"),

@@ -64,7 +64,7 @@ def test_stability_limits_are_the_published_ones() -> None:
 
 
 def test_unknown_method_names_the_known_ones() -> None:
-    with pytest.raises(SceneError, match=r'"rk5" is not known; there are: auto, rk4, dopri5'):
+    with pytest.raises(SceneError, match=r'"rk5" is not known; available are: auto, rk4, dopri5'):
         steppers.get("rk5")
 
 

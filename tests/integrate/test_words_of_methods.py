@@ -45,7 +45,7 @@ def test_no_end_in_sight(implicit: bool) -> None:
 @pytest.mark.parametrize("method", FIXED)
 def test_a_method_of_fixed_steps_names_one_of_its_kind(method: str) -> None:
     instead = "dopri5" if method in EXPLICIT else "genalpha"
-    words = f'method "{method}" takes fixed steps: give step in s, or take {instead},'
+    words = f'method "{method}" takes fixed steps: give step in s, or use {instead},'
     assert get(instead).adaptive
     with pytest.raises(SceneError, match=words):
         runaway().simulate(0.1, method)
@@ -56,9 +56,9 @@ def test_a_method_of_fixed_steps_names_one_of_its_kind(method: str) -> None:
 WRONG: list[tuple[dict[str, Any], str]] = [
     ({"tangent": "foo"}, 'tangent = "foo": expected'),
     ({"method": "rodas4", "tangent": "laws"}, 'tangent = "laws": rodas4 falls'),
-    ({"tangent": "exact"}, 'tangent = "exact": method "auto" takes none'),
+    ({"tangent": "exact"}, 'tangent = "exact": method "auto" has no tangent to choose'),
     ({"method": "rodas6"}, 'method "rodas6" is not known'),
-    ({"method": "rodas4", "radius": 0.5}, 'method "rodas4" takes none'),
+    ({"method": "rodas4", "radius": 0.5}, 'method "rodas4" has no such parameter'),
     ({"method": "auto", "step": 0.1}, 'method "auto" chooses its steps'),
     ({"method": "scipy-RK45", "step": 0.1}, 'method "scipy-RK45" chooses its own steps'),
     ({"method": "dttmm-classical"}, 'method "dttmm-classical" takes fixed steps'),

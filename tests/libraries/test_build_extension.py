@@ -154,7 +154,7 @@ def test_a_folder_without_c_says_how_to_get_it(project: Path) -> None:
 
 def test_a_module_from_other_text_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """After an update the module beside the new C may be the old one, with other functions."""
-    again = r"_kernels.* belong to another version of mstmm; build them again: pip install -e \."
+    again = r"_kernels.* belong to another version of mstmm; rebuild them: pip install -e \."
     assert prebuilt.module.__wrapped__() == prebuilt.module()
     with monkeypatch.context() as patch:
         patch.setattr(prebuilt, "built_from", lambda folder: "0" * 64)

@@ -8,7 +8,7 @@ import pytest
 
 import mstmm
 
-SAID = "holds, and the motion goes on into it"
+SAID = "holds, and the motion continues into it"
 BOUNCE = {"event": [{"name": "floor", "when": "slide.q <= 0", "do": "bounce", "restitution": 0.5}]}
 STOP = {"lower": 0.0, "restitution": 0.5}
 

@@ -110,7 +110,7 @@ def test_steps_that_would_leave_nothing_but_rounding_are_refused() -> None:
     scene = mstmm.Scene(gravity=(0, 0, 0), body=[{"name": "mass", "mass": 1.0}], hinge=[spring])
     run = mstmm.compile(scene, engine="looped").simulate(1.0, "exprb32", 1.0)
     assert run.status is Status.TANGENT_FAILED
-    assert "nothing but rounding of its fastest motion; take a shorter step" in run.message
+    assert "lose its fastest motion to rounding; use a shorter step" in run.message
 
 
 def test_more_unknowns_than_it_takes_are_refused() -> None:

@@ -138,7 +138,7 @@ def test_springs_that_hold_a_chain_allow_every_step(method: str) -> None:
 def test_a_method_that_does_not_exist_is_refused_with_those_that_do() -> None:
     model = mstmm.compile(standing(200.0), engine="looped")
     with pytest.raises(
-        SceneError, match=r'"rodas4p3" is not known; there are: .*rodas4p2.*houbolt'
+        SceneError, match=r'"rodas4p3" is not known; available are: .*rodas4p2.*houbolt'
     ):
         model.simulate(1.0, "rodas4p3")
     start = model.initial_state()
@@ -160,6 +160,6 @@ def test_a_radius_out_of_range_is_refused(radius: float) -> None:
 def test_methods_of_fixed_steps_ask_for_one(method: str) -> None:
     model = mstmm.compile(standing(200.0), engine="looped")
     with pytest.raises(
-        SceneError, match=f'"{method}" takes fixed steps: give step in s, or take genalpha'
+        SceneError, match=f'"{method}" takes fixed steps: give step in s, or use genalpha'
     ):
         model.simulate(0.1, method)

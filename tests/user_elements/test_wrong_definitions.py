@@ -395,5 +395,5 @@ def test_damaged_store_says_so(tmp_path: Path, store: Path) -> None:
     path.write_text(CRANK)
     (made,) = mstmm.generate_file(path)
     (made.folder / "element.json").write_text("{}")
-    with pytest.raises(mstmm.ElementError, match=r"is damaged .*generate it again"):
+    with pytest.raises(mstmm.ElementError, match=r"is damaged .*regenerate it"):
         mstmm.compile(mstmm.Scene(**crank({"r": 1.0})))

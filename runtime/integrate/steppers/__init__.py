@@ -1,8 +1,8 @@
 """Time-integration methods by name.
 
-A new method is one file: a function `tableau() -> Tableau`, of an explicit Runge-Kutta method by
-`Tableau` itself, of an implicit one by what `implicit` offers.  Inside the package its module name
-goes into `BUILT_IN`; outside it, call `register(my_tableau())` before the run.  Nothing else
+A new method is one file with a function `tableau() -> Tableau`: `Tableau` itself for an explicit
+Runge-Kutta method, a class of `implicit` for an implicit one.  Inside the package its module name
+is added to `BUILT_IN`; outside it, call `register(my_tableau())` before the run.  Nothing else
 changes: the C loop reads the coefficients at run time.
 """
 
@@ -47,18 +47,18 @@ IMPLICIT = (
 )  # fmt: skip
 BUILT_IN = EXPLICIT + IMPLICIT
 
-#: Explicit methods, as messages name those that follow what others cannot.
+#: Explicit methods, as messages list them.
 EXPLICIT_METHODS = f"{', '.join(EXPLICIT[:-1])} or {EXPLICIT[-1]}"
 
-#: Methods that leave a spectral radius to infinitely fast motion, which a run may choose.
+#: Methods whose spectral radius at infinity a run may choose.
 WITH_RADIUS = ("genalpha", "dttmm", "genalpha-index3")
 
-#: Ending of methods whose steps ask closed loops for positions at their ends: those without it ask
-#: for accelerations, and close the loops behind each step.
+#: Suffix of methods that satisfy the position constraints of closed loops at the end of a step;
+#: the others satisfy those of accelerations and project the state after each step.
 ON_POSITIONS = "-index3"
 
-#: Tangents of the equations of motion that implicit methods may take, in the order of the C loop's
-#: numbers: auto is the exact one for Rosenbrock methods, while iterations try that of laws alone.
+#: Tangents of the equations of motion for implicit methods, in the order of the C loop's numbers:
+#: auto is the exact one for Rosenbrock methods; iterations first try that of inertia and laws.
 TANGENTS = ("auto", "exact", "laws")
 
 #: Rosenbrock methods whose order does not depend on the tangent, and methods that iterate.
@@ -68,7 +68,7 @@ ITERATED = (
     "hht-index3",
 )  # fmt: skip
 
-#: The name of the choice that a run makes among methods, and the one by which it begins.
+#: Name of the automatic choice of a method, and the method with which it starts.
 AUTO, AUTO_EXPLICIT = "auto", "dop853"
 
 _registered: dict[str, Tableau] = {}
@@ -84,10 +84,10 @@ def _built_in(name: str, radius: float | None = None) -> Tableau:
 
 
 def register(tableau: Tableau) -> None:
-    """Makes a method known by its name.
+    """Register a method under its name.
 
     Raises:
-        ValueError: if the name is taken.
+        ValueError: if the name exists already.
     """
     if tableau.name in (AUTO, *names()):
         raise ValueError(f"a method named {tableau.name!r} exists already")
@@ -95,25 +95,28 @@ def register(tableau: Tableau) -> None:
 
 
 def names() -> tuple[str, ...]:
-    """The names that `get` knows."""
+    """Names of all methods that `get` accepts."""
     return (*BUILT_IN, *_registered)
 
 
 def check_damped(name: str, radius: float | None) -> None:
-    """SceneError for steps on positions that damp nothing."""
+    """Raise SceneError for methods with position constraints (index 3) and no damping."""
     if name != f"newmark{ON_POSITIONS}" and not (name.endswith(ON_POSITIONS) and radius == 1.0):
         return
     given = f'method "{name}"' if radius is None else f'radius = {radius:g}: method "{name}"'
     raise SceneError(
-        f"{given} would damp nothing, and errors of multipliers, which on rows of positions go by "
-        f"1/step^2, would grow from step to step; take genalpha{ON_POSITIONS} with a radius below "
-        f"1, or {name.removesuffix(ON_POSITIONS)}, which asks for accelerations"
+        f"{given} would have no damping, and errors of multipliers, which with position "
+        "constraints are proportional to 1/step^2, would grow from step to step; use "
+        f"genalpha{ON_POSITIONS} with a radius below 1, or {name.removesuffix(ON_POSITIONS)}, "
+        "which uses constraints of accelerations"
     )
 
 
 def check_radius(name: str, radius: float | None) -> None:
-    """SceneError for a spectral radius outside 0 to 1, for a method that does not take one, or for
-    one that would damp nothing where it must."""
+    """Raise SceneError for a spectral radius that a method does not permit.
+
+    It must be from 0 to 1, the method must have one, and a method that needs damping must damp.
+    """
     check_damped(name, radius)
     if radius is None:
         return
@@ -121,34 +124,34 @@ def check_radius(name: str, radius: float | None) -> None:
         raise SceneError(f"radius = {radius:g}: expected a spectral radius from 0 to 1")
     if name not in WITH_RADIUS:
         raise SceneError(
-            f'radius = {radius:g}: method "{name}" takes none; those that do are '
-            + ", ".join(WITH_RADIUS)
+            f'radius = {radius:g}: method "{name}" has no such parameter; methods with a radius '
+            "are " + ", ".join(WITH_RADIUS)
         )
 
 
 def check_size(tableau: Tableau, unknowns: int) -> None:
-    """SceneError for more coordinates and speeds together than the method takes."""
+    """Raise SceneError if coordinates and speeds together exceed the limit of the method."""
     if tableau.most_unknowns and unknowns > tableau.most_unknowns:
         raise SceneError(
-            f'method "{tableau.name}" takes the exponential of a matrix of all coordinates and '
-            f"speeds, at most {tableau.most_unknowns}; here there are {unknowns}: take rodas5p or, "
-            "for vibration that is to stay, dop853, or bend bodies by fewer shapes"
+            f'method "{tableau.name}" computes the exponential of a matrix of all coordinates and '
+            f"speeds, at most {tableau.most_unknowns}; found {unknowns}: use rodas5p or, for "
+            "undamped vibration, dop853, or fewer shapes of flexible bodies"
         )
 
 
 def check_steps(tableau: Tableau, step: float | None) -> None:
-    """SceneError for a method without an estimate of its error, and no step to take."""
+    """Raise SceneError for a method without an error estimate if no step is given."""
     if step is not None or tableau.adaptive:
         return
     kin = "genalpha" if tableau.implicit else "dopri5"
     raise SceneError(
-        f'method "{tableau.name}" takes fixed steps: give step in s, or take {kin}, which chooses '
+        f'method "{tableau.name}" takes fixed steps: give step in s, or use {kin}, which chooses '
         "its steps by their error"
     )
 
 
 def check_tangent(name: str, tangent: str) -> None:
-    """SceneError for a tangent that there is not, or with which a method loses what it is for."""
+    """Raise SceneError for an unknown tangent, or one with which a method loses its order."""
     if tangent not in TANGENTS:
         known = ", ".join(TANGENTS)
         raise SceneError(f'tangent = "{tangent}": expected one of {known}')
@@ -159,25 +162,25 @@ def check_tangent(name: str, tangent: str) -> None:
         return
     if name in IMPLICIT:
         raise SceneError(
-            f'tangent = "{tangent}": {name} falls to a low order without the exact tangent (rodas4 '
-            f"to the first); those that do without are {', '.join(able)}"
+            f'tangent = "{tangent}": {name} has a low order without the exact tangent (rodas4 the '
+            f"first); methods that do not need it are {', '.join(able)}"
         )
     raise SceneError(
-        f'tangent = "{tangent}": method "{name}" takes none that could be chosen; those that do '
+        f'tangent = "{tangent}": method "{name}" has no tangent to choose; methods with a tangent '
         f"are {', '.join(IMPLICIT)}"
     )
 
 
 def get(name: str, radius: float | None = None) -> Tableau:
-    """The tableau of a method.
+    """Tableau of a method by its name.
 
     Args:
         name: of the method.
-        radius: spectral radius at infinity, 0 to 1, of a method that lets it be chosen.
+        radius: spectral radius at infinity, 0 to 1, of a method with this parameter.
 
     Raises:
-        SceneError: if there is no such method, and names those there are; for a radius that the
-            method does not take.
+        SceneError: if there is no such method (lists the existing ones), or for a radius that the
+            method does not permit.
     """
     check_radius(name, radius)
     if name in BUILT_IN:
@@ -185,7 +188,7 @@ def get(name: str, radius: float | None = None) -> Tableau:
     if name not in _registered:
         known = ", ".join((AUTO, *names()))
         raise SceneError(
-            f'method "{name}" is not known; there are: {known}, and '
+            f'method "{name}" is not known; available are: {known}, and '
             "SciPy's as scipy-DOP853, -RK45, -RK23, -Radau, -BDF, -LSODA, SUNDIALS' as "
             "sundials-BDF, -Adams; and dttmm-classical, dttmm-classical-product"
         )

@@ -1,4 +1,4 @@
-"""The 8(5,3) method of Dormand, Prince, Hairer and Wanner with its dense output of order 7.
+"""8(5,3) method of Dormand, Prince, Hairer and Wanner with its dense output of order 7.
 
 E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., Springer
 1993, section II.5 (coefficients), II.6 (dense output) and II.10 (error estimate); the decimals are

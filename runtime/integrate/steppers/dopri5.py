@@ -1,4 +1,4 @@
-"""The 5(4) pair of Dormand and Prince with its quartic dense output.
+"""5(4) pair of Dormand and Prince with its quartic dense output.
 
 J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, Journal of Computational
 and Applied Mathematics 6 (1980) 19-26; dense output: L. F. Shampine, Some practical Runge-Kutta

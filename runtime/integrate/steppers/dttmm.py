@@ -1,13 +1,12 @@
-"""Generalised alpha with one linearised equation a step: the discrete-time transfer matrix method.
+"""Discrete-time transfer matrix method: generalised alpha with one linear solution per step.
 
 The equations of motion are linearised at a predictor of second order and solved once, in the
-coordinates of the hinges.  Where the motion is smooth the result is as accurate as the iterated
-method's, for less than half its cost; fast motion that the step does not resolve is not iterated
-away.
+coordinates of the hinges.  For smooth motion the result is as accurate as that of the iterated
+method, for less than half its cost.  Errors of fast motion that the step does not resolve remain.
 
 B. Rong, X. Rui, L. Tao, G. Wang, Discrete time transfer matrix method for launch dynamics modeling
 and cosimulation of self-propelled artillery system, Journal of Applied Mechanics 80 (2013) 011008;
-the maps in time are those of `genalpha`.
+the integration formulas are those of `genalpha`.
 """
 
 from __future__ import annotations
@@ -21,5 +20,5 @@ from .implicit import Implicit, alpha
 def tableau(radius: float = RADIUS) -> Implicit:
     """The method `dttmm`."""
     of: dict[str, Any] = dict(constants(radius))
-    source = "one linearisation a step of Chung and Hulbert (1993)"
+    source = "one linearisation per step of Chung and Hulbert (1993)"
     return alpha("dttmm", source, one_iteration=True, **of)

@@ -1,4 +1,4 @@
-"""A 4(3) pair of diagonally implicit stages, L-stable and stiffly accurate: ESDIRK4(3)6L[2]SA_2.
+"""4(3) pair of diagonally implicit stages, L-stable, stiffly accurate: ESDIRK4(3)6L[2]SA_2.
 
 C. A. Kennedy, M. H. Carpenter, Diagonally implicit Runge-Kutta methods for stiff ODEs, Applied
 Numerical Mathematics 146 (2019) 221-244.

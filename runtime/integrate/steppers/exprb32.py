@@ -1,4 +1,4 @@
-"""An exponential Rosenbrock method with two stages: vibration is followed, not resolved.
+"""Exponential Rosenbrock method with two stages: steps may be longer than vibration periods.
 
 M. Hochbruck, A. Ostermann, J. Schweitzer, Exponential Rosenbrock-type methods, SIAM Journal on
 Numerical Analysis 47 (2009) 786-803: the pair exprb32.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from .implicit import Implicit, exponential
 
-#: From here on the exponential of a matrix takes most of a step.
+#: For more unknowns the exponential of a matrix dominates the cost of a step.
 MOST_UNKNOWNS = 40
 
 

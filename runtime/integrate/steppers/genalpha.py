@@ -1,4 +1,4 @@
-"""Generalised alpha: second order, with damping of what the step does not resolve.
+"""Generalised alpha: second order, with damping of motion that the step does not resolve.
 
 J. Chung, G. M. Hulbert, A time integration algorithm for structural dynamics with improved
 numerical dissipation: the generalized-alpha method, Journal of Applied Mechanics 60 (1993) 371-375.
@@ -10,11 +10,11 @@ from typing import Any
 
 from .implicit import Implicit, alpha
 
-RADIUS = 0.8  # the spectral radius left to infinitely fast motion unless one is asked for
+RADIUS = 0.8  # default spectral radius at infinity
 
 
 def constants(radius: float) -> dict[str, float]:
-    """The constants of the method with the spectral radius r at infinity, 0 <= r <= 1."""
+    """Constants of the method for a spectral radius at infinity from 0 to 1."""
     alpha_m, alpha_f = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
     gamma = 0.5 + alpha_f - alpha_m
     return {

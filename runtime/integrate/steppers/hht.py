@@ -1,4 +1,4 @@
-"""The method of Hilber, Hughes and Taylor with a little damping, alpha = 0.05.
+"""Method of Hilber, Hughes and Taylor with low damping, alpha = 0.05.
 
 H. M. Hilber, T. J. R. Hughes, R. L. Taylor, Improved numerical dissipation for time integration
 algorithms in structural dynamics, Earthquake Engineering and Structural Dynamics 5 (1977) 283-292.

@@ -1,8 +1,7 @@
-"""Methods with a tangent as the C loop takes them: Rosenbrock, diagonally implicit, exponential,
-Newmark's family.
+"""Implicit methods: Rosenbrock, diagonally implicit, exponential, Newmark's family.
 
-All of them work on q' = N(q) u, u' = a, 0 = R(t, q, u, a) with a tangent of R.  Stage 0 of each is
-the slope at the start of the step, and k_s that at its end.
+All integrate q' = N(q) u, u' = a, 0 = R(t, q, u, a) with a tangent of R.  Stage 0 of each is the
+slope at the start of the step, and k_s that at its end.
 """
 
 from __future__ import annotations
@@ -23,17 +22,17 @@ from .tableau import Tableau, divided_difference, frozen, hermite, integrals_in_
 
 ROSENBROCK, DIRK, ALPHA, EXPONENTIAL = 1, 2, 3, 4  # as in `c/integrate.h`
 
-#: Nodes between the ends of a step of the rules of Lobatto, by the order that is asked for.
+#: Inner nodes of the Lobatto rules on a step, by their order.
 _LOBATTO = {4: (0.5,), 6: ((1 - math.sqrt(0.2)) / 2, (1 + math.sqrt(0.2)) / 2)}
 
 
 def numbers(text: str) -> Array:
-    """Numbers between blanks."""
+    """Array of the numbers in a text, separated by blanks; fractions are allowed."""
     return np.array([float(Fraction(word)) for word in text.split()])
 
 
 def lower(text: str, size: int) -> Array:
-    """(size, size) strictly lower triangular, from its rows one after the other."""
+    """Strictly lower triangular matrix (size, size) from a text with its rows."""
     matrix = np.zeros((size, size))
     matrix[np.tril_indices(size, -1)] = numbers(text)
     return matrix
@@ -41,7 +40,7 @@ def lower(text: str, size: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Implicit(Tableau):
-    """What implicit methods have in common; see `Tableau` for what they share with the others.
+    """Base class of implicit methods; see `Tableau` for the other attributes.
 
     Attributes:
         gamma: the diagonal of Rosenbrock and diagonally implicit methods.
@@ -54,31 +53,33 @@ class Implicit(Tableau):
 
     @property
     def implicit(self) -> bool:
-        """True."""
+        """True: steps need a tangent of the equations of motion."""
         return True
 
     @cached_property
     def real_stability_limit(self) -> float:
-        """Infinite: no step of an implicit method here is too long for a motion that decays."""
+        """Infinite: decaying motion does not limit the step of these methods."""
         return math.inf
 
     @property
     def inner(self) -> Array:
-        """Nodes between a step's ends at which rates of quadratures are taken."""
+        """Inner nodes of a step at which the rates of integrals are evaluated."""
         wanted = 4 if self.order <= 4 else 6
         return frozen(_LOBATTO[wanted])
 
     @property
     def quadrature(self) -> Array:
-        """(n + 2, d) weights of the rates at the start, the inner nodes and the end in the dense
-        output of what they integrate to."""
+        """Weights (n + 2, d) of the rates at start, inner nodes and end in dense output.
+
+        The dense output is that of the integrals of these rates.
+        """
         nodes = [Fraction(0), *(Fraction(float(x)) for x in self.inner), Fraction(1)]
         found = integrals_in_basis(nodes)
         return frozen(np.pad(found, ((0, 0), (0, self.n_dense - found.shape[1]))))
 
     @property
     def roughness(self) -> Array:
-        """(n + 2,) weights of those rates in their highest difference, whose sizes add to 1."""
+        """Weights (n + 2,) of those rates in their highest divided difference; sum |w| = 1."""
         nodes = np.array([0.0, *self.inner, 1.0])
         weights = divided_difference(nodes.tolist())
         return frozen(np.array(weights) / np.abs(weights).sum())
@@ -92,16 +93,16 @@ class Implicit(Tableau):
 
 @dataclass(frozen=True, eq=False)
 class Rosenbrock(Implicit):
-    """A Rosenbrock method in the form without products by the tangent, U_i / h in its stages.
+    """Rosenbrock method in the form without products by the tangent, U_i / h in its stages.
 
-    With J the slope of y' = f(t, y) and s = 1 / (gamma h) the stages solve
+    With J the Jacobian of y' = f(t, y) and s = 1 / (gamma h) the stages solve
     (s - J) U_i = f(t + C_i h, y + A_ij U_j) + d_i h f_t + second_ij U_j / h; y + B U is the step.
     For mechanisms the mass matrix of the step's start multiplies the rows of speeds, so that
     Z = K W + C + s M is solved; f is evaluated, or its accelerations are unknowns of the stages
-    and R stands in its place.
+    and R replaces it.
 
     Attributes:
-        d: (s,) weights of h times the slope in time.
+        d: (s,) weights of h times the partial derivative of f with respect to time.
     """
 
     kind: ClassVar[int] = ROSENBROCK
@@ -117,27 +118,27 @@ class Rosenbrock(Implicit):
                 raise ValueError(f"{name}: {label} is {array.shape}, expected {shape}")
         alpha, gamma = self.classical
         if abs(gamma.sum(axis=1) - self.d[1:]).max() > 1e-12:
-            raise ValueError(f"{name}: d is not what C says of it")
+            raise ValueError(f"{name}: d contradicts C")
         if abs(alpha.sum(axis=1) - self.C[1:]).max() > 1e-12:
-            raise ValueError(f"{name}: the nodes are not what A says of them")
+            raise ValueError(f"{name}: the nodes contradict A")
         if not self.gamma > 0.0 or abs(self.weights_classical.sum() - 1.0) > 1e-12:
             raise ValueError(f"{name}: its weights do not add up to 1")
 
     @cached_property
     def _inverse(self) -> Array:
-        """Gamma of the classical form, of which the second set of weights holds the inverse."""
+        """Gamma of the classical form; the second set of weights contains its inverse."""
         s = self.n_stages - 1
         inverse = np.linalg.inv(np.eye(s) / self.gamma - self.second[1:, 1:])
         return np.asarray(inverse, dtype=np.float64)
 
     @cached_property
     def classical(self) -> tuple[Array, Array]:
-        """(alpha, Gamma), (s - 1, s - 1) each, of the form with products by the tangent."""
+        """Coefficients (alpha, Gamma), (s - 1, s - 1) each, of the form with tangent products."""
         return np.asarray(self.A[1:, 1:] @ self._inverse), self._inverse
 
     @cached_property
     def weights_classical(self) -> Array:
-        """(s - 1,) weights of the step in that form."""
+        """Weights (s - 1,) of the step in the form with products by the tangent."""
         return np.asarray(self.B[1:] @ self._inverse)
 
     def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
@@ -160,14 +161,14 @@ def rosenbrock(
     dense_order: int = 3,
     **about: Any,
 ) -> Rosenbrock:
-    """A method from the coefficients in which they are published, in the form of Hairer and Wanner.
+    """Rosenbrock method from published coefficients, in the form of Hairer and Wanner.
 
     Args:
         name, order: of the method.
         gamma, A, C, nodes, d: of its stages.
         B, E: weights of the step and of the error estimate.
         H: (2 or 3, stages) dense output y_0 (1 - x) + x (y_1 + (1 - x) (H_0 + x H_1 + x^2 H_2) U);
-            without, the cubic through both ends and their slopes.
+            by default the cubic through both ends and their slopes.
         dense_order: of that.
         about: `error_order` and `source`.
     """
@@ -191,7 +192,7 @@ def _stiff_dense(b: Array, H: Array) -> Array:
 
 
 def _rational(matrix: Array, weights: Array, z: ArrayLike) -> NDArray[np.complex128]:
-    """1 + z b (1 - z beta)^-1 1 at every z."""
+    """Stability function 1 + z b (1 - z beta)^-1 1 at every z."""
     points = np.asarray(z, dtype=np.complex128)
     one = np.eye(len(weights))
     found = [
@@ -203,17 +204,17 @@ def _rational(matrix: Array, weights: Array, z: ArrayLike) -> NDArray[np.complex
 
 @dataclass(frozen=True, eq=False)
 class Diagonal(Implicit):
-    """A diagonally implicit Runge-Kutta method with an explicit first stage, stiffly accurate.
+    """Diagonally implicit Runge-Kutta method with an explicit first stage, stiffly accurate.
 
-    `A` holds gamma on its diagonal but for the first stage, `second` the weights of the slopes so
-    far from which the iteration for the next one starts.
+    The diagonal of `A` is gamma except for the first stage; `second` contains the weights of the
+    previous slopes in the start value of the iteration for the next one.
     """
 
     kind: ClassVar[int] = DIRK
 
     @property
     def inner(self) -> Array:
-        """None: the stages carry what is integrated besides the motion."""
+        """No inner nodes: the stages also integrate the other rates."""
         return frozen(np.zeros(0))
 
     def _check_consistency(self) -> None:
@@ -234,7 +235,10 @@ def diagonal(
     name: str, order: int, A: Sequence[Sequence[float]], C: Sequence[float], E: ArrayLike,
     **about: Any,
 ) -> Diagonal:  # fmt: skip
-    """A method from rows of its matrix, each up to the diagonal; `about` as in `rosenbrock`."""
+    """Diagonally implicit method from the rows of its matrix, each up to the diagonal.
+
+    `about` as in `rosenbrock`.
+    """
     s = len(A)
     matrix = np.array([[*row, *[0.0] * (s - len(row))] for row in A])
     return Diagonal(
@@ -245,7 +249,10 @@ def diagonal(
 
 
 def _starts(C: Sequence[float]) -> Array:
-    """For every stage the weights of the polynomial through the (at most three) nearest before."""
+    """Weights (s, s) of the previous slopes in the start value of each stage's iteration.
+
+    They extrapolate by the polynomial through the (at most three) nearest previous nodes.
+    """
     weights = np.zeros((len(C), len(C)))
     for i in range(1, len(C)):
         near = sorted(range(i), key=lambda j: abs(C[j] - C[i]))[:3]
@@ -257,7 +264,7 @@ def _starts(C: Sequence[float]) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Alpha(Implicit):
-    """A method of Newmark's family: coordinates and speeds linear in the new acceleration.
+    """Method of Newmark's family: coordinates and speeds are linear in the new acceleration.
 
         (1 - alpha_m) a_1 + alpha_m a_0 = (1 - alpha_f) u'_1 + alpha_f u'_0
         q_1 = q_0 + h u_0 + h^2 ((1/2 - beta) a_0 + beta a_1)
@@ -265,13 +272,13 @@ class Alpha(Implicit):
 
     Attributes:
         alpha_m, alpha_f, beta_n, gamma_n: its constants; `alpha_m = alpha_f = 0` makes a = u'.
-        collocation: the equations of motion hold so many steps ahead, the acceleration is linear
-            up to there (Wilson); 1 for others.
-        backward: Houbolt's differences over three steps; the constants serve the first two.
-        one_iteration: one linearised equation a step, at the predictor u'_1 = u'_0.
-        on_positions: rows of closed loops are met by positions at the step's end, with their
-            multipliers as unknowns (index 3); their speeds err by the method's own order.  Steps
-            that are cut short ask rows for accelerations.
+        collocation: number of steps (Wilson: above 1, others: 1) after which the equations of
+            motion are satisfied; the acceleration is linear up to there.
+        backward: Houbolt's differences over three steps; the constants are used for the first two.
+        one_iteration: one linear solution per step, at the predictor u'_1 = u'_0.
+        on_positions: constraint rows are satisfied by positions at the end of a step, with their
+            multipliers as unknowns (index 3); the error of speeds is of the order of the method.
+            Shortened steps satisfy the rows by accelerations.
     """
 
     kind: ClassVar[int] = ALPHA
@@ -286,26 +293,26 @@ class Alpha(Implicit):
 
     def _check_consistency(self) -> None:
         if not (self.beta_n > 0.0 and self.gamma_n > 0.0 and self.collocation >= 1.0):
-            raise ValueError(f"tableau {self.name}: its constants must be above zero")
+            raise ValueError(f"tableau {self.name}: its constants must be positive")
 
     @property
     def error_constant(self) -> float:
-        """Of h^2 times the change of acceleration: the local error of the coordinates."""
+        """Factor of h^2 times the change of acceleration in the local error of coordinates."""
         return self.beta_n + (self.alpha_m - self.alpha_f) / 2.0 - 1.0 / 6.0
 
     def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
-        """The largest eigenvalue of one step on the oscillation with the eigenvalue z / h."""
+        """Largest eigenvalue of one step on the oscillation with the eigenvalue z / h."""
         points = np.asarray(z, dtype=np.complex128)
         found = [max(np.linalg.eigvals(self._step(x)), key=abs) for x in points.ravel()]
         return np.reshape(np.array(found, dtype=np.complex128), points.shape)
 
     def _step(self, z: complex) -> Array:
-        """The step of u' = -c u - k q with h = 1 and the eigenvalues z and its conjugate."""
+        """Step matrix of u' = -c u - k q with h = 1, eigenvalues z and its conjugate."""
         k, c = abs(z) ** 2, -2.0 * z.real
         return _backward_step(k, c) if self.backward else self._newmark_step(k, c)
 
     def _newmark_step(self, k: float, c: float) -> Array:
-        """On (q, u, u', a)."""
+        """Step matrix of the Newmark form on (q, u, u', a)."""
         h, q, u, rate, a = self.collocation, *np.eye(4)
         part = (1.0 - self.alpha_f) / (1.0 - self.alpha_m)
         rest = (self.alpha_f * rate - self.alpha_m * a) / (1.0 - self.alpha_m)
@@ -323,15 +330,15 @@ class Alpha(Implicit):
 
 
 def _backward_step(k: float, c: float) -> Array:
-    """Houbolt's step on three coordinates in a row."""
-    q0, q1, q2 = np.eye(3)  # the last one first
+    """Step matrix of Houbolt's method on the last three coordinates."""
+    q0, q1, q2 = np.eye(3)  # the most recent first
     rest_a, rest_u = -5.0 * q0 + 4.0 * q1 - q2, (-18.0 * q0 + 9.0 * q1 - 2.0 * q2) / 6.0
     new = -(rest_a + c * rest_u) / (2.0 + c * 11.0 / 6.0 + k)
     return np.array([new, q0, q1])
 
 
 def alpha(name: str, source: str, adaptive: bool = True, **constants: Any) -> Alpha:
-    """A method of second order from its constants."""
+    """Method of Newmark's family, second order, from its constants."""
     zeros = np.zeros(3)
     return Alpha(
         name=name, order=2, source=source, A=frozen(np.zeros((3, 3))), C=frozen(zeros),
@@ -342,7 +349,7 @@ def alpha(name: str, source: str, adaptive: bool = True, **constants: Any) -> Al
 
 
 def on_positions(tableau: Tableau, name: str) -> Alpha:
-    """The same method on rows of positions, under another name."""
+    """Variant of a method that satisfies constraints by positions (index 3), with a new name."""
     assert isinstance(tableau, Alpha)
     source = f"{tableau.source}, on index 3 after Arnold and Brüls (2007)"
     return replace(tableau, name=name, source=source, on_positions=True)
@@ -350,25 +357,25 @@ def on_positions(tableau: Tableau, name: str) -> Alpha:
 
 @dataclass(frozen=True, eq=False)
 class Exponential(Implicit):
-    """An exponential Rosenbrock method: the linearised motion exactly, and two evaluations a step.
+    """Exponential Rosenbrock method: exact linearised motion, two evaluations per step.
 
-    Its weights are functions of a matrix, see `c/exponential.c`; the arrays here tell the loop
-    where the step and its error lie.
+    Its weights are functions of a matrix, see `c/exponential.c`; the arrays here only define the
+    positions of the step and its error for the loop.
     """
 
     kind: ClassVar[int] = EXPONENTIAL
 
     def _check_consistency(self) -> None:
         if not self.most_unknowns > 0:
-            raise ValueError(f"tableau {self.name}: most_unknowns must be above zero")
+            raise ValueError(f"tableau {self.name}: most_unknowns must be positive")
 
     def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
-        """R(z) of one step on y' = lambda y with z = h lambda: what the motion itself does."""
+        """R(z) = exp(z) of one step on y' = lambda y with z = h lambda: exact."""
         return np.asarray(np.exp(np.asarray(z, dtype=np.complex128)))
 
 
 def exponential(name: str, order: int, error_order: int, most: int, source: str) -> Exponential:
-    """A method by its orders, for scenes of at most so many coordinates and speeds together."""
+    """Exponential method from its orders; `most` limits coordinates and speeds together."""
     zeros = np.zeros(3)
     return Exponential(
         name=name, order=order, source=source, A=frozen(np.zeros((3, 3))), C=frozen(zeros),

@@ -1,4 +1,4 @@
-"""A 5(4) pair of diagonally implicit stages, both results L-stable and stiffly accurate.
+"""5(4) pair of diagonally implicit stages, both results L-stable and stiffly accurate.
 
 A. Kvaerno, Singly diagonally implicit Runge-Kutta methods with an explicit first stage, BIT
 Numerical Mathematics 44 (2004) 489-502.

@@ -1,4 +1,4 @@
-"""Newmark's method with constant average acceleration: no damping at all.
+"""Newmark's method with constant average acceleration: no numerical damping.
 
 N. M. Newmark, A method of computation for structural dynamics, Journal of the Engineering Mechanics
 Division 85 (1959) 67-94.

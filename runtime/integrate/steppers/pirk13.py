@@ -1,22 +1,21 @@
-"""Order 13 by iterating Gauss's method with eight nodes: for right-hand sides with lanes.
+"""Iterated Gauss method of order 13 with eight nodes, for right-hand sides with SIMD lanes.
 
-The eight stages of Gauss's implicit method are found by functional iteration from k_0; every
-iteration raises the order by one, and its eight right-hand sides do not wait for each other.  Where
-a compiled scene evaluates eight states in about the time of one, a step costs 13 evaluations one
-after the other and is as long as order 13 allows; elsewhere it costs 97, and dop853 is the method
-to take.
+The eight stages of Gauss's implicit method are found by functional iteration from k_0.  Every
+iteration raises the order by one, and its eight right-hand sides are independent of each other.  If
+a compiled scene evaluates eight states in about the time of one, a step costs 13 successive
+evaluations and is as long as order 13 permits.  Otherwise it costs 97, and dop853 is preferable.
 
 P. J. van der Houwen, B. P. Sommeijer, Parallel iteration of high-order Runge-Kutta methods with
 stepsize control, Journal of Computational and Applied Mathematics 29 (1990) 111-127.  Nodes: M.
 Abramowitz, I. A. Stegun, Handbook of Mathematical Functions (1964), table 25.4.  The weights follow
 from the nodes in exact arithmetic.  Dense output is the polynomial of degree 10 whose slope agrees
 with the eight last stages and both ends; the stages are of order 8 each, so it is of order 9. (More
-points and stages evaluated again were tried: no better at the steps that tolerances ask for.)
+points and repeated evaluation of stages gave no better results at the steps of usual tolerances.)
 
-The difference of two iterates says how far the iteration has come, and nothing of forces that
-depend on time alone: of those every iterate knows the same values.  The error estimate therefore
-also holds the ninth divided difference of the slopes at both ends and the eight nodes, in a part in
-which smooth motion does not notice it and a pole or a jump cannot be missed.
+The difference of two iterates measures the convergence of the iteration, but not the error due to
+forces that depend on time alone: these have the same values in every iterate.  The error estimate
+therefore also contains the ninth divided difference of the slopes at both ends and the eight nodes.
+Its weight is negligible for smooth motion and large enough to detect a pole or a jump.
 """
 
 from __future__ import annotations
@@ -32,10 +31,10 @@ from mstmm.arrays import Array
 from .tableau import Tableau, divided_difference, from_monomials, frozen, integrals
 
 _ITERATIONS = 12
-_COMPARED = 9  # the error estimate: what three iterations less give
+_COMPARED = 9  # iterations of the result with which the error estimate compares
 
-#: Part of the divided difference in the error estimate.  For forces that oscillate it is above the
-#: error of Gauss's weights up to 20 rad a step; where motion is smooth the iterates differ more.
+#: Weight of the divided difference in the error estimate.  For oscillating forces it exceeds the
+#: error of Gauss's weights up to 20 rad per step; for smooth motion the iterates differ more.
 _ROUGHNESS = 1e-8
 
 #: Positive zeros of the Legendre polynomial of degree 8.
@@ -91,10 +90,10 @@ def tableau() -> Tableau:
 
 
 def _dense(nodes: Sequence[Fraction], weights: Array, stages: int) -> Array:
-    """The slope's polynomial goes through k_0, the last eight stages and the next step's first."""
+    """Dense output whose slope interpolates k_0, the last eight stages and the next step's k_0."""
     points = [Fraction(0), *nodes, Fraction(1)]
     narrow = np.array(from_monomials(integrals(points)))
-    narrow[:, 0] = [0.0, *weights, 0.0]  # what it is but for the last digits of the nodes
+    narrow[:, 0] = [0.0, *weights, 0.0]  # exact values; rounding of the nodes would change them
     wide = np.zeros((stages + 1, narrow.shape[1]))
     wide[0], wide[stages - len(nodes) : stages], wide[stages] = narrow[0], narrow[1:-1], narrow[-1]
     return frozen(wide)

@@ -1,8 +1,8 @@
-"""The classical fourth-order method, for fixed steps.
+"""Classical fourth-order Runge-Kutta method, for fixed steps.
 
 W. Kutta, Beitrag zur naeherungsweisen Integration totaler Differentialgleichungen, Zeitschrift
 fuer Mathematik und Physik 46 (1901) 435-453.  Dense output is the cubic Hermite interpolant; the
-slope at the step's end is the next step's first stage, so it costs nothing.
+slope at the end of a step is the first stage of the next step, so it adds no evaluation.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The stiffly accurate 4(3) pair of Hairer and Wanner with six stages.
+"""Stiffly accurate 4(3) pair of Hairer and Wanner with six stages.
 
 E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), section VI.4, code RODAS.
 

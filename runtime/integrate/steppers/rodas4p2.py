@@ -1,4 +1,4 @@
-"""A 4(3) pair with six stages that keeps order 3 under stiff prescribed motion.
+"""4(3) pair of Steinebach with six stages that keeps order 3 with stiff prescribed motion.
 
 G. Steinebach, Improvement of Rosenbrock-Wanner method RODASP, in: Progress in
 Differential-Algebraic Equations II, Springer (2020) 165-184.

@@ -1,4 +1,4 @@
-"""A 4(3) pair with nine stages whose order survives an inexact tangent.
+"""4(3) Rosenbrock pair with nine stages that keeps its order with any tangent.
 
 G. Steinebach, Rodas4PW, as in the tables of OrdinaryDiffEqRosenbrockTableaus.jl (2026).
 

@@ -1,4 +1,4 @@
-"""A 5(4) pair with eight stages for tight tolerances, which stiff prescribed motion spares too.
+"""5(4) Rosenbrock pair with eight stages for tight tolerances and stiff prescribed motion.
 
 G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within the
 Julia Differential Equations package, BIT Numerical Mathematics 63 (2023) 27.

@@ -1,4 +1,4 @@
-"""A third-order method with four stages whose order survives an inexact tangent.
+"""Third-order Rosenbrock method with four stages that keeps its order with any tangent.
 
 J. Rang, L. Angermann, New Rosenbrock W-methods of order 3 for partial differential algebraic
 equations of index 1, BIT Numerical Mathematics 45 (2005) 761-787.

@@ -1,7 +1,7 @@
-"""What the C loop must know of a Runge-Kutta method: its coefficients, as plain arrays.
+"""Coefficients of a Runge-Kutta method for the C loop, as plain arrays.
 
 A method has `s` stages k_0 .. k_(s-1), then k_s = f(t + h, y_new), which is also the first stage
-of the next step, then `e` extra stages that serve dense output alone.  Dense output is
+of the next step, then `e` extra stages for dense output only.  Dense output is
 
     y(t + theta h) = y(t) + h sum_i k_i p_i(theta),   p_i(theta) = sum_j dense[i, j] phi_j(theta)
 
@@ -24,19 +24,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from mstmm.arrays import Array
 
-#: Stages of a block that C evaluates side by side, at most.
+#: Maximum number of stages of a block that C evaluates together.
 LANES = 8
 
 
 def frozen(values: ArrayLike | Sequence[Any]) -> Array:
-    """A contiguous, read-only copy in double precision."""
+    """Contiguous, read-only copy in double precision."""
     array = np.array(values, dtype=np.float64, order="C")
     array.flags.writeable = False
     return array
 
 
 def sparse(text: str, columns: int) -> list[Array]:
-    """Rows of published decimals, written as `column:value`; every row starts with column 0."""
+    """Read rows of published decimals, `column:value`; every row starts with column 0."""
     rows: list[Array] = []
     for word in text.split():
         column, value = word.split(":")
@@ -48,7 +48,7 @@ def sparse(text: str, columns: int) -> list[Array]:
 
 @dataclass(frozen=True, eq=False)
 class Tableau:
-    """One explicit Runge-Kutta method.
+    """Explicit Runge-Kutta method.
 
     Attributes:
         name: the `method=` of `simulate`.
@@ -65,11 +65,11 @@ class Tableau:
             E^2 / sqrt(E^2 + 0.01 E_low^2) (the 8(5,3) pair); None without.
         A_extra, C_extra: (e, s + 1 + e) and (e,) rows of the extra stages.
         beta: exponent of the previous error in the step controller, 0 for the plain one.
-        iterated: (nodes, iterations) of a method whose stages behind the first are so many blocks,
-            each depending on the block before alone (the first on k_0 alone) with the same weights:
-            the stages of a block are evaluated side by side.  None for other methods.
-        most_unknowns: coordinates and speeds that the method takes at most, 0 for any number.
-        source: where the coefficients come from.
+        iterated: (nodes, iterations) of a method whose stages after the first form so many blocks;
+            each depends only on the previous block (the first on k_0) with the same weights: the
+            stages of a block are evaluated together.  None for other methods.
+        most_unknowns: maximum number of coordinates and speeds together, 0 for no limit.
+        source: publication of the coefficients.
 
     Raises:
         ValueError: for shapes that do not fit, or weights that contradict each other.
@@ -117,7 +117,7 @@ class Tableau:
         if abs(self.B.sum() - 1.0) > 1e-13 or np.abs(self.A.sum(1) - self.C).max() > 1e-12:
             raise ValueError(f"tableau {self.name}: sum(B) = 1 or sum(A[i]) = C[i] does not hold")
         if np.abs(self.dense[:, 0] - step).max() > 1e-13:
-            raise ValueError(f"tableau {self.name}: dense output does not end at the step's end")
+            raise ValueError(f"tableau {self.name}: dense output differs from the step at its end")
         if self.iterated is not None and not self._is_iterated(*self.iterated):
             raise ValueError(f"tableau {self.name}: its stages are not {self.iterated} blocks")
 
@@ -137,7 +137,7 @@ class Tableau:
 
     @property
     def mix(self) -> Array:
-        """(nodes, 8): column j of the weights of an iterated method's blocks, for eight lanes."""
+        """Weights (nodes, 8) of an iterated method's blocks, transposed for eight lanes."""
         nodes = self.iterated[0] if self.iterated else 0
         mix = np.zeros((nodes, LANES))
         mix[:, :nodes] = self._block(nodes).T
@@ -145,7 +145,7 @@ class Tableau:
 
     @property
     def read_blocks(self) -> list[int]:
-        """1 for every block of an iterated method that is read by more than the block behind."""
+        """1 for every block of an iterated method that more than the next block reads, else 0."""
         nodes, iterations = self.iterated or (1, 0)
         reading = [self.B, np.abs(self.dense).sum(axis=1), np.abs(self.A_extra).sum(axis=0)]
         reading += [row for row in (self.E, self.E_low) if row is not None]
@@ -160,7 +160,7 @@ class Tableau:
 
     @cached_property
     def rows(self) -> tuple[list[int], list[int], Array]:
-        """Starts, columns and weights of the sparse rows that `mstmm_tableau` in C describes."""
+        """Starts, columns and weights of the sparse rows of `mstmm_tableau` in C."""
         rows = self._rows()
         starts, columns, weights = [0], list[int](), list[float]()
         for row in rows:
@@ -177,12 +177,12 @@ class Tableau:
 
     @property
     def n_stages(self) -> int:
-        """Stages s of the step itself."""
+        """Number of stages s of the step."""
         return len(self.B)
 
     @property
     def n_extra(self) -> int:
-        """Extra stages e of the dense output."""
+        """Number of extra stages e of the dense output."""
         return len(self.C_extra)
 
     @property
@@ -196,7 +196,7 @@ class Tableau:
         return self.E is not None
 
     def weights(self, theta: float) -> Array:
-        """p(theta), shape (s + 1 + e,): y(t + theta h) = y(t) + h p(theta) @ k."""
+        """Weights p(theta) (s + 1 + e,): y(t + theta h) = y(t) + h p(theta) @ k."""
         sum_ = np.zeros(self.dense.shape[0])
         for j in reversed(range(self.n_dense)):
             sum_ = (sum_ + self.dense[:, j]) * (1.0 - theta if j % 2 else theta)
@@ -221,17 +221,17 @@ class Tableau:
 
     @cached_property
     def real_stability_limit(self) -> float:
-        """The largest x with |R(-x')| <= 1 for all 0 <= x' <= x."""
+        """Largest x with |R(-x')| <= 1 for all 0 <= x' <= x."""
         return self._limit(-1.0 + 0.0j)
 
     @cached_property
     def imaginary_stability_limit(self) -> float:
-        """The largest x with |R(i x')| <= 1 for all 0 <= x' <= x, rounding aside."""
+        """Largest x with |R(i x')| <= 1, up to rounding, for all 0 <= x' <= x."""
         return self._limit(0.0 + 1.0j)
 
     def _limit(self, direction: complex) -> float:
         low, width = 0.0, 100.0
-        for _ in range(4):  # the first unstable of a thousand points, then a thousand times finer
+        for _ in range(4):  # find the first unstable of 1000 points, then refine 1000 times
             x = low + width * np.arange(1, 1001) / 1000
             unstable = np.abs(self.amplification(x * direction)) > 1.0 + 1e-9
             if not unstable.any():
@@ -304,12 +304,12 @@ def divided_difference(points: Sequence[Any]) -> list[float]:
 
 
 def integrals_in_basis(nodes: Sequence[Fraction]) -> Array:
-    """(n, n) dense weights of an integral whose slope is known at n nodes."""
+    """Dense weights (n, n) of an integral whose slope is known at n nodes."""
     return from_monomials(integrals(nodes))
 
 
 def _basis_in_monomials(degree: int) -> list[list[Fraction]]:
-    """phi_j as coefficients of theta .. theta^degree."""
+    """Basis functions phi_j as coefficients of theta .. theta^degree."""
     power = [Fraction(0), Fraction(1), *[Fraction(0)] * (degree - 1)]  # of theta^0 .. theta^degree
     basis = [power[1:]]
     for j in range(1, degree):

@@ -1,4 +1,4 @@
-"""Wilson's method: linear acceleration up to 1.4 steps ahead, where the equations hold.
+"""Wilson's method: linear acceleration up to 1.4 steps ahead, where the equations are satisfied.
 
 E. L. Wilson, I. Farhoomand, K. J. Bathe, Nonlinear dynamic analysis of complex structures,
 Earthquake Engineering and Structural Dynamics 1 (1973) 241-252.  For comparison, with fixed steps.
