@@ -209,8 +209,8 @@ def _moved(entry: Entry, place: Path) -> Entry:
 def _unwritable(place: Path, order: Order, error: OSError) -> str:
     if error.errno in _NO_ROOM:
         return (
-            f"no disk space for a compiled library in {place.parent} ({error.strerror}); "
-            f"free space, or set {order.variable} to a folder with space"
+            f"no space for a compiled library in {place.parent} ({error.strerror}); "
+            f"free some, or set {order.variable} to a folder with space"
         )
     return (
         f"nothing can be written to {place.parent} ({error.strerror}); "

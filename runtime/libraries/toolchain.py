@@ -190,7 +190,7 @@ def _reason(found: Compiler, ended: Ended, source: str) -> str:
     program = found.command[0]
     if any(text in ended.said for text in _NO_ROOM) or ended.code == -signal.SIGXFSZ:
         return (
-            f"the C compiler {program} found no space on the disk; free space, or choose another "
+            f"the C compiler {program} found no space on the disk; free some, or choose another "
             "folder (MSTMM_CACHE; for user-defined elements MSTMM_KERNELS)"
         )
     if ended.code < 0:

@@ -121,7 +121,7 @@ def test_nothing_to_do_is_the_start_alone() -> None:
     "keys, said",
     [
         ({}, "takes fixed steps: give step"),
-        ({"step": 0.01, "scheme": "euler"}, "known are generalised-alpha, hht, newmark, wilson"),
+        ({"step": 0.01, "scheme": "euler"}, "use one of generalised-alpha, hht, newmark, wilson"),
         ({"step": 0.01, "scheme": "hht:x"}, "expected alpha from 0 to 0.333333"),
         ({"step": 0.01, "scheme": "newmark:0.4"}, "expected gamma from 0.5 to 1"),
         ({"step": 0.01, "iterations": 0}, "a whole number of iterations, 1 or more"),
@@ -143,7 +143,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
             "body": [_BODY], "hinge": [_PIN],
             "load": [{"name": "push", "on": "b", "force": [1, 0, 0]}],
         },
-        'load "push".*gravity and elastic hinges alone',
+        'load "push".*the only supported loads are gravity and elastic hinges',
     ),
     "spring": (
         {

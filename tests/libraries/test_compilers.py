@@ -27,7 +27,7 @@ BAD = {
     "leaves the function out": ('for last; do :; done\n$REAL -shared -o "$last" -x c /dev/null',
                                 "mstmm_fused_library"),
     "fills the disk": ("echo 'ld: final link failed: No space left on device' >&2\nexit 1",
-                       "no room"),
+                       "no space"),
 }  # fmt: skip
 
 

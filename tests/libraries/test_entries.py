@@ -205,7 +205,7 @@ DAMAGES = {
     "missing": _undescribed,
     "cannot be read": _garbled,
     "another layout": _older_layout,
-    "elsewhere": _pointing_away,
+    "another folder": _pointing_away,
     "description": _a_file,
 }
 

@@ -111,7 +111,7 @@ def test_file_that_may_not_grow(
         message = refusal()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert "no room" in message
+    assert "no space" in message
     assert_tidy(cache_folder, 0)
 
 
@@ -128,7 +128,7 @@ def test_disk_that_is_full(
     with monkeypatch.context() as patch:
         patch.setattr(Path, step, full)
         message = refusal()
-    assert "no room" in message and os.strerror(number) in message
+    assert "no space" in message and os.strerror(number) in message
     assert_tidy(cache_folder, 1)
     assert cache.library(Kernel().recipe).how == "compiled"
 
@@ -143,7 +143,7 @@ def test_disk_that_is_full_before_anything(
 
     with monkeypatch.context() as patch:
         patch.setattr(tempfile, "mkdtemp", full)
-        assert "no room" in refusal()
+        assert "no space" in refusal()
     assert_tidy(cache_folder, 1)
 
 

@@ -98,7 +98,7 @@ FAULTS: dict[str, tuple[str, Fault]] = {
         _compiler('for last; do :; done\necho text >"$last"'),
     ),
     "disk is full": (
-        "no room",
+        "no space",
         _compiler('echo "cannot write: No space left on device" >&2; exit 1'),
     ),
     "folder of another": ("belongs to user", _foreign),

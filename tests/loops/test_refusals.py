@@ -45,7 +45,9 @@ def test_a_structure() -> None:
     """The third crank stands off the line of the other two: the coupler cannot follow all."""
     scene = cranks()
     scene["hinge"][2]["position"] = [1.5, 0.2, 0.0]
-    with pytest.raises(mstmm.SceneError, match=r'no freedom .* at "top.*a structure; take'):
+    with pytest.raises(
+        mstmm.SceneError, match=r'no degree of freedom .* at "top.*a structure; use'
+    ):
         mstmm.compile(mstmm.Scene(**scene))
 
 

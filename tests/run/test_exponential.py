@@ -120,7 +120,7 @@ def test_more_unknowns_than_it_takes_are_refused() -> None:
         if 2 * count <= most:
             assert model.simulate(0.01, "exprb32", 0.01).success
             continue
-        expected = f"at most {most}; here there are {2 * count}: take rodas5p"
+        expected = f"at most {most}; found {2 * count}: use rodas5p"
         with pytest.raises(SceneError, match=expected):
             model.simulate(0.01, "exprb32")
         with pytest.raises(SceneError, match=expected):

@@ -136,5 +136,7 @@ def test_a_result_keeps_what_was_counted(tmp_path: Any) -> None:
 def test_a_radius_is_asked_of_methods_that_take_one() -> None:
     model = mstmm.compile(stiff(), engine="looped")
     for method in ("dop853", "rodas4p2", "scipy-Radau"):
-        with pytest.raises(SceneError, match="has no such parameter; methods with a radius are genalpha, dttmm"):
+        with pytest.raises(
+            SceneError, match="has no such parameter; methods with a radius are genalpha, dttmm"
+        ):
             model.simulate(0.1, method, radius=0.5)

@@ -1,1 +1,1 @@
-"""Closed loops by the looped engine: assembly, rank, and what a model tells of them."""
+"""Closed loops in the looped engine: assembly, rank, and the analysis that a model shows."""

@@ -1,9 +1,9 @@
 """Assembly: the nearest state in which the loops are closed.
 
-Positions by steps that let the rows give way (Levenberg, Quart. Appl. Math. 2 (1944) 164-168):
+Positions are found by steps with compliant rows (Levenberg, Quart. Appl. Math. 2 (1944) 164-168):
 with mu times their mobility on the diagonal of L a step is the change of least inertia that closes
-the gaps as far as mu allows, and far from where a loop closes it does not run wild.  Speeds by one
-correction, as slips are linear in them.
+the gaps as far as mu permits, and it stays bounded far from a closed state.  Speeds need one
+correction because velocity errors are linear in them.
 """
 
 from __future__ import annotations
@@ -22,33 +22,35 @@ from ..engine import Engine
 from .calls import LoopCalls
 from .parallel import COUNTING, skewed, skewed_by_gap
 
-#: Longest step of a coordinate (rad, m), and most steps.
+#: Longest step of a coordinate (rad, m), and maximum number of steps.
 _LONGEST, _STEPS = 0.5, 300
-#: Compliance of the rows: the first, and where there is no use in more or in less.
+#: Compliance of the rows: initial, maximum and minimum.
 _FIRST, _MOST, _LEAST = 1e-2, 1e8, 1e-12
-#: Ways along which misfits close are so many times longer than these.
+#: Paths along which misfits close are so many times longer than the misfits.
 _LONG = 50.0
-#: Gap (m, rad) that is closed where hinges are up to 1 m apart, and change (rad, m) at which
-#: nothing moves any more.
+#: Gap (m, rad) that counts as closed for distances of hinges up to 1 m, and change (rad, m) at
+#: which the iteration has converged.
 _CLOSED, _STILL = 1e-10, 1e-9
-#: Other starts where one leads to an open loop, and how far they are from it (rad, m).
+#: Number of other starts if one leads to an open loop, and their distance from it (rad, m).
 _TRIES, _SHAKEN = 4, 0.1
-#: So often at most rows are chosen anew.
+#: Maximum number of choices of rows.
 _CHOICES = 4
-#: So many hinges are named.
+#: Maximum number of hinges named in a message.
 _NAMED = 8
-#: Distance of a mass centre in sizes of the scene from which on its body hardly moves.
+#: Distance of a mass centre, relative to the size of the scene, beyond which its body hardly moves.
 _FAR = 1e5
-#: Speeds by which rows may slip, in parts of the largest; pivots that still tell a row from others,
-#: in parts of its mobility.
+#: Permitted velocity errors relative to the largest speed; smallest pivot of an independent row
+#: relative to its mobility.
 _SLIP, _TOLD = 1e-8, 1e-15
-#: So much that the own coordinates of closing hinges alone follow.
+#: Compliance so large that only the coordinates of closing hinges change.
 _ALONE = 1e14
 
 
 def with_held(engine: Engine, hinges: Collection[str]) -> Engine:
-    """The engine of the same scene with all speeds of some hinges imposed, in which flexible bodies
-    resist a change of their shape as they do at rest."""
+    """Engine of the same scene with all speeds of some hinges prescribed.
+
+    Flexible bodies have their stiffness at rest in it.
+    """
     packed = engine.packed
     places = {packed.hinge_position[name] for name in hinges}
     if not places and not packed.flexible:
@@ -61,10 +63,9 @@ def with_held(engine: Engine, hinges: Collection[str]) -> Engine:
 
 
 class Assembly:
-    """Assembly of one packed scene at `t` (s) with some hinges held; `q` (nq,) is near what is
-    asked.
+    """Assembly of one packed scene at `t` (s) with some hinges held, near `q` (nq,).
 
-    `behind` says, as words that end a message, what is behind loops that do not close near a q.
+    `behind` returns the end of a message with the cause of loops that do not close near a q.
     """
 
     def __init__(
@@ -76,14 +77,15 @@ class Assembly:
         if self.calls.engine is not engine:
             self.calls.judge_by([q])
         self._weights = self._weighted()
-        #: 1 for speeds that nobody holds.
+        #: 1 for speeds that are neither held nor driven, else 0.
         self.free = self._free_speeds()
 
     def positions(self, q: Array, much: float = 0.0, rough: bool = True) -> Array:
-        """q (nq,) with loops closed, or with gaps that no change closes of up to `much` (m, rad);
-        a `rough` one leaves gaps as small open that only long ways close.
+        """Close the loops near q (nq,).
 
-        Raises OpenLoop with the least gap, its pose and what was held where there is none near.
+        Gaps of up to `much` (m, rad) that no change closes may remain; with `rough` also those that
+        close only after a long path.  Raises OpenLoop with the smallest gap, its pose and the held
+        hinges if there is no such state near.
         """
         draw, start = np.random.default_rng(0), q
         rough = rough and much > 0.0
@@ -91,7 +93,7 @@ class Assembly:
         for _ in range(_TRIES):
             if self._closes(missing, much):
                 return nearest
-            # Where all is in line nothing tells which way to bend.
+            # With all links in line the direction of bending is undetermined.
             shaken = draw.uniform(-_SHAKEN, _SHAKEN, len(self._still)) * self.free
             trial, after = self._nearest(self.calls.moved(start, shaken), rough)
             if self._largest(after) < self._largest(missing):
@@ -102,7 +104,7 @@ class Assembly:
         raise OpenLoop(self._open(nearest, missing), gap, self.by_names(nearest))
 
     def nearest_closed(self, q: Array, much: float = 0.0) -> Array | None:
-        """q (nq,) where steps from q lead, if loops are closed there but for gaps up to `much`."""
+        """State (nq,) to which steps from q lead if its gaps are at most `much`, else None."""
         try:
             found, missing = self._nearest(q, much > 0.0)
         except NumericalFailure:
@@ -110,8 +112,10 @@ class Assembly:
         return found if self._closes(missing, much) else None
 
     def _nearest(self, q: Array, rough: bool = False) -> tuple[Array, Array]:
-        """q of the least gap that steps from q lead to, and what the rows lack there; a `rough` one
-        leaves misfits open that only long ways along a motion close."""
+        """State of the smallest gap to which steps from q lead, and the errors of the rows there.
+
+        With `rough`, misfits that close only after a long path along a motion remain.
+        """
         self.calls.choose(q)
         for _ in range(_CHOICES):
             q, missing = self._stepped(q, rough)
@@ -120,7 +124,7 @@ class Assembly:
         return q, missing
 
     def _stepped(self, q: Array, rough: bool) -> tuple[Array, Array]:
-        """The same for the rows that are chosen."""
+        """Result of `_nearest` for the rows chosen at present."""
         q, give, left = self._own(q), _FIRST, np.inf
         rest = self._rest(q)
         for _ in range(_STEPS):
@@ -147,19 +151,22 @@ class Assembly:
         return q, self._lacking(q, self._still, self.calls.gap, _MOST)[1]
 
     def _lacking(self, q: Array, u: Array, level: int, give: float = 0.0) -> tuple[Array, Array]:
-        """A correction and what the rows lack, but for misfits of those that are not met now."""
+        """Correction and errors of the rows, without misfits of rows that are not satisfied now."""
         change, missing = self.calls.correction(level, q, u, give)
         most = self._locks * max(1.0, float(np.abs(u).max(initial=0.0)))
         misfits = self.calls.resting() & (np.abs(missing) <= most)
         return change, np.where(misfits, 0.0, missing)
 
     def speeds(self, q: Array, u: Array) -> Array:
-        """u (nu,) without slips at the closed q.  SceneError where those held do not allow it."""
+        """Remove the velocity errors of u (nu,) at the closed q.
+
+        SceneError if the held speeds do not permit it.
+        """
         self.calls.choose(q)
         u, missing = self._without_slips(q, u)
         counting = self.calls.inverses() > 0
         if self._slipping(u, missing) is not None and not counting.all():
-            # Beside a singular pose rows are still told apart by rounding's leave.
+            # Near a singular pose small pivots above rounding still belong to independent rows.
             floors = [self.calls.records.floor(row) for row in range(self.calls.count)]
             for k, mobility in enumerate(self.calls.mobility.tolist()):
                 self.calls.records.judge(k, _TOLD * mobility)
@@ -172,15 +179,15 @@ class Assembly:
             raise SceneError(
                 f"scene: the speeds given for {self._names()} contradict each other by "
                 f"{self._amount(row, missing, '.3g', '/s')} {self._where(row)}; "
-                f"{known or 'give fewer of them, or others'}"
+                f"{known or 'give fewer or other speeds'}"
             )
         return u
 
     def _without_slips(self, q: Array, u: Array) -> tuple[Array, Array]:
-        """u with its slips corrected, and what is left of them."""
+        """Speeds u with corrected velocity errors, and the remaining errors of the rows."""
         change, missing = self._lacking(q, u, self.calls.slip)
         largest = self._largest(missing)
-        while True:  # once, but for digits lost behind heavy bodies
+        while True:  # once, except for digits lost because of heavy outboard bodies
             trial = u + self.free * change
             change, after = self._lacking(q, trial, self.calls.slip)
             if not self._largest(after) < largest:
@@ -188,7 +195,7 @@ class Assembly:
             u, missing, largest = trial, after, self._largest(after)
 
     def _slipping(self, u: Array, missing: Array) -> int | None:
-        """The row that slips most, where that is more than rounding."""
+        """Row with the largest velocity error if that exceeds rounding, else None."""
         much = _SLIP * max(1.0, float(np.abs(u).max(initial=0.0)))
         slips = np.abs(missing) / self._sizes
         return int(slips.argmax()) if slips.max(initial=0.0) > much else None
@@ -209,12 +216,12 @@ class Assembly:
         return np.zeros(self.calls.engine.nu)
 
     def _correction(self, q: Array, give: float) -> tuple[Array, Array]:
-        """What closes the gaps, and these; what is held stays, though its rows may yield."""
+        """Correction of the gaps, and the gaps; held coordinates stay, though their rows comply."""
         change, missing = self._lacking(q, self._still, self.calls.gap, give)
         return self.free * change, missing
 
     def _own(self, q: Array) -> Array:
-        """q with the own coordinates of closing hinges where the bodies put them."""
+        """Adapt the coordinates of closing hinges in q to the positions of the bodies."""
         for _ in range(12):
             change, _ = self._correction(q, _ALONE)
             length = float(np.abs(change).max(initial=0.0))
@@ -225,19 +232,21 @@ class Assembly:
 
     def _rest(self, q: Array) -> float:
         missing = self._lacking(q, self._still, self.calls.gap, _ALONE)[1]
-        with np.errstate(over="ignore"):  # what is asked may be beyond all squares
+        with np.errstate(over="ignore"):  # squares of requested values may overflow
             return float(np.sum(self._weights * missing**2))
 
     def _closes(self, missing: Array, much: float = 0.0) -> bool:
-        """Whether gaps are none, for the size of what they are part of, or no more than `much`."""
+        """True if all gaps are zero relative to the scene's size, or at most `much`."""
         return bool(np.all(np.abs(missing) <= np.maximum(much, _CLOSED * self._sizes)))
 
     def _largest(self, missing: Array) -> float:
         return float(np.abs(missing).max(initial=0.0))
 
     def _weighted(self) -> Array:
-        """The same for all gaps, for all angles and for all couplings: the mean mobility of their
-        kind, so that the least gap is that of the geometry."""
+        """Weights (rows,) of the gaps: the inverse mean mobility of lengths, angles or couplings.
+
+        Equal weights within a kind make the smallest gap a property of the geometry.
+        """
         calls = self.calls
         turning = np.zeros(calls.count, bool)
         for one in calls.records.closures:
@@ -269,13 +278,13 @@ class Assembly:
         )
 
     def by_names(self, q: Array) -> dict[str, tuple[float, ...]]:
-        """q of hinges and of flexible bodies that have some."""
+        """Coordinates q by the names of hinges and flexible bodies."""
         layout = self.calls.engine.packed.layout
         slots = {**layout.hinges, **layout.modal}
         return {name: tuple(q[one.q_slice].tolist()) for name, one in slots.items() if one.nq}
 
     def _names(self) -> str:
-        """Hinges that are held or driven."""
+        """Names of the held or driven hinges for messages."""
         names = [f'"{name}"' for name in (*self.held, *self._driven())]
         return ", ".join(names[:_NAMED]) + (" ..." if names[_NAMED:] else "")
 
@@ -291,11 +300,11 @@ class Assembly:
     def _subject(self, row: int) -> str:
         closing = self.calls.closing(row)
         if self.calls.coupling_of(row):
-            return f"{closing} cannot hold"
+            return f"{closing} cannot be satisfied"
         return f"the loop that {closing} closes stays open"
 
     def _far_mass(self) -> str:
-        """A body whose mass centre lies so far away that hardly anything moves it; "" without."""
+        """End of a message that names a body with an implausibly distant mass centre, or ""."""
         bodies = self.calls.engine.packed.described.body
         size = max(
             (math.hypot(*end.position) for b in bodies for end in b.ends.values()), default=0
@@ -311,7 +320,7 @@ class Assembly:
 
     def _remedy(self, row: int, q: Array, missing: Array) -> str:
         if self.calls.coupling_of(row):
-            return "leave it or another coupling out, or correct what they equal"
+            return "omit it or another coupling, or correct their expressions"
         known = (
             self._behind(q)
             or self._far_mass()
@@ -320,7 +329,7 @@ class Assembly:
         if known:
             return known
         less = ", hold or drive less" if self.held or self._driven() else ""
-        return f"correct lengths or axes{less}, or start nearer to where it closes"
+        return f"correct lengths or axes{less}, or start nearer to a closed state"
 
     def _amount(self, row: int, missing: Array, digits: str, per: str = "") -> str:
         amount = f"{abs(missing[row]):{digits}}"

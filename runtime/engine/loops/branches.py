@@ -1,8 +1,9 @@
-"""The ways in which loops can close: branches, and which of them is nearest to what is asked.
+"""Branches on which loops can close, and the search for the one nearest to a requested state.
 
-Steps from a start lead to one branch, mostly but not always the nearest.  So others are looked
-for, from bodies placed by the starts of all hinges that state one, cut or not, and from drawn
-places; each is led along its motions to where it is nearest, and the nearest is taken.
+Steps from a start lead to one branch, usually but not always the nearest.  The search therefore
+also starts from bodies placed by the initial states of all hinges that state one, cut or not, and
+from random positions.  On each branch it moves to the state nearest to the requested one, and the
+nearest branch is used.
 """
 
 from __future__ import annotations
@@ -25,27 +26,27 @@ from ...pack.packed import Packed
 from ..engine import Engine
 from .assembly import Assembly
 
-#: Drawn starts at most, how many speeds they have in sum, the most of one, and most hinges that are
-#: placed anew.
+#: Maximum number of random starts, of their speeds in total, and of the speeds of one; maximum
+#: number of hinges of a scene whose bodies are placed again.
 _TRIES, _IN_SUM, _SPEEDS, _PLACED = 12, 240, 60, 300
-#: Steps along the motions at most, the longest (rad, m), and one that is none.
+#: Maximum number of steps on a branch, the longest step, and one that counts as none (rad, m).
 _STEPS, _LONGEST, _STILL = 40, 0.5, 1e-4
-#: A square of speeds that is none.
+#: A squared norm of speeds that counts as zero.
 _NONE = 1e-30
-#: States that are one branch are apart by no more (rad, m).
+#: Largest distance (rad, m) of two states on the same branch.
 _APART = 1e-2
-#: A start that is off by no more (rad, lengths) is nearest; and so much nearer counts.
+#: A start within this distance (rad, lengths) is the nearest; smallest difference that counts.
 _NEAR, _NEARER = 1e-3, 1e-6
 
 
 @dataclass(frozen=True)
 class Branch:
-    """A way in which the loops close.
+    """Branch on which the loops close.
 
     Attributes:
-        distance: by how much the hinges with a start that counts are off from it: root of the sum
-            of squares, of angles in rad, of lengths in parts of the mean distance of hinges.
-        q: (nq,) the state on it that is nearest to the start.
+        distance: distance from the requested initial coordinates: root of the sum of squares, of
+            angles in rad, of lengths relative to the mean distance of hinges.
+        q: (nq,) state on the branch that is nearest to the start.
         pose: the same by the names of hinges.
     """
 
@@ -55,10 +56,10 @@ class Branch:
 
 
 class Wishes:
-    """Coordinates `q` (nq,) that are asked for; those of hinges in `kept` are met anyway.
+    """Requested coordinates `q` (nq,); those of hinges in `kept` are satisfied in any case.
 
-    Where `stated`, the starts count that the scene states: of several hinges that hold one body
-    those of the others are free where they are zero, as what nobody states is.
+    With `stated` only initial states in the scene count.  If several hinges carry one body, the
+    coordinates of the others are free if they are zero, like those without an initial state.
     """
 
     def __init__(
@@ -67,9 +68,9 @@ class Wishes:
         self.packed, self.q, self._length = packed, q, length_of(packed.system)
         self.kept = tuple(kept)
         counting = _stating(packed.described) if stated else packed.described.hinge
-        #: Places of coordinates that count, those of them that are angles, and of quaternions.
+        #: Indices in q of requested angles, lengths and quaternions.
         self.angles, self.lengths, self._fours = list[int](), list[int](), list[int]()
-        #: Places of angles in q, of hinges that count or not.
+        #: Indices in q of all angles, requested or not.
         self.turning = list[int]()
         driven = {hinge.name for hinge in packed.described.hinge if hinge.drive is not None}
         names = {one.name for one in counting} - {*kept} - driven
@@ -87,14 +88,14 @@ class Wishes:
                 (self.lengths if slides else self.angles).extend([slots.q + k] * counts)
 
     def off(self, q: Array) -> Array:
-        """(nq,) q less what is asked for, of coordinates that count; angles by the shorter way."""
+        """Deviation (nq,) of q from the requested coordinates; angles within half a turn."""
         found = np.zeros(len(q))
         found[self.lengths] = (q - self.q)[self.lengths]
         found[self.angles] = _wrapped((q - self.q)[self.angles])
         return found
 
     def distance(self, q: Array) -> float:
-        """See `Branch`."""
+        """Distance of q from the requested coordinates, see `Branch`."""
         off = self.off(q)
         squares = float(np.sum(off[self.angles] ** 2))
         squares += float(np.sum((off[self.lengths] / self._length) ** 2))
@@ -104,13 +105,13 @@ class Wishes:
         return math.sqrt(squares)
 
     def nearest_turn(self, q: Array) -> Array:
-        """q with angles by whole turns as near as can be to those asked for."""
+        """Shift the angles of q by whole turns to be nearest to the requested ones."""
         found = q.copy()
         found[self.turning] = (self.q + _wrapped(q - self.q))[self.turning]
         return found
 
     def toward(self, q: Array) -> Array:
-        """(nu,) change along the speeds from q to what is asked for."""
+        """Change (nu,) along the speeds from q to the requested coordinates."""
         off, layout, found = self.off(q), self.packed.layout, np.zeros(self.packed.layout.nu)
         for hinge in self.packed.described.hinge:
             slots = layout.hinges[hinge.name]
@@ -119,7 +120,7 @@ class Wishes:
         return found
 
     def drawn(self, draw: np.random.Generator) -> Array:
-        """(nu,) a change along the speeds by anything: half a turn, the length of the scene."""
+        """Random change (nu,) along the speeds: up to half a turn, or the length of the scene."""
         found, layout = np.zeros(self.packed.layout.nu), self.packed.layout
         for hinge in self.packed.described.hinge:
             slots, facts = layout.hinges[hinge.name], hinge.facts
@@ -131,18 +132,21 @@ class Wishes:
 
 
 class Search:
-    """Branches near `wishes`, of loops that `assembly` closes but for gaps of up to `much`; that of
-    `first` (nq,), where steps from the start lead, comes first where others are as near."""
+    """Search for branches near `wishes` on which `assembly` closes the loops, gaps up to `much`.
+
+    The branch of `first` (nq,), to which steps from the start lead, precedes others that are as
+    near.
+    """
 
     def __init__(self, assembly: Assembly, wishes: Wishes, first: Array, much: float = 0.0) -> None:
         self._assembly, self._wishes, self._first, self._much = assembly, wishes, first, much
 
     def is_near(self) -> bool:
-        """Whether `first` is where the wishes are: no other branch is nearer."""
+        """True if `first` is at the requested coordinates: no other branch is nearer."""
         return self._wishes.distance(self._first) < _NEAR
 
     def nearest(self) -> Array:
-        """(nq,) `first`, or a state on a branch that is nearer."""
+        """State `first` (nq,), or one on a nearer branch."""
         if len(self.found) < 2:
             return self._first
         best, far = self.found[0], self._wishes.distance(self._settled_first)
@@ -152,7 +156,7 @@ class Search:
 
     @cached_property
     def found(self) -> tuple[Branch, ...]:
-        """All branches that were found, the nearest first."""
+        """All branches found, the nearest first."""
         starts = (self._assembly.nearest_closed(start, self._much) for start in self._starts())
         others = [closed for closed in starts if closed is not None]
         wishes, states = self._wishes, [self._settled_first if others else self._first]
@@ -182,7 +186,7 @@ class Search:
         return self._settled(self._first)
 
     def _settled(self, q: Array) -> Array:
-        """q led along the motions to where it is nearest to the wishes."""
+        """Move q on its branch to the state nearest to the requested coordinates."""
         calls, far = self._assembly.calls, self._wishes.distance(q)
         for _ in range(_STEPS):
             try:
@@ -212,14 +216,14 @@ def _wrapped(angles: Array) -> Array:
 
 
 def _stating(scene: Scene) -> list[Hinge]:
-    """The hinges whose starts count."""
+    """Hinges whose initial states count."""
     keepers = {body: _keeper(hinges) for body, hinges in _holding(scene).items()}
     stated = [hinge for hinge in scene.hinge if _is_stated(hinge)]
     return [hinge for hinge in stated if _is_moved(hinge) or keepers[hinge.outboard_body] is hinge]
 
 
 def _holding(scene: Scene) -> dict[str, list[Hinge]]:
-    """Hinges by the body that they hold."""
+    """Hinges by their outboard body."""
     found: dict[str, list[Hinge]] = {}
     for hinge in scene.hinge:
         found.setdefault(hinge.outboard_body, []).append(hinge)
@@ -227,7 +231,7 @@ def _holding(scene: Scene) -> dict[str, list[Hinge]]:
 
 
 def _keeper(hinges: list[Hinge]) -> Hinge:
-    """Of the hinges that hold one body that which says where it begins."""
+    """Of several hinges with the same outboard body, the one that determines its initial state."""
     return next((hinge for hinge in hinges if _is_moved(hinge)), hinges[0])
 
 
@@ -236,7 +240,7 @@ def _is_stated(hinge: Hinge) -> bool:
 
 
 def _is_moved(hinge: Hinge) -> bool:
-    """Whether a hinge begins elsewhere than where it begins unless told."""
+    """True if a hinge states an initial q that differs from the default."""
     if hinge.initial is None or not hinge.initial.q or hinge.facts is None:
         return False
     usual = start_of(len(hinge.initial.q), hinge.facts.quaternion)
@@ -244,8 +248,10 @@ def _is_moved(hinge: Hinge) -> bool:
 
 
 def _placed(packed: Packed, q: Array, kept: Collection[str], much: float) -> Array | None:
-    """(nq,) the start with every body where the hinge that states most puts it, loops closed from
-    there; None where that is the tree there is, where it closes nothing, and for large scenes."""
+    """Closed start (nq,) with every body placed by the hinge that states its initial state.
+
+    None if the tree is the same, if the loops do not close from there, and for large scenes.
+    """
     scene = packed.described
     if len(scene.hinge) > _PLACED or scene.beam or scene.elastic or packed.releases:
         return None
@@ -264,13 +270,13 @@ def _placed(packed: Packed, q: Array, kept: Collection[str], much: float) -> Arr
         )
         start = _by_names(q, packed, other)
         closed = Assembly(Engine(other), start, kept).nearest_closed(start, much)
-    except MstmmError:  # bodies hold each other in a circle
+    except MstmmError:  # the determining hinges form a cycle
         return None
     return None if closed is None else _by_names(closed, other, packed)
 
 
 def _by_names(q: Array, packed: Packed, other: Packed) -> Array:
-    """q (nq,) of a scene as that of the same one with other cuts."""
+    """Convert q (nq,) of a scene to that of the same scene with other cuts."""
     found = np.zeros(other.layout.nq)
     for hinge in packed.described.hinge:
         found[other.layout.hinges[hinge.name].q_slice] = q[packed.layout.hinges[hinge.name].q_slice]

@@ -13,21 +13,21 @@ from ..engine import Engine
 from .mobility import mobilities
 from .numbers import LoopNumbers
 
-#: A pivot below this share of its usual size is rounding, which is the mobility of its row but for
-#: rows that only heavy bodies answer.
+#: A pivot below this fraction of its reference is rounding; the reference is the mobility of its
+#: row, except for rows with pivots below the second fraction of it because of heavy bodies.
 ROUNDING, _ANSWERED = 1e-8, 1e-3
-#: A pivot below this share of the mobility of its row repeats others: misfits up to 4e-3 rad.
+#: A row with a pivot below this fraction of its mobility is redundant: misfits up to 4e-3 rad.
 REPEATED = 1e-6
-#: Shares of the mobility below which no usual size is one, and no pivot whatever its usual size.
+#: Fractions of the mobility below which a reference, and any pivot, count as zero.
 _NOISE, _LEAST = 1e-12, 1e-15
 
 
 class LoopCalls(LoopNumbers):
-    """Gaps and slips of the loops of one packed scene, and what corrects them.
+    """Position gaps and velocity errors of the loops of one packed scene, and their corrections.
 
-    Every row is given the mobility of its ends at `q` (nq,), if they were free: the scale by which
-    a pivot is judged.  `mobility` (rows,) is given where these ends have no mass.  What drives and
-    couplings ask is that at `t` (s), where no other time is named.
+    The reference for the pivot of every row is the mobility of its ends at `q` (nq,) as if free;
+    `mobility` (rows,) replaces it if these ends have no mass.  Drives and couplings have their
+    values at `t` (s), unless another time is given.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class LoopCalls(LoopNumbers):
     def correction(
         self, level: int, q: Array, u: Array, give: float = 0.0, t: float | None = None
     ) -> tuple[Array, Array]:
-        """(change along the speeds (nu,), what the rows lack (rows,)); see sweep.h."""
+        """Correction along the speeds (nu,) and errors of the rows (rows,); see sweep.h."""
         engine, t = self.engine, self.t if t is None else t
         change, missing = np.zeros(engine.nu), np.zeros(max(1, self.count))
         failure = engine.ffi.new("mstmm_failure *")
@@ -70,8 +70,10 @@ class LoopCalls(LoopNumbers):
         return change, missing[: self.count]
 
     def choose(self, q: Array) -> bool:
-        """Of rows that repeat others those that are met from now on: what was chosen stays while it
-        is not much worse than the best at q (nq,).  Whether there is a new choice."""
+        """Choose which of interchangeable redundant rows are satisfied; True for a new choice.
+
+        A previous choice is kept while it is not much worse than the best at q (nq,).
+        """
         engine = self.engine
         changed, failure = engine.ffi.new("int *"), engine.ffi.new("mstmm_failure *")
         code = engine.lib.mstmm_choose_rows(
@@ -83,16 +85,16 @@ class LoopCalls(LoopNumbers):
         return bool(changed[0])
 
     def resting(self) -> NDArray[np.bool_]:
-        """Whether each row (rows,) is not met because others of its choice are."""
+        """Mask (rows,) of the rows not satisfied because others of their choice are."""
         return self.records.resting(self.memory)
 
     def let_go(self) -> list[int]:
-        """Rows of hinges that have been let go by `memory`."""
+        """Rows of hinges that are released according to `memory`."""
         releases = (int(self.model.rows[row].release) for row in range(self.count))
         return [row for row, place in enumerate(releases) if place >= 0 and self.memory[place]]
 
     def stressed(self, q: Array, asked: Array, give: float) -> Array:
-        """Multipliers (rows,) of rows that lack `asked` and yield by `give`; see sweep.h."""
+        """Multipliers (rows,) of rows with errors `asked` and compliance `give`; see sweep.h."""
         engine, found = self.engine, np.zeros(max(1, self.count))
         failure = engine.ffi.new("mstmm_failure *")
         code = engine.lib.mstmm_stressed(
@@ -104,7 +106,7 @@ class LoopCalls(LoopNumbers):
         return found[: self.count]
 
     def moved(self, q: Array, change: Array) -> Array:
-        """q (nq,) moved by a change along the speeds (nu,)."""
+        """Move q (nq,) by a change along the speeds (nu,)."""
         engine, result, t = self.engine, q.copy(), self.t
         failure = engine.ffi.new("mstmm_failure *")
         code = engine.lib.mstmm_moved(
@@ -117,7 +119,7 @@ class LoopCalls(LoopNumbers):
         return result
 
     def driven(self, q: Array, u: Array) -> tuple[Array, Array]:
-        """The state with driven coordinates filled in."""
+        """State (q, u) with the driven coordinates and speeds set."""
         engine, q, u, t = self.engine, q.copy(), u.copy(), self.t
         failure = engine.ffi.new("mstmm_failure *")
         code = engine.lib.mstmm_fill_driven(
@@ -129,9 +131,11 @@ class LoopCalls(LoopNumbers):
         return q, u
 
     def judge_by(self, states: Sequence[Array]) -> set[int]:
-        """Take the largest pivots at these closed states (nq,) for the usual ones, where they are
-        far below the mobilities: honest rows, behind which heavy bodies hang.  Rows whose pivots
-        are rounding at all of them."""
+        """Set the reference of pivots far below their mobilities from closed states (nq,).
+
+        Such rows are independent, with heavy bodies outboard of them; their reference is the
+        largest pivot at these states.  Returns the rows whose pivots are rounding at all states.
+        """
         floors = [self.records.floor(row) for row in range(self.count)]
         for row in range(self.count):
             self.records.judge(row, _NOISE * float(self.mobility[row]))
@@ -146,6 +150,6 @@ class LoopCalls(LoopNumbers):
         return {row for row in range(self.count) if not usual[row]} - {*self.records.chosen}
 
     def strain(self, q: Array) -> float:
-        """The largest of what is rounding for a row in parts of its pivot, at a closed state."""
+        """Largest ratio of a row's rounding level to its pivot, at a closed state."""
         self.correction(self.slip, q, np.zeros(self.engine.nu))
         return float((self.inverses() * self.records.floors).max(initial=0.0))

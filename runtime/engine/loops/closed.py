@@ -1,4 +1,4 @@
-"""The closed loops of a model: assembled, their rows judged, and told of."""
+"""Closed loops of a model: assembly at the start, rank of the rows, and their description."""
 
 from __future__ import annotations
 
@@ -27,51 +27,51 @@ from .refinement import refinements, unlike_masses
 from .rotor_assembly import RotorAssembly
 from .stress import outboard_axes
 
-#: Directions of a hinge that closes a loop, as its rows are called.
+#: Names of the rows of a hinge that closes a loop, by direction.
 _DIRECTIONS = ("x", "y", "z", "mx", "my", "mz")
-#: The row of a coupling of coordinates, and of one of speeds.
+#: Names of the row of a coupling of coordinates, and of one of speeds.
 _COUPLED = ("expression", "speeds")
-#: And of constraints, by whose directions their rows are; "hinge": of a point on a curve.
+#: Names of the rows of constraints by kind and direction; "hinge": a point on a curve.
 _OF_CONSTRAINTS = {
     "distance": ("length",), "plane": ("normal",), "rolling": ("x", "y", "normal"),
     "hinge": ("", "across1", "across2"),
 }  # fmt: skip
-#: Gaps at which it may still be that rows repeat others but for a misfit, in parts of the length of
-#: the scene.
+#: Largest position gap of a row that may still be redundant up to a misfit, relative to the length
+#: of the scene.
 _NEARLY = 1e-2
-#: Misfits of rows that repeat others that are rounding, in parts of those that lock.
+#: Misfits of redundant rows that are rounding, relative to those that lock.
 _SILENT = 1e-3
-#: A pose is near a singular one where the strain is this many times that of the start.
+#: A pose is near a singular one if the strain is this many times that of the start.
 _STRAINED = 10.0
-#: Longest step (rad, m) by which a branch is followed.
+#: Longest step (rad, m) along a branch.
 _LED = 0.1
-#: So many hinges are named.
+#: Maximum number of hinges named in a message.
 _NAMED = 8
 
 
 @dataclass(frozen=True)
 class Loops:
-    """What closes in a scene.
+    """Closed-loop analysis of a scene: cut hinges, rows, rank, redundancy and mobility.
 
     Attributes:
-        cut: hinges that close loops; which of a loop's hinges does changes nothing but the work.
+        cut: hinges that close loops; the choice of a loop's hinge affects only the computing time.
         rows: (hinge, direction) of every row, in the order in which they are closed: "x" to "mz"
-            for the outboard axis of the hinge along or about which it lies, or nearly so, "u1",
-            ... for its own speeds; or (constraint, direction): "length", "normal", "x" and "y"
-            where it rolls, "across1" and "across2" of a curve.
-        rank: how many rows say something of their own.
-        nearby: how many do in closed states nearby; more than `rank` in a singular pose.
-        redundant: rows that repeat others, so that the loads along them are not determined.
-        momentary: those of them that do so in this pose alone.
+            for the outboard axis of the hinge nearest to its direction, "u1", ... for its own
+            speeds; or (constraint, direction): "length", "normal", "x" and "y" of rolling,
+            "across1" and "across2" of a curve.
+        rank: number of independent rows.
+        nearby: that number in closed states nearby; greater than `rank` in a singular pose.
+        redundant: redundant rows, so that the loads along them are not determined.
+        momentary: those of them that are redundant only in this pose.
         not_unique: components of the loads of hinges, "fx" to "mz" along and about their outboard
-            axes, and directions of the loads of constraints and couplings, by name: rigid bodies
-            do not determine them, results show one of many shares.
-        misfit: the largest gap (m, rad) that rows which repeat others leave at the start, for they
-            do so nearly alone, with the row; 0 and two empty words where there is none.
-        mobility: speeds that are left free.
-        shapes: how many of these are rates of the shapes of flexible bodies, as many as there are
-            unless rows that nothing else can meet take some.
-        width: most rows that are open across one hinge at a time.
+            axes, and directions of the loads of constraints and couplings, by name, that rigid
+            bodies do not determine: results show one of many distributions.
+        misfit: the largest position gap (m, rad) at the start of rows that are redundant up to a
+            misfit, with the row; 0 and two empty strings if there is none.
+        mobility: number of free speeds.
+        shapes: number of these that are rates of the shapes of flexible bodies: all of them unless
+            some are needed to satisfy rows.
+        width: largest number of rows that are open across one hinge at a time.
     """
 
     cut: tuple[str, ...] = ()
@@ -90,24 +90,24 @@ class Loops:
 
     @property
     def singular(self) -> bool:
-        """Whether the start is a singular pose, where fewer rows count than nearby."""
+        """True if the start is a singular pose, with fewer independent rows than nearby."""
         return self.nearby > self.rank
 
     @property
     def counted(self) -> str:
-        """Rows, their rank and what is left free, in words."""
+        """Summary of rows, rank and mobility."""
         bent = f", of them {self.shapes} of shapes" if self.shapes else ""
         speeds = "1 speed" if self.mobility == 1 else f"{self.mobility} speeds"
         return f"{self.rank} of {len(self.rows)} rows count, {speeds} left{bent}"
 
     def repeated(self, most: int) -> str:
-        """`redundant` in words, so many of them by name."""
+        """List of `redundant` for messages, with at most `most` names."""
         told = ", ".join(f"{word} of {name}" for name, word in self.redundant[:most])
         return told + (" ..." if len(self.redundant) > most else "")
 
     @property
     def open_loads(self) -> str:
-        """`not_unique` in words, the first hinges by name."""
+        """List of `not_unique` for messages, with the first names."""
         alike: dict[tuple[str, ...], list[str]] = {}
         for name, words in self.not_unique.items():
             alike.setdefault(words, []).append(name)
@@ -118,26 +118,30 @@ class Loops:
 
     @property
     def branches(self) -> tuple[Branch, ...]:
-        """The ways in which the loops can close with what `hold` keeps, as far as they are found:
-        the nearest to the start, where the model begins, then the others."""
+        """Branches on which the loops close with coordinates of `hold` kept, as far as found.
+
+        The first is nearest to the start and is that of the model.
+        """
         return self.found_by()
 
     @property
     def independent(self) -> tuple[str, ...]:
-        """Names of speeds that decide all others, as many as the mobility: those over which mass
-        matrices and linear models of the mechanism stand."""
+        """Names of the independent speeds, as many as the mobility.
+
+        They determine all others; mass matrices and linear models of the mechanism refer to them.
+        """
         return self.decided_by()
 
 
 class Closed:
-    """The start of a scene with its loops closed, and what is known of them.
+    """Start of a scene with closed loops, and their analysis.
 
-    `engine` is the one to go on with, in which rows that always repeat others are left out.
+    `engine` is the engine to use from then on, without the rows that are always redundant.
     """
 
     def __init__(self, engine: Engine, free_speeds: int) -> None:
         packed, self.engine = engine.packed, engine
-        self._whole = engine  #: with all rows there are
+        self._whole = engine  #: with all rows
         self._found: tuple[Branch, ...] = ()
         hinges = [hinge for hinge in packed.described.hinge if not hinge.is_weld]
         holds = [hinge.name for hinge in hinges if hinge.hold]
@@ -158,7 +162,7 @@ class Closed:
         near = self._nearest(q, near, holds, _NEARLY * length)
         try:
             self._begin(near, u, holds, free_speeds, calls)
-        except OpenLoop:  # what is left open there is no misfit: it closes farther away
+        except OpenLoop:  # the gap there is no misfit: it closes farther away
             near = self._assembly(near, holds).positions(near, _NEARLY * length, rough=False)
             self.engine = engine
             self._begin(near, u, holds, free_speeds, calls)
@@ -168,10 +172,10 @@ class Closed:
     def _begin(
         self, near: Array, u: Array, holds: Collection[str], free_speeds: int, calls: LoopCalls
     ) -> None:
-        """Judge the rows near a state (nq,) that is closed but for misfits, and begin there;
-        `calls` are those of all rows.
+        """Find the rank of the rows near a state (nq,) that is closed up to misfits; start there.
 
-        Raises OpenLoop where those that count do not close, SceneError for what cannot move.
+        `calls` are those of all rows.  Raises OpenLoop if independent rows do not close, SceneError
+        if the mechanism cannot move.
         """
         locks = LOCKED * length_of(self.engine.packed.system)
         self._keep(near)
@@ -191,7 +195,7 @@ class Closed:
         self._refuse_locked(calls, repeating, locks)
 
     def _nearest(self, q: Array, near: Array, holds: Collection[str], much: float) -> Array:
-        """`near`, where steps from the start q (nq,) lead, or a state on a nearer branch."""
+        """Return `near`, to which steps from the start q (nq,) lead, or a nearer branch's state."""
         self._wishes = Wishes(self.engine.packed, q, holds)
         search = Search(self._assembly(q, holds), self._wishes, near, much)
         if search.is_near():
@@ -202,8 +206,10 @@ class Closed:
 
     @property
     def branches(self) -> tuple[Branch, ...]:
-        """Branches on which the loops close, as far as they were found, the nearest to the start
-        first; looked for when they are asked for first, where the start was closed."""
+        """Branches on which the loops close, as far as found, the nearest to the start first.
+
+        If the start was closed, the search happens at the first access.
+        """
         if not self._found:
             holds = self._wishes.kept
             search = Search(self._assembly(self.start[0], holds), self._wishes, self.start[0])
@@ -213,7 +219,7 @@ class Closed:
     def nearest(
         self, q: Array, u: Array, holds: Collection[str], fast: Collection[str], t: float
     ) -> tuple[Array, Array]:
-        """As `assembled`, on the branch that is nearest to q of those that are found."""
+        """Assemble as `assembled`, on that of the branches found that is nearest to q."""
         assembly = self._assembly(q, holds, t)
         near = assembly.positions(q)
         search = Search(assembly, Wishes(self.engine.packed, q, holds, stated=False), near)
@@ -221,10 +227,10 @@ class Closed:
         return near, self._assembly(near, fast, t).speeds(near, u)
 
     def led(self, q: Array, to: Array, holds: Collection[str], t: float = 0.0) -> Array:
-        """A closed q (nq,) with the coordinates of `holds` led to those of `to` by small steps, so
-        that it stays on its branch; what drives and couplings ask is that at t (s).
+        """Move the coordinates of `holds` from a closed q (nq,) to those of `to` on one branch.
 
-        Raises OpenLoop where the branch ends before.
+        The steps are small, so that the state stays on its branch; drives and couplings have their
+        values at t (s).  Raises OpenLoop if the branch ends before.
         """
         layout, kept = self.engine.packed.layout, np.zeros(len(q), bool)
         driven = {hinge.name for hinge in self.engine.packed.described.hinge if hinge.drive}
@@ -240,10 +246,10 @@ class Closed:
     def assembled(
         self, q: Array, u: Array, holds: Collection[str], fast: Collection[str], t: float = 0.0
     ) -> tuple[Array, Array]:
-        """The nearest (q, u) with loops closed at t (s); positions of `holds` and speeds of `fast`
-        stay.
+        """Nearest (q, u) that satisfies all constraints at t (s).
 
-        Raises SceneError where there is none.
+        The coordinates of `holds` and the speeds of `fast` are kept.  Raises SceneError if there is
+        none.
         """
         q = self._assembly(q, holds, t).positions(q)
         return q, self._assembly(q, fast, t).speeds(q, u)
@@ -252,18 +258,18 @@ class Closed:
         return RotorAssembly(self.engine, q, hinges, self._sharing, t)
 
     def _sharing(self, q: Array) -> str:
-        """Drives that move the same freedom near q, in words."""
+        """End of a message about drives of the same degree of freedom near q, or ""."""
         return sharing(self._whole, q)
 
     def _keep(self, q: Array) -> None:
-        """Couplings without a value keep what they have at q."""
+        """Give couplings without a value the one that they have at q."""
         packed = self.engine.packed
         if any(one.kept is None for one in packed.system.couplings):
             values = LoopCalls(self.engine, q).values()
             self.engine = Engine(packed_system(keeping(packed.system, values.tolist()), packed))
 
     def _judged(self, q: Array, free_speeds: int) -> tuple[Loops, dict[int, tuple[str, str]]]:
-        """What closes near q, and the rows that always repeat others."""
+        """Analyse the loops near q; also the rows that are always redundant, by index."""
         rank, calls = rank_at(self.engine, q), LoopCalls(self.engine, q)
         packed, records = self.engine.packed, calls.records
         names, loads = self._names(calls), dict(rank.open.loads)
@@ -271,9 +277,9 @@ class Closed:
             if name not in packed.layout.hinges:
                 loads[name] = (*loads.get(name, ()), word)
         if rank.stuck and not self._is_led:
-            way = "give what bends there axial shapes too, or let an end of it slide"
+            way = "give the flexible bodies there axial shapes too, or let one of their ends slide"
             if not packed.flexible:
-                way = "change a length or the place of a hinge a little, so that they close in"
+                way = "change a length or the place of a hinge slightly, so that they close in"
                 way += " more than this pose"
             raise SceneError(
                 f"scene: {_ending(names[row][0] for row in sorted(rank.here))} in a pose that no "
@@ -292,7 +298,7 @@ class Closed:
         mobility = free_speeds - self._shared() - rows
         bent = sum(slots.nu for slots in packed.layout.modal.values())
         if packed.releases:
-            # What repeats others now may be needed once these let go: by every evaluation.
+            # Rows redundant now may be needed after a release: every evaluation decides.
             for row in rank.going:
                 records.judge(row, REPEATED * float(calls.mobility[row]))
         elif rank.always:
@@ -314,43 +320,42 @@ class Closed:
         return told, {row: names[row] for row in sorted(rank.always)}
 
     def _too_many(self, q: Array, holds: Sequence[str], free_speeds: int) -> str:
-        """What ends a message where more is held than is free near q, by the rank there."""
+        """End of a message if more coordinates are held than are free near q, else ""."""
         count = sum(self.engine.packed.layout.hinges[name].nu for name in holds)
         try:
             near = Assembly(self.engine, q).positions(q)
             self._keep(near)
             mobility = self._judged(near, free_speeds)[0].mobility
-        except MstmmError:  # it does not close without holds either
+        except MstmmError:  # it does not close without held coordinates either
             return ""
         if count <= mobility:
             return ""
-        ways = "1 freedom" if mobility == 1 else f"{mobility} freedoms"
+        ways = "1 degree of freedom" if mobility == 1 else f"{mobility} degrees of freedom"
         return f"; hold keeps {count} coordinate{'s' * (count > 1)}, the mechanism has {ways}"
 
     def _refuse_structure(self) -> None:
-        """SceneError where nothing can move, and nothing that goes by time moves it."""
+        """Raise SceneError if no motion is free and none is prescribed over time."""
         if self.loops.mobility > 0 or self._is_led:
             return
         way = skewed(self.engine.packed, COUNTING)
-        way = way or "take a hinge with more coordinates, or a [[spring]] in place of one of them"
+        way = way or "use a hinge with more coordinates, or replace a hinge by a [[spring]]"
         raise SceneError(
-            f"scene: no freedom is left, and {_ending(name for name, _ in self.loops.rows)}: a "
-            f"structure; {way}"
+            f"scene: no degree of freedom is left, and "
+            f"{_ending(name for name, _ in self.loops.rows)}: a structure; {way}"
         )
 
     def _refuse_drowned(self, rows: Sequence[tuple[str, str]]) -> None:
-        """NumericalFailure for rows that geometry tells from others, but no sweep with these
-        masses."""
+        """Raise NumericalFailure for independent rows that the masses hide in rounding."""
         if rows:
             name, direction = rows[0]
             raise NumericalFailure(
-                f'direction {direction} of what "{name}" closes drowns in rounding: '
+                f'direction {direction} of the loop closed by "{name}" is lost to rounding: '
                 f"{unlike_masses(self.engine)}"
             )
 
     @property
     def _is_led(self) -> bool:
-        """Whether drives, couplings that go by time or releases may move what nothing else does."""
+        """True if drives, couplings that depend on time, or releases may move the mechanism."""
         packed = self.engine.packed
         led = any(one.goes_by_time for one in packed.described.coupling)
         return led or bool(packed.system.driven or packed.releases)
@@ -358,7 +363,7 @@ class Closed:
     def _refuse_locked(
         self, calls: LoopCalls, repeating: Mapping[int, tuple[str, str]], much: float
     ) -> None:
-        """SceneError where a row that repeats others leaves a gap that they do not close."""
+        """Raise SceneError if a redundant row leaves a gap that the others do not close."""
         q, u = self.start
         missing = np.abs(calls.correction(calls.gap, q, np.zeros(len(u)))[1])
         slips = np.abs(calls.correction(calls.slip, q, u)[1])
@@ -371,29 +376,29 @@ class Closed:
             if missing[row] > much:
                 if direction in _COUPLED:
                     raise SceneError(
-                        f'scene: coupling "{closing}" contradicts what others ask, by '
-                        f"{missing[row]:.3g} at the start; leave it out, or correct what it equals"
+                        f'scene: coupling "{closing}" contradicts other constraints by '
+                        f"{missing[row]:.3g} at the start; omit it, or correct its expression"
                     )
                 raise SceneError(
-                    f"scene: direction {direction} of {calls.closing(row)} repeats what others "
-                    f"do, but for a gap of {missing[row]:.3g}: "
+                    f"scene: direction {direction} of {calls.closing(row)} is redundant, violated "
+                    f"by {missing[row]:.3g}: "
                     f"{self._sharing(q) or self._locking(float(missing[row]))}"
                 )
 
     def _locking(self, gap: float) -> str:
-        """Why a gap (m, rad) that nothing closes is none of a mechanism, and what to do."""
+        """End of a message about a gap (m, rad) that no motion closes, with a remedy."""
         way = skewed_by_gap(self.engine.packed, gap)
         way = way or "make axes parallel and points meet, or use a ball or cylindrical hinge"
         return f"as a rigid mechanism it would lock; {way}"
 
     def _shared(self) -> int:
-        """Speeds of cut hinges that nobody imposes: the tree has them already."""
+        """Number of free speeds of cut hinges, which the tree counts already."""
         system = self.engine.packed.system
         frames = [system.body(one.frame) for one in system.closures]
         return sum(frame.nu - sum(frame.imposed) for frame in frames)
 
     def _names(self, calls: LoopCalls) -> list[tuple[str, str]]:
-        """(hinge, direction) of every row."""
+        """Names (hinge, direction) of every row."""
         names, system = [("", "")] * calls.count, self.engine.packed.system
         for one in calls.records.closures:
             hinge, _, table = calls.engine.hinge_name(one.frame).partition("/")
@@ -416,8 +421,7 @@ class Closed:
 
 
 def _chosen(records: LoopRecords, rank: Rank) -> dict[int, int]:
-    """How many rows count of closures of which some stand in for others, by the place of the
-    frame."""
+    """Number of independent rows of closures with interchangeable rows, by place of the frame."""
     own = {one.frame: {*one.rows.values()} for one in records.closures}
     standing = rank.always - rank.going
     return {
@@ -427,19 +431,21 @@ def _chosen(records: LoopRecords, rank: Rank) -> dict[int, int]:
 
 
 def _behind(engine: Engine, q: Array) -> str:
-    """What is behind loops that close at the start q (nq,) but not later, and what to do; empty
-    where neither drives nor axes are."""
+    """Cause of loops that close at the start q (nq,) but not later, with a remedy.
+
+    Empty if neither drives nor axes are the cause.
+    """
     return sharing(engine, q) or skewed(engine.packed, COUNTING)
 
 
 def _ending(closing: Iterable[str]) -> str:
-    """Loops by what closes them, the first by name."""
+    """Phrase that names the elements that close loops, the first ones only."""
     names = [f'"{name}"' for name in dict.fromkeys(closing)]
     return f"loops close at {', '.join(names[:_NAMED])}{' ...' if len(names) > _NAMED else ''}"
 
 
 def _words(sizes: Array) -> list[str]:
-    """A word for each of n directions (n, 6), none twice: the largest components choose first."""
+    """Distinct names of n directions (n, 6); the largest components choose first."""
     words, left = [""] * len(sizes), sizes.copy()
     for _ in words:
         row, column = np.unravel_index(left.argmax(), left.shape)

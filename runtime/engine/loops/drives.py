@@ -1,4 +1,4 @@
-"""Drives that move the same freedom of closed loops: one decides what the others may do."""
+"""Redundant drives: several drives that move the same degree of freedom of closed loops."""
 
 from __future__ import annotations
 
@@ -14,17 +14,20 @@ from .assembly import Assembly
 from .calls import REPEATED
 from .rank import judging
 
-#: Random motions beyond as many as there are drives.
+#: Number of random motions in addition to the number of drives.
 _MORE = 2
-#: Shares of motions that are rounding, and of combinations of drives in which one has no part.
+#: Relative motions that are rounding, and relative shares of a drive in a combination that count as
+#: none.
 _ROUNDING, _NO_PART = 1e-6, 1e-4
-#: So many drives are named.
+#: Maximum number of drives named in a message.
 _NAMED = 8
 
 
 def sharing(engine: Engine, q: Array) -> str:
-    """Which drives move the same freedom near q (nq,), and what to do, as words that end a message;
-    empty where each moves its own, and where loops stay open without them too."""
+    """End of a message that names drives of the same degree of freedom near q (nq,), with a remedy.
+
+    Empty if each drive moves its own degree of freedom, or if loops stay open without drives too.
+    """
     driven = engine.packed.system.driven
     if len(driven) < 2:
         return ""
@@ -42,7 +45,7 @@ def sharing(engine: Engine, q: Array) -> str:
 
 
 def _moved(engine: Engine, q: Array) -> Array:
-    """(drives, n) the driven speeds in random motions of the mechanism without its drives."""
+    """Driven speeds (drives, n) in random motions of the mechanism without its drives."""
     packed = engine.packed
     free = Engine(packed_system(freed(packed.system), packed))
     closed = Assembly(free, q).positions(q)
@@ -64,9 +67,9 @@ def _words(names: list[str], drives: int, surplus: int) -> str:
     if len(names) == 2:
         told = told.replace(", ", " and ")
     alone = drives - surplus == 1
-    moved = "the same freedom" if alone else "the same freedoms"
+    moved = "the same degree of freedom" if alone else "the same degrees of freedom"
     less = "one" if surplus == 1 else "all but one" if alone else "some"
     return (
-        f"the drives of hinges {told} move {moved} of the mechanism; leave out {less} of these "
-        "drives, or take a [[bushing]], which yields, in place of a hinge of the loop"
+        f"the drives of hinges {told} move {moved} of the mechanism; omit {less} of these drives, "
+        "or replace a hinge of the loop by a compliant [[bushing]]"
     )

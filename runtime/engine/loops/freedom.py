@@ -1,8 +1,8 @@
-"""What closed loops leave free: speeds that decide all others, and how these follow.
+"""Independent speeds of closed loops, and the speeds that they determine.
 
-Random speeds less what the rows do not allow span the motions of a mechanism, one correction each.
-A few speeds are read off that tell these motions apart, the first in the scene that do so well, and
-u = N v: N is 1 in the rows of v, and no row slips.
+Random speeds, each projected on the constraints by one correction, span the motions of a mechanism.
+Independent speeds v are chosen that distinguish these motions, preferably the first in the scene,
+and u = N v: N is 1 in the rows of v, and no row has a velocity error.
 """
 
 from __future__ import annotations
@@ -21,22 +21,23 @@ from ..engine import Engine
 from .closed import Closed
 from .rank import judging
 
-#: Motions that are rounding beside others, in sizes of the speeds.
+#: Motions that are rounding compared with others, in characteristic scales of the speeds.
 _ROUNDING = 1e-9
-#: A speed is read off where no other tells more than this many times as much apart.
+#: A speed is chosen if no other one distinguishes motions better by more than this factor.
 _WELL = 4.0
-#: And a speed that is asked for where it does so at all.
+#: A requested speed is chosen if no other one is better by more than this factor.
 _BARELY = 1e4
-#: Gaps (m, rad) of loops that are open.
+#: Position gaps (m, rad) above which loops are open.
 _OPEN = 1e-6
-#: Speeds that decide others this many times their own size decide nothing any more.
+#: Speeds determine no others if these would be more than this many times larger.
 _MOST = 1e8
 
 
 class Freedom:
-    """The motions of one packed scene with closed loops.
+    """Independent speeds and motions of one packed scene with closed loops.
 
-    `free` are the places of the speeds that nobody imposes, `sizes` (nu,) motions of order one.
+    `free` are the indices of the speeds that are not prescribed, `sizes` (nu,) the characteristic
+    scales of the speeds.
     """
 
     def __init__(self, engine: Engine, free: Sequence[int], sizes: Array, closed: Closed) -> None:
@@ -48,14 +49,14 @@ class Freedom:
 
     @cached_property
     def places(self) -> tuple[int, ...]:
-        """Places of the independent speeds, those that are chosen at the start."""
+        """Indices of the independent speeds, which are chosen at the start."""
         return self.chosen(self._start)
 
     def chosen(self, q: Array) -> tuple[int, ...]:
-        """Places of speeds that decide all others at q (nq,).
+        """Choose the indices of speeds that determine all others at q (nq,).
 
-        Each is the first in the scene that is told apart from those before it a quarter as well as
-        any other, by motions in sizes.
+        Each is the first in the scene that distinguishes the remaining motions, in characteristic
+        scales, at least a quarter as well as any other.
         """
         left = self._motions(q) / self.sizes[:, None]
         return tuple(sorted(read_off(left, self._free.tolist(), _WELL)[0]))
@@ -63,11 +64,11 @@ class Freedom:
     def settling(
         self, q: Array, shapes: Sequence[int], kept: Sequence[int], wished: Sequence[int]
     ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Places of the speeds that hold a mechanism at q where `shapes` settle, and of those of
-        the shapes that decide all others then.
+        """Choose speeds that fix a mechanism at q while `shapes` settle.
 
-        Held are `kept`, as far as they may move, and the first that tell the motions in which no
-        shape changes apart, of `wished` where these do.
+        Returns the indices of the fixed speeds, and of the shapes that then determine all others.
+        Fixed are `kept`, as far as they can move, and the first speeds that distinguish the motions
+        without change of shape, preferably those in `wished`.
         """
         left = self._motions(q) / self.sizes[:, None]
         held, left = read_off(left, kept, _BARELY)
@@ -80,9 +81,10 @@ class Freedom:
         return (*held, *more), tuple(sorted(read_off(left, shapes, _WELL)[0]))
 
     def following(self, q: Array, places: Sequence[int]) -> Array:
-        """N (nu, n): all speeds for a unit of each of some independent ones.
+        """Matrix N (nu, n): all speeds for a unit of each of some independent ones.
 
-        Raises NumericalFailure where these decide nothing, at a dead centre, and at singular poses.
+        Raises NumericalFailure if these do not determine the others, as at a dead centre, and in
+        singular poses.
         """
         found, own = self._motions(q), list(places)
         scaled = found[own] / self.sizes[own, None]
@@ -93,8 +95,8 @@ class Freedom:
         self._refuse_open(q)
         names = ", ".join(self._calls.engine.packed.layout.u_name(k) for k in own)
         raise NumericalFailure(
-            f"the loops leave {ways} motions here, which {names or 'no speed'} cannot tell apart: "
-            "a dead centre or a singular pose; take a state beside it"
+            f"the loops leave {ways} motions here, which {names or 'no speed'} cannot distinguish: "
+            "a dead centre or a singular pose; use a state near it"
         )
 
     def _refuse_open(self, q: Array) -> None:
@@ -103,29 +105,30 @@ class Freedom:
         if gaps[row] > _OPEN:
             raise NumericalFailure(
                 f"the loop that {self._calls.closing(row)} closes is open by {gaps[row]:.3g} at "
-                "this q; take that of model.assemble(q)"
+                "this q; use that of model.assemble(q)"
             )
 
     def driving(self, q: Array, speed: int) -> Array:
-        """All speeds (nu,) for a unit of one that is imposed, the others of these at rest; nan
-        where the loops do not let it move alone."""
+        """All speeds (nu,) for a unit of one prescribed speed with the other prescribed ones zero.
+
+        nan if the loops do not permit that motion.
+        """
         moved = self._allowed(q, np.eye(1, len(self.sizes), speed)[0])
         slips = self._slips(q, moved)[1]
         return moved if np.abs(slips).max(initial=0.0) < _ROUNDING else np.full_like(moved, np.nan)
 
     def moved(self, q: Array, speeds: Array) -> Array:
-        """q (nq,) after a small motion along speeds (nu,); loops are closed to first order."""
+        """Move q (nq,) slightly along speeds (nu,); loops are closed to first order."""
         return self._calls.moved(q, speeds)
 
     @property
     def free(self) -> list[int]:
-        """Places of the speeds that nobody imposes."""
+        """Indices of the speeds that are not prescribed."""
         return list(map(int, self._free))
 
     @cached_property
     def rows_of_speeds(self) -> frozenset[int]:
-        """Rows that restrict speeds and keep no position: of discs that roll, couplings of
-        speeds."""
+        """Rows that constrain speeds but no positions: of rolling discs, couplings of speeds."""
         records = self._calls.records
         asked = {one.frame: one.of_speeds for one in self._calls.engine.packed.system.closures}
         found = {
@@ -135,15 +138,15 @@ class Freedom:
         return frozenset(found | {x.row for x in records.couplings if x.coupling.of_speeds})
 
     def without_slip(self, q: Array, u: Array) -> Array:
-        """The nearest speeds to u (nu,) that no row refuses, with imposed ones as they are."""
+        """Nearest speeds to u (nu,) that satisfy all rows; prescribed speeds are unchanged."""
         return np.asarray(u + self._calls.correction(self._calls.slip, q, u)[0])
 
     def slip(self, q: Array, u: Array) -> Array:
-        """(rows,) J(q) u, but for its sign."""
+        """Velocity errors (rows,): J(q) u up to its sign."""
         return self._slips(q, u)[1]
 
     def _motions(self, q: Array) -> Array:
-        """(nu, n) a basis of the motions at q, orthonormal in sizes."""
+        """Basis (nu, n) of the motions at q, orthonormal in characteristic scales."""
         count = min(len(self._free), self._loops.mobility + 1)  # one more shows at a singular pose
         draw = np.random.default_rng(0)
         trials = np.zeros((count, len(self.sizes)))
@@ -155,20 +158,25 @@ class Freedom:
         return np.asarray(left[:, kept] * self.sizes[:, None])
 
     def _allowed(self, q: Array, speeds: Array) -> Array:
-        """Speeds less their slips."""
+        """Speeds (nu,) projected on the constraints."""
         return speeds + self._slips(q, speeds)[0]
 
     def _slips(self, q: Array, speeds: Array) -> tuple[Array, Array]:
-        """The correction (nu,) of speeds and the slips, without what rows ask of a scene at rest:
-        couplings that go by time."""
+        """Correction (nu,) of speeds and their velocity errors (rows,), without those at rest.
+
+        At rest the velocity errors are those of couplings that depend on time.
+        """
         correction, slips = self._calls.correction(self._calls.slip, q, speeds)
         still, asked = self._calls.correction(self._calls.slip, q, np.zeros_like(speeds))
         return correction - still, slips - asked
 
 
 def read_off(left: Array, places: Sequence[int], well: float = _WELL) -> tuple[list[int], Array]:
-    """Rows of motions (nu, n), orthonormal in sizes, that tell them apart, and what of the motions
-    moves none of these; each is the first of `places` that is told apart well."""
+    """Choose rows that distinguish motions (nu, n), orthonormal in characteristic scales.
+
+    Each is the first of `places` that distinguishes the remaining motions well enough.  Also
+    returns the motions in which none of the chosen rows moves.
+    """
     own, found = list(places), list[int]()
     for _ in range(left.shape[1]):
         lengths = np.linalg.norm(left[own], axis=1)
@@ -180,6 +188,6 @@ def read_off(left: Array, places: Sequence[int], well: float = _WELL) -> tuple[l
 
 
 def _without(left: Array, place: int) -> Array:
-    """Motions (nu, n) less what moves one speed."""
+    """Motions (nu, n) without their part that moves one speed."""
     along = left[place] / np.linalg.norm(left[place])
     return np.asarray(left - np.outer(left @ along, along))

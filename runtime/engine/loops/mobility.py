@@ -1,5 +1,7 @@
-"""How far rows of closed loops give way to a load of one, if the bodies next to them were free: the
-scale by which their pivots are judged."""
+"""Mobility of constraint rows: response of the free adjacent bodies to a unit load of a row.
+
+It is the reference for the pivots of the rows.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +17,10 @@ from .numbers import LoopNumbers
 
 
 def mobilities(numbers: LoopNumbers) -> Array:
-    """J M^-1 J^T of both ends of every row (rows,), after a correction; of what has no mass that of
-    the others."""
+    """Mobility J M^-1 J^T of both ends of every row (rows,), after a correction.
+
+    Rows between bodies without mass get the mean of the others.
+    """
     found, masses = np.zeros(numbers.count), _Masses(numbers.engine)
     for one in numbers.records.closures:
         for body, name in ((one.inboard, "J_A"), (one.outboard, "J_B")):
@@ -33,8 +37,10 @@ def mobilities(numbers: LoopNumbers) -> Array:
 
 
 def _of_coupling(numbers: LoopNumbers, one: WrittenCoupling, masses: _Masses) -> float:
-    """C^T D^-1 C hinge by hinge, with D of the body that it holds alone; of a hinge that closes a
-    loop as of its rows."""
+    """Mobility C^T D^-1 C of a coupling, summed over its hinges.
+
+    D is that of the hinge's single body; a hinge that closes a loop counts as its rows do.
+    """
     found, closures = 0.0, {closure.frame: closure for closure in numbers.records.closures}
     for place in one.columns:
         slopes = numbers.slopes_of(one, place)
@@ -60,12 +66,12 @@ def _of_hinge(engine: Engine, place: int, slopes: Array, masses: _Masses) -> flo
 
 
 def _inverse(matrix: Array) -> Array:
-    """What has no inertia does not move."""
+    """Pseudo-inverse: directions without inertia do not move."""
     return np.asarray(np.linalg.pinv(matrix, rcond=1e-12, hermitian=True), dtype=np.float64)
 
 
 class _Masses:
-    """Mass matrices of bodies alone, about their input ends, once for all alike, and inverses."""
+    """Mass matrices of single bodies about input ends, and inverses; equal bodies share them."""
 
     def __init__(self, engine: Engine) -> None:
         self.engine, self.which = engine, engine.packed.system.which

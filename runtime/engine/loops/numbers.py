@@ -1,4 +1,4 @@
-"""What the last correction of closed loops has left in the workspace."""
+"""Results of the last correction of closed loops in the workspace."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..engine import Engine
 
 
 class LoopNumbers:
-    """Numbers of rows, closures and couplings of one packed scene."""
+    """Access to the workspace of rows, closures and couplings of one packed scene."""
 
     def __init__(self, engine: Engine) -> None:
         records = engine.packed.written.loops
@@ -19,14 +19,14 @@ class LoopNumbers:
         self.count = records.count
 
     def closing(self, row: int) -> str:
-        """What a row belongs to, for a message."""
+        """Name of the element to which a row belongs, for messages."""
         for one in self.records.closures:
             if row in one.rows.values():
                 return self.engine.closing(one.frame)
         return f'coupling "{self.coupling_of(row)}"'
 
     def coupling_of(self, row: int) -> str:
-        """The coupling whose row it is; "" where it is none's."""
+        """Name of the coupling to which a row belongs, or ""."""
         found = (one.coupling.name for one in self.records.couplings if one.row == row)
         return next(found, "")
 
@@ -35,7 +35,7 @@ class LoopNumbers:
         return self._of_rows("INVERSE")
 
     def pivots(self) -> Array:
-        """The pivots of the rows in the last correction."""
+        """Pivots of the rows in the last correction."""
         return self._of_rows("PIVOT")
 
     def _of_rows(self, name: str) -> Array:
@@ -44,18 +44,21 @@ class LoopNumbers:
         return self.engine.workspace_array()[first : first + stride * self.count : stride].copy()
 
     def values(self) -> Array:
-        """The values of couplings in the last correction of gaps."""
+        """Values of the couplings in the last correction of gaps."""
         first = self.records.place + int(self.engine.lib.MSTMM_COUPLING_GAP)
         places = [first + one.numbers for one in self.records.couplings]
         return self.engine.workspace_array()[places]
 
     def slopes_of(self, one: WrittenCoupling, place: int) -> Array:
-        """-C of a coupling (nu,) on the speeds of one of its hinges, after a correction."""
+        """Derivatives -C (nu,) of a coupling on the speeds of one of its hinges.
+
+        Valid after a correction.
+        """
         at = self.records.place + one.columns[place]
         return self.engine.workspace_array()[at : at + self.engine.packed.system.body(place).nu]
 
     def numbers_of(self, one: WrittenClosure, name: str) -> Array:
-        """Numbers of a closure after a correction: W, J_A or J_B, 6 rows of 6."""
+        """Matrix (6, 6) of a closure after a correction: W, J_A or J_B."""
         at = self.records.place + one.numbers
         at += int(getattr(self.engine.lib, f"MSTMM_CLOSURE_{name}"))
         return self.engine.workspace_array()[at : at + 36].reshape(6, 6).copy()

@@ -1,8 +1,8 @@
-"""Loops of pins and prismatic hinges whose axes are parallel but for a small angle.
+"""Loops of pin and prismatic hinges whose axes are parallel except for a small angle.
 
-Such a loop moves in a plane or not at all, so that the angle is an oversight, whatever it does:
-lock, leave no freedom, or not close.  Between two pins that follow each other around a loop nothing
-turns, so that the angles between their axes are those of the scene in every pose.
+Such a loop moves in a plane or not at all, so the angle is a mistake whatever its effect: the loop
+locks, has no degree of freedom, or does not close.  Between two successive pins of a loop nothing
+rotates, so that the angles between their axes are those of the scene in every pose.
 """
 
 from __future__ import annotations
@@ -21,22 +21,25 @@ from mstmm.scene.tables.all import SceneTables
 from ...pack.loops.variants import length_of
 from ...pack.packed import Packed
 
-#: The largest angle (rad) that is small, and the least that may let rows count which repeat others
-#: where axes are parallel.
+#: Largest angle (rad) that counts as small, and the smallest one that may make rows independent
+#: that are redundant with parallel axes.
 _SMALL, COUNTING = 0.1, 1e-4
-#: Gaps (m, rad) that an angle leaves, in parts of it, for lengths of 1 m; and angles that are
+#: Ratio of a gap (m, rad) to the angle that causes it, for lengths of 1 m; angles that are
 #: rounding, rad.
 _LEAVES, _ROUNDING = 4.0, 1e-9
-#: So many hinges move a loop in a plane.
+#: Number of hinges of a loop that moves in a plane.
 _MOVING = 4
-#: Angles at both neighbours of a hinge that is off, in parts of the larger, and all others.
+#: A hinge is off alone if the smaller angle to its neighbours exceeds the first fraction of the
+#: larger one, and all other angles are below the second.
 _BOTH, _OTHERS = 0.5, 0.1
 
 
 @dataclass(frozen=True)
 class _Skew:
-    """`angle` (rad) by which the axes of two hinges on one body are off: from parallel, or a
-    prismatic one from the plane across the pins beside it."""
+    """Angle (rad) between two hinge axes on one body that should be parallel.
+
+    For a prismatic hinge: the angle from the plane perpendicular to the adjacent pins.
+    """
 
     angle: float
     hinges: tuple[Hinge, ...]
@@ -44,13 +47,15 @@ class _Skew:
 
 
 def skewed_by_gap(packed: Packed, gap: float) -> str:
-    """As `skewed`, by angles that may leave a gap (m, rad)."""
+    """Find skewed axes as `skewed` does, with angles that may cause a gap (m, rad)."""
     return skewed(packed, gap / (_LEAVES * max(1.0, length_of(packed.system))))
 
 
 def skewed(packed: Packed, least: float) -> str:
-    """Which axis of a closed loop is off from parallel by `least` to 0.1 rad, and what to do, as
-    words that end a message; empty where none is."""
+    """End of a message that names an axis of a closed loop that is nearly parallel, with a remedy.
+
+    Its angle is from `least` to 0.1 rad; empty if there is no such axis.
+    """
     scene, worst = packed.described.skeleton, list[_Skew]()
     plan = build(scene).plan
     for cut in plan.cut if plan is not None else ():
@@ -66,8 +71,11 @@ def _largest(skews: list[_Skew]) -> float:
 
 
 def _skews(scene: SceneTables, loop: list[Hinge]) -> list[_Skew]:
-    """Of pins that follow each other around a loop, and of what slides where all pins are parallel;
-    empty where other hinges are in it, less than two pins, or too few to move it in a plane."""
+    """Angles between successive pins of a loop, or of its prismatic hinges if these are larger.
+
+    Empty if the loop contains other hinges, fewer than two pins, or too few hinges for a planar
+    motion.
+    """
     moving = sum(not hinge.is_weld for hinge in loop)
     if moving < _MOVING or not all(_is_axial(hinge) for hinge in loop):
         return []
@@ -91,8 +99,10 @@ def _is_axial(hinge: Hinge) -> bool:
 def _between_pins(
     scene: SceneTables, loop: list[Hinge]
 ) -> Iterator[tuple[tuple[Hinge, Hinge], tuple[Array, Array], str, list[tuple[Hinge, Array]]]]:
-    """Two pins that follow each other around a loop, their axes where nothing turns, the body on
-    which the first stands, and with their axes the prismatic hinges between them."""
+    """Successive pins of a loop, their axes in one frame, and prismatic hinges between them.
+
+    Also the body outboard of the first pin, and the axes of the prismatic hinges.
+    """
     pins = [k for k, hinge in enumerate(loop) if hinge.facts and hinge.facts.turns]
     body = split(loop[0].inboard)[0]
     for hinge in loop[: pins[0]] if pins else ():
@@ -113,8 +123,7 @@ def _between_pins(
 
 
 def _sides(scene: SceneTables, hinge: Hinge, body: str) -> tuple[Array, Array, str]:
-    """Axes of a hinge at rest in those of `body`, which it joins, and in those of the other one;
-    that other one."""
+    """Axes of a hinge at rest in the axes of `body` and of the other body, and that body's name."""
     inboard = _end(scene, hinge.inboard) @ np.array(hinge.rotation)
     outboard, other = _end(scene, hinge.outboard), split(hinge.inboard)[0]
     if body == other:
@@ -129,7 +138,7 @@ def _end(scene: SceneTables, reference: str) -> Array:
 
 
 def _apart(one: Array, other: Array) -> float:
-    """The angle (rad) between two lines."""
+    """Angle (rad) between two lines."""
     return math.atan2(float(np.linalg.norm(np.cross(one, other))), abs(float(one @ other)))
 
 
@@ -143,8 +152,8 @@ def _words(skews: list[_Skew]) -> str:
     if len(worst.hinges) == 1:
         return (
             f'the axis of hinge "{worst.hinges[0].name}" is {off} out of the plane in which the '
-            "pins of its loop turn; lay it in that plane by an exact axis and orientation, or take "
-            "a cylindrical hinge in place of one of the pins"
+            "pins of its loop rotate; put it in that plane by an exact axis and orientation, or "
+            "replace one of the pins by a cylindrical hinge"
         )
     shared = [one for one in worst.hinges if one in ranked[1].hinges]
     alone = all(skew.angle < _OTHERS * worst.angle for skew in others)
@@ -153,13 +162,13 @@ def _words(skews: list[_Skew]) -> str:
         beside = [one.name for skew in ranked[:2] for one in skew.hinges if one is not hinge]
         return (
             f'the axis of hinge "{hinge.name}" is {off} from parallel to those of "{beside[0]}" '
-            f'and "{beside[1]}" beside it in the loop; make it parallel by an exact axis and '
-            "orientation, or take a ball hinge in its place"
+            f'and "{beside[1]}" next to it in the loop; make it parallel by an exact axis and '
+            "orientation, or replace it by a ball hinge"
         )
     one, other = worst.hinges
     where = "ground" if worst.body == "ground" else f'body "{worst.body}"'
     return (
         f'the axes of hinges "{one.name}" and "{other.name}" on {where} are {off} from parallel; '
-        "make them parallel by an exact axis and orientation, or take a ball hinge in place of "
-        "the one that is off"
+        "make them parallel by an exact axis and orientation, or replace one of them by a ball "
+        "hinge"
     )

@@ -1,10 +1,10 @@
-"""Which rows of closed loops say what others say already.
+"""Rank of constraint rows: redundant rows of closed loops, and singular configurations.
 
-Decided once, at a state in which the loops are closed, and in a metric of the hinges: with true
-masses a heavy coupler makes honest rows look like rounding, and with any masses of bodies what
-hangs on the hinges of a loop does, as the rest of a long mast.  The level of a row that repeats
-others but for a misfit is the square of the misfit.  A row that repeats others here but not in
-closed states nearby is no repetition but a singular pose.
+The rank is determined once, at a state in which the loops are closed, and in a metric of the
+hinges.  With true masses a heavy coupler makes independent rows look like rounding.  With any
+masses of bodies, parts attached to the hinges of a loop, as the rest of a long mast, do so too.
+The pivot of a row that is redundant up to a misfit is proportional to the square of the misfit.
+A row that is redundant here but not in closed states nearby indicates a singular pose.
 """
 
 from __future__ import annotations
@@ -24,32 +24,39 @@ from ..engine import Engine
 from .calls import REPEATED, LoopCalls
 from .stress import Open, not_unique
 
-#: Closed states nearby: how many, how far (rad, m), and how much farther the own coordinates of cut
-#: hinges may go, which only follow.
+#: Closed states nearby: number, distance (rad, m), and the factor by which the coordinates of cut
+#: hinges, which only follow, may exceed it.
 _NEIGHBOURS, _AWAY, _FOLLOWING = 3, 3e-2, 10.0
-#: Over this way (rad, m) what repeats others but for a misfit leaves no gap that locks.
+#: Over this distance (rad, m) a row that is redundant up to a misfit leaves no gap that locks.
 _FAR = 0.3
-#: A closed state that is nearer than this part of the way asked for is the pose itself.
+#: A closed state nearer than this fraction of the requested distance is the pose itself.
 _BACK = 0.1
-#: Around a singular pose so many are looked for at most.  One counts from which speeds without
-#: slips lead on, over this way (rad, m) and but for this part of it, and that is known to so much.
+#: Around a singular pose: maximum number of trials; distance (rad, m) over which, and relative
+#: deviation up to which, speeds without velocity errors must lead on from a state; its accuracy
+#: (rad, m).
 _TRIES, _ON, _ASIDE, _SETTLED = 16, 3e-3, 0.2, 1e-8
-#: A row that repeats others here does so there too where its pivot is not this many times larger,
-#: or not larger than rounding, in parts of the mobility.
+#: A row that is redundant here is redundant there too if its pivot is at most so many times larger,
+#: or at most rounding, relative to the mobility.
 _RAISED, _ROUNDING = 1e2, 1e-12
-#: Most steps to such a state, the gap (m, rad) that is none, the compliance of rows at first, and
-#: by the gap that is left.
+#: Maximum number of steps to such a state, gap (m, rad) that counts as closed, initial compliance
+#: of rows, and compliance relative to the remaining gap.
 _STEPS, _CLOSED, _GIVE, _SHARE = 200, 1e-9, 1e-6, 1e-2
 
 
 @dataclass(frozen=True)
 class Rank:
-    """Rows that repeat others here, those of them that do so in closed states nearby too, and those
-    of these that go: the others take the place of another row of their hinge where that one says
-    less, at a pose farther away.  `states` are those that were looked at, this one first,
-    `open` the loads that rows which always repeat others leave open, and
-    `nearby` is how few repeat others in any of the states.  `stuck`: motions that close the loops
-    to first order lead back to the pose from wherever they go, as of links stretched out in line.
+    """Redundant rows of closed loops at a state.
+
+    Attributes:
+        here: rows that are redundant at the state.
+        always: those of them that are redundant in closed states nearby too.
+        going: those of these that are removed; the others may replace another row of their hinge
+            that becomes redundant in a pose farther away.
+        states: the examined states (nq,), the given one first.
+        open: the loads that redundant rows leave undetermined.
+        nearby: smallest number of redundant rows in any of the states.
+        stuck: motions that close the loops to first order all lead back to the pose, as with links
+            stretched out in line.
     """
 
     here: frozenset[int]
@@ -62,7 +69,7 @@ class Rank:
 
 
 def rank_at(engine: Engine, q: Array) -> Rank:
-    """Rows that repeat others at a closed state q (nq,) and around it."""
+    """Find the redundant rows at a closed state q (nq,) and around it."""
     calls = judging(engine, q)
     level = REPEATED * calls.mobility
     here = _repeating(calls, q, level)
@@ -83,9 +90,11 @@ def rank_at(engine: Engine, q: Array) -> Rank:
 def _around(
     calls: LoopCalls, q: Array, here: frozenset[int], level: Array
 ) -> tuple[list[Array], bool]:
-    """Closed states nearby, and whether all ways to such states lead back; around a singular pose
-    those alone through which a motion goes, where there are some: others are closed by rounding,
-    or where motions branch."""
+    """Closed states nearby, and whether all motions to such states lead back.
+
+    Around a singular pose only states are used, if any, from which a motion leads on: others are
+    closed by rounding, or motions branch there.
+    """
     draw, ways, states = np.random.default_rng(0), list[float](), list[Array]()
 
     def found(settled: float) -> Array | None:
@@ -110,7 +119,7 @@ def _around(
 
 
 def _way(calls: LoopCalls, change: Array) -> float:
-    """The largest change of q (nq,), own coordinates of cut hinges left out, which follow."""
+    """Largest change of q (nq,), without the coordinates of cut hinges, which follow."""
     own, packed = change.copy(), calls.engine.packed
     for cut in packed.expanded.cuts:
         if cut.constraint is None:
@@ -119,8 +128,10 @@ def _way(calls: LoopCalls, change: Array) -> float:
 
 
 def judging(engine: Engine, q: Array) -> LoopCalls:
-    """Of the scene in the metric of its hinges, with the mobilities of bodies all alike; of all
-    hinges, those too that weld bodies packed as one."""
+    """Loop calls of a scene in the metric of its hinges, with mobilities of equal bodies.
+
+    Bodies that were merged for simplification are separate in it, with their welds.
+    """
     packed = unmerged(engine.packed)
     mobility = LoopCalls(Engine(packed_system(geometric(packed.system), packed)), q).mobility
     slides = {
@@ -131,10 +142,10 @@ def judging(engine: Engine, q: Array) -> LoopCalls:
 
 
 def _stand_ins(calls: LoopCalls, q: Array, left_out: frozenset[int]) -> frozenset[int]:
-    """Rows that say something once another row of their hinge is left out in their place: they
-    stay, and which of them count is chosen along the way.
+    """Redundant rows that become independent if another row of their hinge is omitted.
 
-    Tried for all hinges at a time: what each leaves out first for what it keeps first, and so on.
+    They are kept, and the rows to use are chosen during the motion.  All hinges are tried at the
+    same time: the first omitted row of each instead of its first kept row, and so on.
     """
     hinges = [set(one.rows.values()) for one in calls.records.closures]
     sides = [(sorted(rows & left_out), sorted(rows - left_out)) for rows in hinges]
@@ -150,7 +161,7 @@ def _stand_ins(calls: LoopCalls, q: Array, left_out: frozenset[int]) -> frozense
 
 
 def _repeating(calls: LoopCalls, q: Array, level: Array) -> frozenset[int]:
-    """Rows whose pivots are below their level, those before them taken as met."""
+    """Rows whose pivots are below their level if the preceding rows are satisfied."""
     for row, floor in enumerate(level.tolist()):
         calls.records.judge(row, floor)
     calls.correction(calls.slip, q, np.zeros(calls.engine.nu))
@@ -158,8 +169,10 @@ def _repeating(calls: LoopCalls, q: Array, level: Array) -> frozenset[int]:
 
 
 def _neighbour(calls: LoopCalls, q: Array, speeds: Array, settled: float) -> Array | None:
-    """A closed state on the way that speeds without any slips lead, known to `settled` (rad, m);
-    None where they lead nowhere."""
+    """Closed state in the direction of speeds without velocity errors, to `settled` (rad, m).
+
+    None if these speeds lead to none.
+    """
     try:
         ahead = _ahead(calls, q, speeds, _AWAY, np.zeros(calls.count))
         return None if ahead is None else _closed(calls, ahead, settled)
@@ -168,8 +181,11 @@ def _neighbour(calls: LoopCalls, q: Array, speeds: Array, settled: float) -> Arr
 
 
 def _goes_on(calls: LoopCalls, q: Array, left: frozenset[int], apart: float) -> bool:
-    """Whether a motion without the rows that are `left` out leads away, over a long way and to both
-    sides, and leaves no gap of these that locks (m, rad): they repeat others but for a misfit."""
+    """True if the rows `left` are redundant up to a misfit.
+
+    A motion without them must lead far away in both directions, and leave gaps of these rows of at
+    most `apart` (m, rad).
+    """
     level = np.zeros(calls.count)
     level[list(left)] = np.inf
     speeds = np.random.default_rng(0).uniform(-1.0, 1.0, calls.engine.nu)
@@ -188,8 +204,10 @@ def _goes_on(calls: LoopCalls, q: Array, left: frozenset[int], apart: float) -> 
 
 
 def _leads_on(calls: LoopCalls, q: Array, speeds: Array, level: Array) -> bool:
-    """Whether speeds without slips, but for rows of small pivots, lead to closed states, as they do
-    where motions do not branch."""
+    """True if speeds without velocity errors lead to closed states.
+
+    Rows with pivots below `level` are ignored.  False where motions branch.
+    """
     try:
         ahead = _ahead(calls, q, speeds, _ON, level)
         near = None if ahead is None else _closed(calls, ahead, _SETTLED)
@@ -201,8 +219,10 @@ def _leads_on(calls: LoopCalls, q: Array, speeds: Array, level: Array) -> bool:
 
 
 def _ahead(calls: LoopCalls, q: Array, speeds: Array, way: float, level: Array) -> Array | None:
-    """q (nq,) moved by so much (rad, m) along speeds without slips in the rows whose pivots are
-    above their level; None where there are none."""
+    """Move q (nq,) by `way` (rad, m) along speeds projected on the rows with pivots above `level`.
+
+    None if no such speeds remain.
+    """
     for row, floor in enumerate(level.tolist()):
         calls.records.judge(row, floor)
     tangent = speeds + calls.correction(calls.slip, q, speeds)[0]
@@ -217,9 +237,9 @@ def _ahead(calls: LoopCalls, q: Array, speeds: Array, way: float, level: Array) 
 def _closed(
     calls: LoopCalls, near: Array, settled: float, left: Collection[int] = ()
 ) -> Array | None:
-    """The closed state (nq,) near another one, known to `settled` (rad, m); None: there is none.
+    """Closed state (nq,) near a given one, to `settled` (rad, m), or None.
 
-    All rows but those that are `left` out are met, those that repeat others here as well.
+    It satisfies all rows except those in `left`, redundant rows too.
     """
     still, give = np.zeros(calls.engine.nu), _GIVE
     for row in range(calls.count):

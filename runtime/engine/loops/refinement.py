@@ -1,7 +1,7 @@
-"""How often heavy bodies behind light ones make accelerations be refined.
+"""Number of refinements that accelerations need with heavy bodies outboard of light ones.
 
-What inverse dynamics of an answer leaves over is answered too, and added: again and again, as long
-as that changes anything.  What the last time changes is what is wrong before it.
+A refinement solves for the residual of inverse dynamics and adds the correction; it is repeated as
+long as results change.  The last change estimates the error before it.
 """
 
 from __future__ import annotations
@@ -15,22 +15,21 @@ from ...pack.start import start_values
 from ..engine import Engine
 from .parallel import COUNTING, skewed
 
-#: Change of the accelerations, in parts of the largest, that is rounding, and from which on
-#: they are not to be believed.
+#: Relative change of accelerations that is rounding, and one above which they are rejected.
 _ROUNDING, _WRONG = 1e-12, 1e-6
-#: Part of what weight, speeds or efforts make of them, below which they are balanced.
+#: Accelerations below this fraction of those due to weight, speeds or efforts count as balanced.
 _BALANCED = 1e-3
-#: The ratio of masses from which on it may be what loses digits.
+#: Mass ratio above which the masses may be the cause of lost digits.
 _UNLIKE = 100.0
-#: Refinements at most.
+#: Maximum number of refinements.
 _MOST = 4
 
 
 def refinements(engine: Engine, q: Array, u: Array, mobility: int) -> int:
-    """As many as accelerations at (q, u), and those of drawn efforts, take until they stay as they
-    are.
+    """Number of refinements until accelerations at (q, u) no longer change.
 
-    Raises NumericalFailure where they do not.
+    Accelerations due to random efforts are tested too.  Raises NumericalFailure if they do not
+    converge.
     """
     model = engine.packed.model
     efforts = np.random.default_rng(0).uniform(-1.0, 1.0, (2, engine.nu))
@@ -44,7 +43,7 @@ def refinements(engine: Engine, q: Array, u: Array, mobility: int) -> int:
 
     weight = float(np.linalg.norm(engine.packed.described.gravity))
     usual = weight + float(np.abs(u).max(initial=0.0)) ** 2
-    usual = usual if mobility > 0 else max(usual, 1.0)  # what only drives move may stand still
+    usual = usual if mobility > 0 else max(usual, 1.0)  # mechanisms moved by drives may be at rest
     try:
         before = answers(0)
         for times in range(1, _MOST + 1):
@@ -62,16 +61,16 @@ def refinements(engine: Engine, q: Array, u: Array, mobility: int) -> int:
     wrong = float(changed.max())
     if wrong > _WRONG:
         raise NumericalFailure(
-            f"accelerations{' of the closed loops' * engine.packed.system.closes} are wrong by "
-            f"{wrong:.1g} of their size, and refining them does not help: {unlike_masses(engine)}"
+            f"accelerations{' of the closed loops' * engine.packed.system.closes} have a relative "
+            f"error of {wrong:.1g} that refinement does not reduce: {unlike_masses(engine)}"
         )
     return _MOST
 
 
 def of_tree(engine: Engine) -> int:
-    """The same of a tree at its start, where they are asked for: once at least.
+    """Number of refinements of a tree at its start with sweep="refined": at least one.
 
-    Raises SceneError where they do not stay as they are.
+    Raises SceneError if accelerations do not converge.
     """
     packed = engine.packed
     q, u = start_values(packed.scene, packed.layout, packed.flexible)
@@ -82,18 +81,20 @@ def of_tree(engine: Engine) -> int:
 
 
 def unlike_masses(engine: Engine) -> str:
-    """The heaviest body and the lightest that has a mass, and what to do; where they are alike,
-    what else loses the digits of closed loops."""
+    """End of a message that names the heaviest and the lightest body, with a remedy.
+
+    If their masses are similar, another cause of lost digits in closed loops is named.
+    """
     masses = {body.name: body.mass for body in engine.packed.described.body if body.mass > 0}
     if not masses:
-        return "bring the masses of bodies nearer together"
+        return "make the masses of bodies more similar"
     heavy, light = (choose(masses, key=masses.__getitem__) for choose in (max, min))
     if masses[heavy] < _UNLIKE * masses[light] and engine.packed.system.closes:
         return skewed(engine.packed, COUNTING) or (
-            "what closes them nearly repeats what others do; make axes parallel and points meet, "
-            "or use a ball or cylindrical hinge"
+            "their constraints are nearly redundant; make axes parallel and points coincide, or "
+            "use a ball or cylindrical hinge"
         )
     return (
-        f'body "{heavy}" ({masses[heavy]:.3g} kg) hangs behind light ones such as "{light}" '
-        f"({masses[light]:.3g} kg); bring their masses nearer together"
+        f'heavy body "{heavy}" ({masses[heavy]:.3g} kg) outboard of light ones such as "{light}" '
+        f"({masses[light]:.3g} kg); make their masses more similar"
     )

@@ -1,7 +1,7 @@
-"""Assembly of mechanisms of many bodies, beside the inertia of rotors where bodies' leads nowhere.
+"""Assembly of mechanisms of many bodies with the inertia of rotors if that of bodies fails.
 
-Steps of least change beside the inertia of bodies turn the last links of a long chain most, so that
-it crumples; with the same rotors on all hinges it bends as a whole.
+Steps of least change weighted by the inertia of bodies rotate the last links of a long chain most,
+so that it folds up; with equal rotors on all hinges it bends as a whole.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from ...pack.pack import packed_system
 from ..engine import Engine
 from .assembly import Assembly
 
-#: Fewer speeds than these do not crumple.
+#: Mechanisms with fewer speeds do not fold up.
 _MANY = 20
-#: Motions (rad, m) away from where all is in line.
+#: Random change (rad, m) of a pose with all links in line.
 _ASIDE = 1e-3
 
 
 class RotorAssembly(Assembly):
-    """An `Assembly` that tries again beside rotors."""
+    """Assembly that tries again with the inertia of rotors."""
 
     def __init__(
         self, engine: Engine, q: Array, hinges: Collection[str] = (),
@@ -50,12 +50,12 @@ class RotorAssembly(Assembly):
             return super().positions(near, *more, **others)
 
     def _shaken(self, q: Array) -> Array:
-        """q a little aside: where all is in line nothing tells which way to bend."""
+        """Change q slightly: with all links in line the direction of bending is undetermined."""
         aside = _ASIDE * np.random.default_rng(0).uniform(-1.0, 1.0, self._engine.nu)
         return self.calls.moved(q, aside * self.free)
 
     def _with_rotors(self) -> Engine:
-        """Each as heavy as all rigid bodies, at the usual distance between hinges."""
+        """Engine with a rotor on each hinge: total mass times mean hinge distance squared."""
         packed = self._engine.packed
         system, known = packed.system, packed.written.loops
         masses = system.rows(lambda body: body.body_p[0] if len(body.body_p) else 0.0)

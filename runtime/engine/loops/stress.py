@@ -1,9 +1,9 @@
 """Loads that rigid bodies do not determine: self-stress states of closed loops.
 
-Multipliers z of rows that repeat others may grow together without moving anything: L z = 0.  Rows
-that yield a little, (L + give f) x = give f y again and again from a random y, leave the share of
-these alone, at the cost of a sweep each time.  A component of a hinge's load is unique where none
-of them touches it.
+Multipliers z of redundant rows may grow together without any motion: L z = 0.  Repeated solutions
+with compliant rows, (L + give f) x = give f y from a random y, converge to the part of y in this
+null space, at the cost of a sweep each.  A component of a hinge's load is unique if no self-stress
+state contains it.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from .calls import LoopCalls
 
 #: Components of a load along and about the outboard axes of a hinge.
 _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
-#: Yielding in parts of the mobility, repetitions, and states drawn.
+#: Compliance relative to the mobility, number of repetitions, and number of random states.
 _GIVE, _TIMES, _DRAWN = 1e-7, 4, 2
-#: Parts of the largest component that are rounding, and so many times the gaps (m, rad) that rows
-#: which repeat others leave: by these the states are off.
+#: Components that are rounding: relative to the largest one, and as a multiple of the gaps (m, rad)
+#: that redundant rows leave, which falsify the states.
 _ROUNDING, _OFF = 1e-5, 10.0
 
 _UPPER = np.triu_indices(6)
@@ -30,16 +30,17 @@ _UPPER = np.triu_indices(6)
 
 @dataclass(frozen=True)
 class Open:
-    """What is not unique: components of the loads of hinges, by their names, and rows of closures,
-    by their numbers."""
+    """Indeterminate loads: components of hinge loads by hinge name, and rows by index."""
 
     loads: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     rows: frozenset[int] = frozenset()
 
 
 def not_unique(calls: LoopCalls, q: Array, silent: Collection[int] = ()) -> Open:
-    """At the closed q (nq,), rows that are `silent` there left out.  `calls` are those of a
-    geometry in which all rows are met."""
+    """Find the indeterminate loads at the closed q (nq,) without the rows in `silent`.
+
+    `calls` are those of a geometry in which all rows are satisfied.
+    """
     gaps = np.abs(calls.correction(calls.gap, q, np.zeros(calls.engine.nu))[1])
     rounding = max(_ROUNDING, _OFF * float(gaps.max(initial=0.0)))
     drawn = [_touched(calls, q, silent, seed, rounding) for seed in range(_DRAWN)]
@@ -54,7 +55,7 @@ def not_unique(calls: LoopCalls, q: Array, silent: Collection[int] = ()) -> Open
 
 
 def outboard_axes(calls: LoopCalls, place: int) -> Array:
-    """(3, 3) outboard axes of the hinge at a place of the tree, in internal ones of its body."""
+    """Outboard axes (3, 3) of the hinge at a place of the tree, in internal axes of its body."""
     packed = calls.engine.packed
     hinge = packed.scene.hinges[packed.topology.at(place)[1]]
     return np.reshape(packed.end(hinge.outboard)[1], (3, 3))
@@ -63,8 +64,7 @@ def outboard_axes(calls: LoopCalls, place: int) -> Array:
 def _touched(
     calls: LoopCalls, q: Array, silent: Collection[int], seed: int, rounding: float
 ) -> tuple[Array, Array]:
-    """Whether a drawn self-stress state loads the component of the inboard hinge (bodies, 6), and
-    the row (rows,)."""
+    """Masks of components (bodies, 6) and rows (rows,) that a random self-stress state loads."""
     for row in range(calls.count):
         calls.records.judge(row, np.inf if row in silent else 0.0)
     met = np.array(
@@ -80,7 +80,7 @@ def _touched(
 
 
 def _loads(calls: LoopCalls) -> Array:
-    """(bodies, 6) sizes of the components of every inboard hinge's load, in outboard axes."""
+    """Absolute load components (bodies, 6) of every inboard hinge, in outboard axes."""
     packed = calls.engine.packed
     found = np.zeros((packed.system.count, 6))
     for place in range(len(found)):
@@ -92,7 +92,7 @@ def _loads(calls: LoopCalls) -> Array:
 
 
 def _at_frame(calls: LoopCalls, place: int) -> Array:
-    """(6,) f = S delta + e that the last call left for a body, about its internal origin."""
+    """Load f = S delta + e (6,) of a body from the last call, about its internal origin."""
     lib, first = calls.engine.lib, int(calls.engine.packed.written.blocks[place])
     numbers = calls.engine.workspace_array()[first:]
     S = np.zeros((6, 6))

@@ -1,1 +1,1 @@
-"""Accelerations, efforts and mass matrices of states that are given: one, or many."""
+"""Evaluation at given states: accelerations, efforts, mass matrices, points; one or many."""

@@ -1,4 +1,4 @@
-"""One state at a time, as it is asked for a million times: what stays the same is made once."""
+"""Fast calls for single states: everything that does not change is prepared once."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from ..code import Fusing
 from ..engine import Engine
 from ..live import LiveInputs
 
-#: Scenes of more bodies or speeds take so long that other threads are let run meanwhile, each with
-#: a record of its own; and their mass matrix so long that nothing is kept for it.
+#: Calls on scenes with more bodies or speeds release Python's lock, with one record per thread, and
+#: have no prepared call of the mass matrix.
 MOST = 100
 
 #: Code of the scene: that of accelerations, that of inverse dynamics and the mass matrix.
 Libraries = tuple[FusedLibrary | None, FusedLibrary | None]
-#: What a record answers.
+#: Calls of a record.
 _CALLS = ("accelerations", "efforts", "mass", "energy", "momentum", "moved")
 
 
 def small(engine: Engine) -> bool:
-    """Whether a call takes so short a time that no other thread has to run meanwhile."""
+    """True if calls are so short that Python's lock need not be released."""
     return engine.packed.topology.count <= MOST and engine.nu <= MOST
 
 
 class Alone:
-    """Calls on states that are already rows of doubles (nq,), (nu,).
+    """Calls on single states that are rows of doubles (nq,), (nu,).
 
-    They give None where a state is none of these, or where something fails: the general way then
-    serves it, or says what is wrong.  Safe to call from several threads.
+    They return None for other arguments and for any failure: the caller then uses the general call,
+    which evaluates the state or reports what is wrong.  Safe to call from several threads.
 
     Attributes:
         accelerations: (t, q, u, efforts or None) -> udot (nu,).
-        efforts: (t, q, u, udot) -> those beyond the efforts of laws (nu,).
-        mass: (q) -> (nu, nu), where no body is flexible.
+        efforts: (t, q, u, udot) -> efforts (nu,) in addition to those of laws.
+        mass: (q) -> (nu, nu), if no body is flexible.
         energy: (t, q, u) -> (); momentum: (t, q, u) -> (6,).
-        moved: (dt, q, u) -> (nq,), where no body is flexible.
-        library, inverse: code of the scene behind them; `renew` where the fusion has other.
+        moved: (dt, q, u) -> (nq,), if no body is flexible.
+        library, inverse: code of the scene in use; call `renew` if the fusion has other code.
     """
 
     accelerations: Call
@@ -58,7 +58,7 @@ class Alone:
         self.renew()
 
     def renew(self) -> None:
-        """Go by the code that there is of the scene."""
+        """Use the code that exists for the scene now."""
         by = self._fusion.library, self._fusion.inverse
         record = _Record(self._engine, self._fusion, by) if small(self._engine) else None
         for name in _CALLS:
@@ -66,7 +66,7 @@ class Alone:
         self.library, self.inverse = by
 
     def seek(self) -> None:
-        """Look for code of inverse dynamics at the first call, and at those numbers that double."""
+        """Look for code of inverse dynamics at call numbers 1, 2, 4, 8, ..."""
         fusion = self._fusion
         if fusion.inverse is None:
             self._asked += 1
@@ -76,7 +76,7 @@ class Alone:
             self.renew()
 
     def _of_thread(self, name: str) -> Call:
-        """The call of the record that each thread has for itself."""
+        """Call that uses the record of the current thread."""
 
         def call(*given: Any) -> Any:
             return getattr(self._made(), name)(*given)
@@ -84,7 +84,7 @@ class Alone:
         return call
 
     def _made(self) -> _Record:
-        """This thread's record, made again when there is more code of the scene."""
+        """Record of this thread, created again when there is new code of the scene."""
         by = self.library, self.inverse
         made: _Record | None = getattr(self._local, "made", None)
         if made is None or made.by != by:
@@ -93,7 +93,7 @@ class Alone:
 
 
 class _Record:
-    """The calls of `Alone`, with all that they work on; `by`: the code of the scene behind them."""
+    """Prepared calls of `Alone` with their memory; `by` is the code of the scene that they use."""
 
     def __init__(
         self, engine: Engine, fusion: Fusing, by: Libraries, released: bool = False
@@ -110,7 +110,7 @@ class _Record:
         record.p, record.memory, record.none, record.qdot, record.work = self._pointed
         if released:
             record.workspace = engine.workspace()
-        else:  # that of a thread is in use while others call
+        else:  # the thread's own workspace is used by other calls
             self._point("workspace", "real[]", np.zeros(engine.packed.workspace))
         record.fused, record.inverse = (
             ffi.NULL if one is None else one.descriptor for one in self.by

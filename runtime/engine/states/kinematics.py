@@ -1,7 +1,7 @@
-"""Points of a scene at given states: where they are, how they move, and how speeds move them.
+"""Points of a scene at given states: positions, motion, and Jacobians.
 
-Coordinates and speeds are taken as they are given, driven ones as well; laws, loads and gravity
-are left out, so that no motion has to be determined.
+Given coordinates and speeds are used unchanged, driven ones too; laws, loads and gravity are
+omitted, so that no acceleration has to be determined.
 """
 
 from __future__ import annotations
@@ -31,26 +31,26 @@ _MOVES = [*range(3, 6), *range(9, 12)]
 _GAINS = [*range(6, 9), *range(12, 15)]
 _TURNS = COLUMNS["angular_velocity"]
 
-#: One body or end, or several.
+#: Name of one body or end, or several names.
 Names = str | Sequence[str]
 
 
-#: What a call of `Kinematics.call` reads, q or q and u, and what it answers of a point.
+#: Kind of a call of `Kinematics.call` -> whether it needs u besides q, and its result for a point.
 _SHAPES: dict[str, tuple[bool, tuple[int, ...]]] = {
     "places": (False, (3,)), "poses": (False, (4, 4)), "velocities": (True, (6,)),
     "jacobian": (False, (6,)), "jacobian_rate": (True, (6,)),
 }  # fmt: skip
 
-#: (by, row, column, value): increments turn by themselves, the rate of `row` by `column` being
-#: value times the speed `by`.
+#: Entries (by, row, column, value) of the rotation of increments: the rate of `row` due to `column`
+#: is value times the speed `by`.
 Brackets = list[tuple[int, int, int, float]]
 
 
 class Kinematics:
-    """Calls on one packed scene.  Safe to make from several threads.
+    """Kinematic calls on one packed scene.  Safe to call from several threads.
 
-    Rows of states are arrays (n, nq), (n, nu).  `brackets` are those of the increments, None where
-    they change with the state.  Code of the scene is looked for as bodies are asked for.
+    Rows of states are arrays (n, nq), (n, nu).  `brackets` returns those of the increments, None if
+    they depend on the state.  Code of the scene is looked for when bodies are requested.
     """
 
     def __init__(
@@ -62,18 +62,20 @@ class Kinematics:
         self._known = dict[Names, list[Probe]]()
         self._records = dict[Names, tuple[Any, int]]()
         self._calls = dict[tuple[str, Names], Call]()
-        #: How often bodies or ends were asked for without code of the scene.
+        #: Number of requests of bodies or ends without code of the scene.
         self._asked = dict[Names, int]()
         self._local = threading.local()
         self._numbers = int(engine.lib.MSTMM_PROBE_NUMBERS)
 
     def call(self, kind: str, of: Names) -> Call:
-        """The call on one state, q (nq,) or q and u (nu,), that answers "places", "poses",
-        "velocities", "jacobian" or "jacobian_rate" of bodies or ends."""
+        """Prepared call on one state, q (nq,) or q and u (nu,), for bodies or ends.
+
+        `kind` is "places", "poses", "velocities", "jacobian" or "jacobian_rate".
+        """
         key = tuple(of) if type(of) is list else of
         try:
             found = self._calls.get((kind, key))
-        except TypeError:  # no names: `texts_of` says what is wrong
+        except TypeError:  # no names: `texts_of` raises the error
             found = None
         if found is None:
             key = of if isinstance(of, str) else texts_of("of", of, "rod1.tip")
@@ -83,7 +85,7 @@ class Kinematics:
         return found
 
     def _sought(self, kind: str, key: Names) -> Call:
-        """The same, where code is looked for at the first call and at those numbers that double."""
+        """Prepared call after a search for code at call numbers 1, 2, 4, 8, ..."""
         asked = self._asked[key] = self._asked.get(key, 0) + 1
         found = self._calls.get((kind, key))
         if found is None or asked & (asked - 1) == 0:
@@ -92,7 +94,7 @@ class Kinematics:
             codes = [] if loops else [self._fusion.ready_points(body, asked) for body in bodies]
             there = [one for one in codes if one is not None]
             complete = not loops and len(there) == len(bodies)
-            if complete:  # what goes by loops so far is made anew
+            if complete:  # prepare the calls that used loops again
                 for other in _SHAPES:
                     self._calls.pop((other, key), None)
             if complete or loops:
@@ -101,8 +103,10 @@ class Kinematics:
         return found
 
     def each(self, kind: str, of: Names, general: Callable[..., Array], *states: Array) -> Array:
-        """(n, k, 6, nu): "jacobian" or "jacobian_rate" at rows of states, by `call`, and by
-        `general` (of, row, ...) where that leaves it to the general way."""
+        """Evaluate "jacobian" or "jacobian_rate" (n, k, 6, nu) at rows of states.
+
+        The prepared call is used, or `general(of, row, ...)` where it returns None.
+        """
         call, count = self.call(kind, of), self._probes(of)[1]
         found = np.empty((len(states[0]), count, 6, self._engine.nu))
         for place, given in zip(found, zip(*states, strict=True), strict=True):
@@ -133,11 +137,11 @@ class Kinematics:
 
     @cached_property
     def _room(self) -> Any:
-        """A workspace that all of these calls use, of which one at a time runs."""
+        """Workspace shared by all of these calls, of which one runs at a time."""
         return self._engine.pointer(np.zeros(self._engine.packed.workspace))
 
     def points(self, of: Names, q: Array, u: Array, udot: Array) -> Array:
-        """(n, k, 24): motion of k bodies or ends, see `Observation`."""
+        """Motion (n, k, 24) of k bodies or ends, see `Observation`."""
         probes, count = self._probes(of)
         found = np.empty((len(q), count, self._numbers))
         given = (self._engine.pointer(x) for x in (q, u, udot))
@@ -145,16 +149,16 @@ class Kinematics:
         return found
 
     def still(self, of: Names, q: Array) -> Array:
-        """`points` of n states at rest."""
+        """Result of `points` for n states at rest."""
         rest = np.zeros((len(q), self._engine.nu))
         return self.points(of, q, rest, rest)
 
     def moving(self, of: Names, q: Array, u: Array) -> Array:
-        """(n, k, 6): velocity and angular velocity, inertial axes."""
+        """Velocity and angular velocity (n, k, 6) in inertial axes."""
         return self.points(of, q, u, np.zeros(u.shape))[..., _MOVES]
 
     def jacobian(self, of: Names, q: Array) -> Array:
-        """(k, 6, nu) of one state: what each speed adds to `moving`."""
+        """Jacobian (k, 6, nu) of one state: derivative of `moving` with respect to speeds."""
         if self._bends:
             return self._by_units(of, q)
         probes, count = self._probes(of)
@@ -163,18 +167,18 @@ class Kinematics:
         return found
 
     def _by_units(self, of: Names, q: Array) -> Array:
-        """The same by one speed after the other, modes among them."""
+        """Jacobian (k, 6, nu) from unit speeds, rates of modes included."""
         nu = self._engine.nu
         many, units = np.tile(q, (nu, 1)), np.eye(nu)
         return np.moveaxis(self.points(of, many, units, np.zeros((nu, nu)))[..., _MOVES], 0, -1)
 
     def jacobian_rate(self, of: Names, q: Array, u: Array, turning: Array | None) -> Array:
-        """(k, 6, nu) of one state: the rate of `jacobian` along speeds u (nu,).
+        """Rate (k, 6, nu) of `jacobian` along speeds u (nu,), at one state.
 
-        The accelerations that speeds w bring by themselves are a square of w; half of its change
-        along u is the part of J' that does not tell u from the column's own speed.  What does is
-        the bracket of both: w x of the turns, and J times that of the speeds, -`turning` (nu, nu;
-        None: zero), which is the rate of increments by themselves.
+        Accelerations at udot = 0 are quadratic in the speeds w; half of their change along u is the
+        part of J' that is symmetric in u and the column's speed.  The antisymmetric part is the
+        bracket of both: w x of the rotations, and J times that of the speeds, -`turning` (nu, nu;
+        None: zero), which is the rate of the increments.
         """
         nu = self._engine.nu
         size = max(1.0, float(np.abs(u).max(initial=0.0)))
@@ -189,7 +193,7 @@ class Kinematics:
         return found if turning is None else found - jacobian @ turning / 2
 
     def _probes(self, of: Names) -> tuple[Any, int]:
-        """Records of bodies and ends for C, kept; SceneError for one that there is not."""
+        """C records of bodies and ends, cached; SceneError for an unknown name."""
         key = of if isinstance(of, str) else tuple(of)
         known = self._records.get(key)
         if known is None:
@@ -213,7 +217,7 @@ class Kinematics:
             raise NumericalFailure(self._engine.failure_text(made.failure, 0.0))
 
     def _made(self) -> _Record:
-        """This thread's record."""
+        """Record of this thread."""
         made: _Record | None = getattr(self._local, "made", None)
         if made is None:
             made = self._local.made = _Record(self._engine)
@@ -221,7 +225,7 @@ class Kinematics:
 
 
 class _Record:
-    """What C works with, of one thread."""
+    """C record of the general calls of one thread."""
 
     __slots__ = ("_pointed", "failure", "record")
 
@@ -232,7 +236,7 @@ class _Record:
 
 
 class _Compiled:
-    """What C works with where there is code of the scene."""
+    """C record of prepared calls with code of the scene."""
 
     def __init__(
         self, engine: Engine, fusion: Fusing, probes: list[Probe], codes: list[FusedLibrary]
@@ -250,7 +254,7 @@ class _Compiled:
 
 
 class _Points:
-    """What C works with where the same bodies or ends are asked for again and again."""
+    """C record of prepared calls of the looped engine for fixed bodies or ends."""
 
     def __init__(
         self, engine: Engine, room: Any, probes: Any, count: int, brackets: Brackets
@@ -267,7 +271,7 @@ class _Points:
 
 
 def _fill(record: Any, engine: Engine, workspace: Any) -> list[Any]:
-    """Fill `mstmm_kinematics`; what it points to."""
+    """Fill `mstmm_kinematics`; returns the memory to which it points."""
     arrays = engine.start_memory(), np.zeros(engine.nu), np.empty(engine.nu)
     pointed = [engine.pointer(array) for array in arrays]
     record.model, record.workspace = engine.packed.model, workspace

@@ -1,8 +1,8 @@
-"""Accelerations of many states: vector lanes where there is fused code, then threads.
+"""Accelerations of many states: in SIMD lanes with fused code, and in threads.
 
-The numbers of a state do not depend on the states around it, on how many there are or on the number
-of threads: every state of a batch goes through the same code, alone in its lane or in its turn.
-C runs without the interpreter's lock.
+The result of a state does not depend on the other states, on their number or on the number of
+threads: every state of a batch is evaluated by the same code.  C runs without the interpreter's
+lock.
 """
 
 from __future__ import annotations
@@ -23,14 +23,16 @@ from ..code import Fusing
 from ..engine import Engine
 from ..live import LiveInputs
 
-#: A thread is worth starting for about 0.2 ms of work; in states times speeds.
+#: Smallest work for which a thread is started, about 0.2 ms, in states times speeds.
 _LEAST_LANES, _LEAST_LOOPED = 20000, 2000
 
 
 @dataclass(frozen=True)
 class States:
-    """n states: t (n,), q (n, nq), u (n, nu), extra efforts (n, nu) or None; `lead` is the shape
-    of the leading axes they came with, () for one state."""
+    """Batch of n states: t (n,), q (n, nq), u (n, nu), extra efforts (n, nu) or None.
+
+    `lead` is the shape of the leading axes of the caller's arrays, () for one state.
+    """
 
     lead: tuple[int, ...]
     t: Array
@@ -41,14 +43,14 @@ class States:
 
 @dataclass(frozen=True)
 class Failed:
-    """The first state of a range that could not be evaluated."""
+    """First state of a range that could not be evaluated."""
 
     index: int
     failure: Any
 
 
 def processors() -> int:
-    """How many processors this process may use."""
+    """Number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -57,11 +59,11 @@ def processors() -> int:
 def accelerations(
     engine: Engine, fusing: Fusing, states: States, threads: int | None = None
 ) -> Array:
-    """udot (n, nu).  `threads` at most (None: as many as there are processors).
+    """Compute udot (n, nu) of a batch with at most `threads` threads (None: one per processor).
 
-    One state (no leading axis) goes through the scalar code, others through the lanes.  Raises
-    SceneError for an impossible number of threads; NumericalFailure, UndeterminedMotion naming the
-    state and the hinge.
+    One state (no leading axis) uses the scalar code, others the lanes.  Raises SceneError for an
+    invalid number of threads; NumericalFailure or UndeterminedMotion that names the state and the
+    hinge.
     """
     n, udot = len(states.q), np.empty((len(states.q), engine.nu))
     live = LiveInputs(engine.packed.system, fusing.inputs)
@@ -86,9 +88,9 @@ def accelerations(
 def in_threads(
     run: Callable[[int, int], Failed | None], n: int, step: int, smallest: int, threads: int
 ) -> Failed | None:
-    """run(first, end) over 0..n in ranges that begin at multiples of `step`.
+    """Call run(first, end) over 0..n in ranges that begin at multiples of `step`.
 
-    No range but the last holds fewer than `smallest`.  Returns the failure of the lowest index.
+    Only the last range may be shorter than `smallest`.  Returns the failure of the lowest index.
     """
     pieces = max(1, min(threads, n // max(1, smallest)))
     if pieces == 1:
@@ -138,7 +140,7 @@ def _failure(engine: Engine, library: FusedLibrary, code: int) -> Any:
 
 
 def _looped(engine: Engine, states: States, udot: Array) -> Callable[[int, int], Failed | None]:
-    """The engine's own loop; every thread has a workspace."""
+    """Evaluation of a range by the looped engine; every thread has a workspace."""
     memory = np.tile(engine.start_memory(), (len(states.q), 1))
 
     def run(first: int, end: int) -> Failed | None:
@@ -164,7 +166,7 @@ def _error(engine: Engine, states: States, failed: Failed) -> NumericalFailure:
 
 
 def _named(lead: tuple[int, ...], index: int) -> str:
-    """The state's place on the leading axes; nothing for one state."""
+    """Prefix of a message with the index of a state on the leading axes; "" for one state."""
     if not lead:
         return ""
     place = [int(k) for k in np.unravel_index(index, lead)]

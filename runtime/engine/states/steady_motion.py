@@ -1,4 +1,4 @@
-"""Motion of coordinates at steady rates."""
+"""Motion of coordinates with constant rates."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ from mstmm.arrays import Array
 
 
 def move_steadily(q: Array, rates: Array, dt: float, quaternions: Iterable[int]) -> Array:
-    """q (nq,) after dt (s) at `rates` (nq,); unit quaternions, which begin at the indices
-    `quaternions`, turn at a steady angular velocity and stay units."""
+    """Move q (nq,) by dt (s) with constant `rates` (nq,).
+
+    Unit quaternions, which begin at the indices `quaternions`, rotate at constant angular velocity
+    and keep unit length.
+    """
     found = q + rates * dt
     for first in quaternions:
         four = slice(first, first + 4)

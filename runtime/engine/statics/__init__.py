@@ -1,1 +1,1 @@
-"""Static equilibrium: the search for it, and what holds it."""
+"""Static equilibrium: search and stability."""

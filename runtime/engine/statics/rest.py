@@ -1,8 +1,8 @@
-"""The way to rest: coordinates at which no effort is needed, by Newton's method and load steps.
+"""Static equilibrium by Newton's method and load steps: coordinates that need no effort.
 
-Efforts of different kinds stand side by side (N beside N*m, an axial shape beside a twist), so
-nothing is compared across coordinates: every stiffness is judged beside those of its own coordinate
-and every step beside the size of its coordinate, a motion that changes the shape of things.
+Efforts of different kinds (N and N*m, of an axial shape and of a twist) are never compared: every
+stiffness is scaled by those of its own coordinate, and every step by the characteristic scale of
+its coordinate, a motion that changes the geometry noticeably.
 """
 
 from __future__ import annotations
@@ -16,28 +16,30 @@ from numpy.typing import NDArray
 from mstmm.arrays import Array
 from mstmm.errors import NumericalFailure
 
-_LONGEST = 0.5  # step, in sizes of the coordinates
-#: Scaled stiffness below which a direction counts as slack: that of simple differences, and that of
-#: exact ones, which are taken behind steps shorter than the third number, in sizes.
+_LONGEST = 0.5  # step, in characteristic scales of the coordinates
+#: Scaled stiffness below which a direction counts as slack: by simple differences, and by exact
+#: ones, which are used after steps shorter than the third number, in characteristic scales.
 _SOFT, _SOFTEST, _NEAR = 1e-8, 1e-10, 0.1
 _MAX_ITERATIONS, _ITERATIONS_OF_A_PART = 200, 20
-#: Forces without potential have no downhill to follow: a stiffness so far from symmetric, and the
-#: iterations that are then enough to see whether Newton's method goes there by itself.
+#: Forces without potential have no descent direction: relative asymmetry of their stiffness, and
+#: the number of iterations that then shows whether Newton's method converges.
 _SKEW, _ITERATIONS_WITHOUT_POTENTIAL = 1e-4, 20
 _HALVINGS = 40
-#: How much efforts may climb in a step: so many times, or to those of such a motion, in sizes.
+#: Permitted growth of efforts in a step: by this factor, or up to those of such a motion in
+#: characteristic scales.
 _MORE, _ASTRAY = 10.0, 1e-3
-#: Steps of the difference quotients, in sizes; of those of fourth order, which are exact to some
-#: 1e-12 where simple ones are to 1e-8: where a stiffness is no rounding it agrees with fine ones.
+#: Steps of the difference quotients in characteristic scales: coarse, fine, and of fourth order,
+#: which are exact to about 1e-12, simple ones to 1e-8.  A stiffness that is no rounding agrees with
+#: the fine ones.
 _COARSE, _FINE, _WIDE = 1e-4, 1e-5, 1e-3
-#: Stiffness in parts of the largest one, all in J, that is rounding of it.
+#: Stiffness that is rounding, relative to the largest one, all in J.
 _NOTHING = 1e-16
-#: First part of the load that is tried where the whole is too much, and the smallest.
+#: First fraction of the load that is tried if the whole load fails, and the smallest.
 _FIRST_PART, _LEAST_PART = 0.25, 2.0**-10
 
 
 class Unsettled(NumericalFailure):
-    """No rest found; `residual` (n,) is what was left along coordinates of `problem`."""
+    """No equilibrium found; `residual` (n,) are the remaining efforts in the coordinates."""
 
     def __init__(self, message: str, residual: Array, problem: Rest | None = None) -> None:
         super().__init__(message)
@@ -45,8 +47,10 @@ class Unsettled(NumericalFailure):
 
 
 class Undetermined(NumericalFailure):
-    """Rest that nothing holds in some directions; `places` are the coordinates they move among
-    those of `problem`."""
+    """Equilibrium without stiffness in some directions.
+
+    `places` are the coordinates of `problem` that these directions move.
+    """
 
     def __init__(self, places: Sequence[int], problem: Rest) -> None:
         super().__init__("")
@@ -55,15 +59,14 @@ class Undetermined(NumericalFailure):
 
 @dataclass(frozen=True)
 class Rest:
-    """What is to come to rest, n coordinates of it.
+    """Equilibrium problem in n coordinates.
 
     Attributes:
-        needed: q -> efforts (n,) that rest needs in the coordinates, N, N*m.
+        needed: q -> efforts (n,) that equilibrium needs in the coordinates, N, N*m.
         moved: q and a small motion (n,) -> q after it.
-        sizes: (n,) motions of order one: 1 rad, the length of a body; m or rad.
-        places: which speeds of the scene they are, for who asks.
-        there: the same in coordinates that tell motions of another q apart, where those of here
-            need not.
+        sizes: (n,) characteristic scales of the coordinates: 1 rad, the length of a body; m, rad.
+        places: indices of the coordinates among the speeds of the scene.
+        there: q -> the same problem in coordinates that are independent at that q.
     """
 
     needed: Callable[[Array], Array]
@@ -73,11 +76,11 @@ class Rest:
     there: Callable[[Array], Rest] | None = None
 
     def at(self, q: Array) -> Rest:
-        """In coordinates that serve at q."""
+        """The same problem in coordinates that are independent at q."""
         return self if self.there is None else self.there(q)
 
     def efforts(self, q: Array) -> Array:
-        """Efforts times sizes, J.  NumericalFailure where they are not finite."""
+        """Efforts (n,) times characteristic scales, J.  NumericalFailure if not finite."""
         with np.errstate(all="ignore"):
             found = self.needed(q) * self.sizes
         if not np.isfinite(found).all():
@@ -85,11 +88,11 @@ class Rest:
         return found
 
     def after(self, q: Array, step: Array) -> Array:
-        """q after a motion given in sizes."""
+        """Move q by a motion given in characteristic scales."""
         return self.moved(q, step * self.sizes)
 
     def slope(self, q: Array, size: float = _COARSE) -> Array:
-        """(n, n) stiffness in J, by central differences."""
+        """Stiffness (n, n) in J, by central differences."""
         columns = [
             (self.efforts(self.after(q, unit)) - self.efforts(self.after(q, -unit))) / (2 * size)
             for unit in size * np.eye(len(self.sizes))
@@ -97,22 +100,22 @@ class Rest:
         return np.array(columns).reshape(len(columns), len(columns)).T
 
     def exact_slope(self, q: Array) -> Array:
-        """(n, n) stiffness in J, by differences of fourth order."""
+        """Stiffness (n, n) in J, by differences of fourth order."""
         return np.asarray((4 * self.slope(q, _WIDE) - self.slope(q, 2 * _WIDE)) / 3)
 
 
 def at_rest(problem: Rest, q: Array, tolerance: float) -> Array:
-    """`approached`, and refused where nothing pushes a motion back: Undetermined."""
+    """Find an equilibrium as `approached` does; Undetermined if it has neutral directions."""
     found = approached(problem, q, tolerance)
     leaving(problem.at(found), found)
     return found
 
 
 def approached(problem: Rest, q: Array, tolerance: float) -> Array:
-    """q at rest, coordinates within `tolerance` times their sizes, or within rounding.
+    """Find q at rest, to `tolerance` times the characteristic scales, or to rounding.
 
-    Newton's method at once, else with the load in parts: what is missing at the start is given as
-    an effort from outside and taken away bit by bit.  Raises Unsettled.
+    Newton's method is applied to the whole load, else in load steps: the efforts missing at the
+    start act as external efforts, which are reduced to zero in steps.  Raises Unsettled.
     """
     try:
         return _newton(problem, q, tolerance, _MAX_ITERATIONS, _downhill)
@@ -175,7 +178,9 @@ def _newton(
         q, residual, falls = _followed(problem, q, residual, step, scale)
         if not falls and length < _COARSE and _is_rounding(problem, q, residual):
             return q
-    raise Unsettled(f"no rest after {iterations} steps", residual / problem.sizes, problem)
+    raise Unsettled(
+        f"not converged after {iterations} iterations", residual / problem.sizes, problem
+    )
 
 
 def _is_skew(slope: Array, scale: Array) -> bool:
@@ -185,19 +190,21 @@ def _is_skew(slope: Array, scale: Array) -> bool:
 
 
 def _scale(slope: Array, residual: Array, noise: Array | float = 0.0) -> Array:
-    """(n,) the stiffness of each coordinate as it shows: K_ii, or K_ij^2 / K_jj, or the effort;
-    `noise` is what of K_jj is rounding."""
+    """Scale (n,) of the stiffness of each coordinate: the largest of K_ii, K_ij^2 / K_jj, effort.
+
+    `noise` is the rounding error of K_jj.
+    """
     own = np.maximum(np.maximum(np.abs(np.diag(slope)), noise), 1e-300)
     coupled = np.max(((slope + slope.T) / 2) ** 2 / own, axis=1, initial=0.0)
     return np.maximum.reduce([own, coupled, np.abs(residual)])
 
 
 def _downhill(slope: Array, residual: Array, scale: Array, soft: float) -> Array:
-    """Newton's step where the stiffness is positive definite; else one that runs downhill too.
+    """Newton step if the stiffness is positive definite, else a modified step of descent.
 
-    Along directions in which the stiffness is negative or vanishes, Newton would run uphill or far
-    away; the step goes with the forces there, so that unstable equilibria are left behind (for
-    forces without potential this is only a heuristic).
+    In directions with negative or zero stiffness Newton's step would ascend or be too long; there
+    the step follows the forces, so that unstable equilibria are avoided (for forces without
+    potential this is only a heuristic).
     """
     root = np.sqrt(scale)
     scaled, force = slope / np.outer(root, root), residual / root
@@ -209,7 +216,7 @@ def _downhill(slope: Array, residual: Array, scale: Array, soft: float) -> Array
 
 
 def _along_the_path(slope: Array, residual: Array, scale: Array, _: float) -> Array:
-    """Newton's step as it is: what was at rest under a little less load is close by."""
+    """Unmodified Newton step: the equilibrium for the previous load is near."""
     root = np.sqrt(scale)
     try:
         return np.asarray(np.linalg.solve(slope / np.outer(root, root), -residual / root) / root)
@@ -220,12 +227,12 @@ def _along_the_path(slope: Array, residual: Array, scale: Array, _: float) -> Ar
 def _followed(
     problem: Rest, q: Array, residual: Array, step: Array, scale: Array
 ) -> tuple[Array, Array, bool]:
-    """q after the step, at most _LONGEST long, what is left there, and whether it is less.
+    """Line search: q after the step, the efforts there, and whether they are smaller.
 
-    The step is halved until there is a state at its end and the efforts fall or do not climb again:
-    where forces have a potential, `needed` is its gradient, and the step has not passed the bottom
-    by much as long as the gradient along it has not turned around to more than half its size, nor
-    others have grown out of sight of the bottom, beside a slack valley.
+    The step, at most _LONGEST long, is halved until its end is a valid state and the efforts
+    decrease or do not reverse.  If forces have a potential, `needed` is its gradient: the step has
+    not passed the minimum far unless the gradient along it has reversed to more than half its size.
+    The efforts must also not grow much across a direction of little stiffness.
     """
     step = step / max(1.0, float(np.abs(step).max(initial=0.0)) / _LONGEST)
     before, along = _size(residual, scale), abs(float(residual @ step))
@@ -256,24 +263,25 @@ def _size(residual: Array, scale: Array) -> float:
 
 
 def _noise(problem: Rest, q: Array) -> tuple[Array, Array]:
-    """The stiffness (n, n) in J, and how far two difference quotients of it lie apart."""
+    """Stiffness (n, n) in J, and the difference of two difference quotients of it."""
     exact, fine = problem.exact_slope(q), problem.slope(q, _FINE)
     return exact, np.abs(exact - fine)
 
 
 def _is_rounding(problem: Rest, q: Array, residual: Array) -> bool:
-    """Whether the efforts left are what rounding leaves of larger ones that cancel."""
+    """True if the remaining efforts are rounding of larger ones that cancel."""
     _, noise = _noise(problem, q)
     return bool((np.abs(residual) <= 10 * _FINE * noise.max(axis=1, initial=0.0)).all())
 
 
 def leaving(problem: Rest, q: Array) -> tuple[int, ...]:
-    """Coordinates that leave a rest once it is disturbed, as their stiffness is negative; none
-    where efforts have no potential, whose stiffness does not tell.
+    """Unstable coordinates of an equilibrium, by negative stiffness.
 
-    Raises Undetermined for directions whose stiffness is rounding beside that of their coordinates,
-    Unsettled where efforts are left that no small motion takes away: beside a coordinate without
-    stiffness of its own another one may count as so stiff that steps get short far from rest.
+    Empty if efforts have no potential, because their stiffness then does not show stability.
+    Raises Undetermined for directions whose stiffness is rounding relative to that of their
+    coordinates, Unsettled for remaining efforts that no small motion removes: next to a coordinate
+    without stiffness the scale of another one may be so large that steps become short far from
+    equilibrium.
     """
     slope, noise = _noise(problem, q)
     nothing = _NOTHING * float(np.abs(slope).max(initial=0.0))
@@ -293,5 +301,7 @@ def leaving(problem: Rest, q: Array) -> tuple[int, ...]:
         raise Undetermined(moving(loose), problem)
     residual = problem.efforts(q)
     if np.abs(residual).max(initial=0.0) > len(slope) * _COARSE * np.abs(slope).max(initial=0.0):
-        raise Unsettled("steps get short far from rest", residual / problem.sizes, problem)
+        raise Unsettled(
+            "steps become short far from equilibrium", residual / problem.sizes, problem
+        )
     return () if _is_skew(slope, scale) else moving(values < 0)

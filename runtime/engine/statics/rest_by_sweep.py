@@ -1,13 +1,12 @@
-"""The way to static equilibrium by the factored tangent, O(bodies) a step.
+"""Static equilibrium by pseudo-transient continuation with the factored tangent, O(bodies) a step.
 
     (K + sigma W) x = -R(q),   J x = 0
 
-is a step downhill of whatever has a potential: R are the efforts that rest lacks, K their slopes, J
-the rows of closed loops, and W the inertia with rotors on the hinges.  Equilibrium does not depend
-on W, but the way there does: beside the inertia of bodies alone, chains of many links crumple
-where their loads push for a while.  sigma, an inverse time squared, falls while steps go downhill,
-so that the way ends in Newton's method (pseudo-transient continuation; Kelley and Keyes, SIAM J.
-Numer. Anal. 35 (1998) 508-523).
+is a step of descent if forces have a potential: R are the efforts that equilibrium lacks, K their
+derivatives, J the rows of closed loops, and W the inertia with rotors on the hinges.  Equilibrium
+does not depend on W, but the path to it does: with the inertia of bodies only, chains of many links
+under compression fold up.  sigma, an inverse time squared, decreases while steps descend, so that
+the iteration ends as Newton's method (Kelley and Keyes, SIAM J. Numer. Anal. 35 (1998) 508-523).
 """
 
 from __future__ import annotations
@@ -22,29 +21,29 @@ from mstmm.errors import NumericalFailure
 from .rest import Unsettled
 from .shifted_stiffness import ShiftedStiffness, Unsolved
 
-#: Steps at most, where nobody asks for another number.
+#: Default maximum number of steps.
 MOST = 2000
-#: Steps in sizes of the coordinates: the longest, and that of the first one.
+#: Longest step and first step, in characteristic scales of the coordinates.
 _LONGEST, _FIRST = 0.5, 0.05
-#: By how much sigma falls behind a step that goes downhill, and rises before one that would not.
+#: Factors by which sigma decreases after a step of descent, and increases after a failed step.
 _EASED, _HELD = 4.0, 4.0
-#: From so many times its first value on no step leads anywhere.
+#: The search fails if sigma exceeds this multiple of its first value.
 _STUCK = 1e8
-#: Steps, in sizes, below which efforts may be rounding; by how much sigma falls between steps that
-#: are short enough, and parts of its first value below which nothing is left of it.
+#: Steps, in characteristic scales, below which efforts may be rounding; factor by which sigma
+#: decreases after steps within the tolerance; fraction of its first value that counts as zero.
 _ROUNDING, _DROPPED, _GONE = 1e-6, 64.0, 1e-20
-#: Changes of q, in parts, by which rounding is seen, how often, and how many times it may be more.
+#: Relative changes of q that reveal rounding, their number, and a safety factor.
 _NUDGE, _NUDGES, _MORE = 4e-16, 3, 10.0
-#: Rounding of efforts, in parts of those that cancel.
+#: Rounding of efforts, relative to those that cancel.
 _CANCELLED = 2e-16
 
 
 class RestBySweep:
-    """The search from one state.
+    """Search for a static equilibrium from one state.
 
-    `settled` puts a state's drives, quaternions and loops in order or raises NumericalFailure,
-    `load` is the work, J, of all forces that may cancel over motions of order one, `progress` is
-    called with the number of every step and its length in sizes.
+    `settled` corrects the drives, quaternions and loops of a state or raises NumericalFailure,
+    `load` is the work, J, of all forces that may cancel, over characteristic motions; `progress` is
+    called with the number of every step and its length in characteristic scales.
     """
 
     def __init__(
@@ -56,14 +55,14 @@ class RestBySweep:
         progress: Callable[[int, float], None] | None = None,
     ) -> None:
         self.stiffness, self.settled, self.most, self.progress = stiffness, settled, most, progress
-        self.cancelled = _CANCELLED * load  #: J, where sigma falls no more
-        self.steps = 0  #: taken by the last search
-        self._least = 0.0  # sigma, with which solutions are no rounding
+        self.cancelled = _CANCELLED * load  #: J, for tests with the smallest sigma
+        self.steps = 0  #: number of steps of the last search
+        self._least = 0.0  # smallest sigma with which solutions are no rounding
 
     def find(self, q: Array, tolerance: float) -> Array:
-        """q (nq,) at rest, coordinates within `tolerance` times their sizes, or within rounding.
+        """Find q (nq,) at rest, to `tolerance` times the characteristic scales, or to rounding.
 
-        Raises Unsettled with what is missing (nu,) after `most` steps.
+        Raises Unsettled with the missing efforts (nu,) after `most` steps.
         """
         self.steps, q = 0, self.settled(q)
         missing, near = self.stiffness.residual(q), False
@@ -73,17 +72,17 @@ class RestBySweep:
         self._least = _GONE * sigma
         for k in range(self.most):
             if sigma > _STUCK * first:
-                raise Unsettled(f"{k} steps led to where none leads on", missing)
+                raise Unsettled(f"after {k} steps no further step leads on", missing)
             step = self._step(missing, sigma, tolerance)
             length = np.inf if step is None else self.stiffness.length(step)
             if self.progress is not None:
                 self.progress(k, length)
             if step is None and near:
-                return q  # so little of sigma that nothing is left of it
+                return q  # sigma is negligible
             if length < _ROUNDING and self._is_rounding(q, missing):
                 return q
             if sigma <= self._least and self._is_rounding(q, missing, self.cancelled):
-                return q  # what nothing pushes back goes by rounding
+                return q  # directions without stiffness move by rounding only
             ahead = None if step is None else self._ahead(q, step, missing)
             if ahead is None:
                 sigma *= _HELD
@@ -97,8 +96,10 @@ class RestBySweep:
         raise Unsettled(f"not at rest after {self.most} steps", missing)
 
     def _step(self, missing: Array, sigma: float, tolerance: float) -> Array | None:
-        """The step from the state whose residual has just been made; None where it is not known to
-        go downhill, as far as that can be told, nor to be nothing."""
+        """Step from the state of the last residual, at most _LONGEST long.
+
+        None if it is not certain that it descends, unless it is within the tolerance.
+        """
         stiffness = self.stiffness
         try:
             stiffness.factor(sigma)
@@ -114,9 +115,11 @@ class RestBySweep:
         return step / max(1.0, length / _LONGEST)
 
     def _ahead(self, q: Array, step: Array, missing: Array) -> tuple[Array, Array] | None:
-        """q after a step, and what is missing there; None where no state is near, uphill, and
-        beyond the bottom by much.  The tangent must be that of q: it turns a motion into a change
-        of coordinates."""
+        """State q after a step, and the missing efforts there.
+
+        None if no valid state is near, if the step ascends, or if it passes the minimum far.  The
+        tangent must be that of q: it converts a motion to a change of coordinates.
+        """
         try:
             ahead = self.settled(q + self.stiffness.tangent.coordinates(step))
             left = self.stiffness.residual(ahead)
@@ -129,8 +132,7 @@ class RestBySweep:
         return ahead, left
 
     def _is_rounding(self, q: Array, missing: Array, cancelled: float = 0.0) -> bool:
-        """Whether what is missing is no more than what rounding of q makes of it, or of what
-        cancels, J."""
+        """True if the missing efforts are rounding of q, or of cancelling efforts (J)."""
         draw, noise = np.random.default_rng(0), cancelled / _MORE / self.stiffness.sizes
         for _ in range(_NUDGES):
             nudged = q * (1 + _NUDGE * draw.uniform(-1.0, 1.0, len(q)))
@@ -139,7 +141,7 @@ class RestBySweep:
         return bool((np.abs(missing) <= _MORE * noise).all())
 
     def _unrest(self, q: Array) -> float:
-        """The largest acceleration, in sizes."""
+        """Largest acceleration in characteristic scales."""
         tangent, still = self.stiffness.tangent, self.stiffness.still
         one = np.array([self.stiffness.t]), q[None], still[None], tangent.memory[None]
         largest = self.stiffness.length(tangent.engine.accelerations(*one)[1][0])

@@ -1,8 +1,8 @@
-"""Stiffness of a scene at rest beside its inertia, K + sigma W: products, solutions, O(bodies).
+"""Shifted stiffness K + sigma W of a scene at rest, W its inertia: products, solutions, O(bodies).
 
-Solutions are along motions that closed loops allow.  A tree is eliminated without its loops and
-springs, and may stand on pivots that are next to nothing where these alone hold it: each solution
-is refined by what it leaves, and refused where that goes on changing it.
+Solutions are motions that closed loops permit.  A tree is eliminated without its loops and springs,
+with very small pivots if only these support it.  Each solution is therefore refined by its
+residual, and rejected if refinement does not converge.
 """
 
 from __future__ import annotations
@@ -14,17 +14,19 @@ from mstmm.errors import NumericalFailure
 
 from ..tangent import Tangent
 
-#: What a refinement may change of a solution that is refined no more, in parts, and how many there
-#: are at most.
+#: Relative change of a solution at which refinement ends, and maximum number of refinements.
 _SMALL, _REFINEMENTS = 1e-4, 3
 
 
 class Unsolved(NumericalFailure):
-    """Solutions are rounding with so small a sigma."""
+    """Failure: with so small a sigma solutions are rounding."""
 
 
 class ShiftedStiffness:
-    """Of the scene of a tangent at time t; `sizes` (nu,) are motions of order one."""
+    """Shifted stiffness of the scene of a tangent at time t (s).
+
+    `sizes` (nu,) are the characteristic scales of the speeds.
+    """
 
     def __init__(self, tangent: Tangent, t: float, sizes: Array) -> None:
         self.tangent, self.t, self.sizes, self.sigma = tangent, t, sizes, 0.0
@@ -37,18 +39,18 @@ class ShiftedStiffness:
         self.own = np.concatenate([np.zeros(0, np.int64), *own])
 
     def residual(self, q: Array) -> Array:
-        """Efforts R (nu,) that rest lacks at q, where all else is meant from now on."""
+        """Efforts R (nu,) that equilibrium lacks at q, to which all other calls refer then."""
         return self.tangent.residual(self.t, q, self.still, self.still)
 
     def factor(self, sigma: float) -> None:
-        """Factor K + sigma W.  NumericalFailure where it is singular."""
+        """Factor K + sigma W.  NumericalFailure if it is singular."""
         self.sigma = sigma
         self.tangent.factor(sigma, 1.0, 0.0, rate=0.0)
 
     def solve(self, efforts: Array) -> Array:
-        """x (nu,), allowed by loops, with (K + sigma W) x = efforts along all that they allow.
+        """Solve (K + sigma W) x = efforts (nu,) for motions x (nu,) that loops permit.
 
-        Raises Unsolved where that is rounding.
+        Raises Unsolved if the solution is rounding.
         """
         x = self.tangent.solve(efforts)
         for _ in range(_REFINEMENTS):
@@ -61,15 +63,15 @@ class ShiftedStiffness:
         raise Unsolved("the stiffness is rounding here")
 
     def press(self, x: Array) -> Array:
-        """K x (nu,)."""
+        """Product K x (nu,)."""
         return self._along(self.tangent.coordinates(x), self.still)
 
     def inertia(self, x: Array) -> Array:
-        """W x (nu,)."""
+        """Product W x (nu,)."""
         return self._along(self.placed, x)
 
     def length(self, x: Array) -> float:
-        """The largest motion in sizes."""
+        """Largest component of a motion in characteristic scales."""
         return float(np.abs(x / self.sizes).max(initial=0.0))
 
     def _along(self, moved: Array, rates: Array) -> Array:

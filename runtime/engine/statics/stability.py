@@ -1,12 +1,12 @@
-"""Directions in which nothing holds a static equilibrium, in O(bodies).
+"""Unstable and neutral directions of a static equilibrium, in O(bodies).
 
-Of the motions that loops leave, those with the least stiffness beside the inertia W are found by
-Arnoldi's method with (K + sigma W)^-1 W (W. E. Arnoldi, Q. Appl. Math. 9 (1951) 17-29; Y. Saad,
-Numerical Methods for Large Eigenvalue Problems, 2011, ch. 6): every eigenvalue kappa of K beside W
-shows as 1 / (kappa + sigma), so that what is far below -sigma or near 0 stands apart.  As sigma
-goes from the largest kappa down by factors, nothing negative is missed.  A direction counts as one
-without stiffness only where its stiffness is what rounding of the state makes of it, however soft
-it is beside others.
+Of the motions that loops permit, those with the least stiffness relative to the inertia W are found
+by Arnoldi's method with (K + sigma W)^-1 W (W. E. Arnoldi, Q. Appl. Math. 9 (1951) 17-29; Y. Saad,
+Numerical Methods for Large Eigenvalue Problems, 2011, ch. 6): every eigenvalue kappa of K relative
+to W appears as 1 / (kappa + sigma), so that eigenvalues far below -sigma or near 0 are separated.
+Since sigma decreases from the largest kappa by factors, no negative eigenvalue is missed.  A
+direction counts as one without stiffness only if its stiffness is rounding of the state, however
+soft it is compared with others.
 """
 
 from __future__ import annotations
@@ -21,34 +21,36 @@ from mstmm.errors import NumericalFailure
 
 from .shifted_stiffness import ShiftedStiffness
 
-#: Vectors of one sequence, and what is left of one that depends on others, in parts.
+#: Vectors of one sequence, and relative remainder of a vector that depends on others.
 _VECTORS, _NOTHING = 16, 1e-10
-#: sigma in parts of the largest kappa, one after the other; kappa that may be none, and how well
-#: those and others agree with the stiffness of their motions where they are no rounding; kappa
-#: beyond so many sigma are rounding of a sequence.
+#: Successive sigma relative to the largest kappa; eigenvalues kappa beyond _SEEN sigma are rounding
+#: of a sequence.  Kappa up to _SOFT of the largest may be zero; unless they are rounding, these
+#: agree with the stiffness of their motions to _ALIKE, others to _NEAR.
 _SHIFTS = tuple(10.0**-k for k in range(0, 13, 2))
 _SEEN = 1e3
 _SOFT, _ALIKE, _NEAR = 1e-10, 1e-2, 0.5
-#: A sigma so large that the inertia is alone, and powers of W^-1 K.
+#: A sigma with which the stiffness is negligible, and number of powers of W^-1 K.
 _ALONE, _POWERS = 1e200, 6
-#: Changes of q, in parts, by which rounding of a stiffness is seen, how often, and how many times
-#: it may be more.
+#: Relative changes of q that reveal rounding of a stiffness, their number, and a safety factor.
 _NUDGE, _NUDGES, _MORE = 1e-14, 2, 10.0
-#: How far a stiffness is from symmetric that has no potential, in parts.
+#: Relative asymmetry above which a stiffness has no potential.
 _SKEW = 1e-4
 
 
 @dataclass(frozen=True)
 class Stability:
-    """Of an equilibrium: motions (nu,) along which it leaves itself, where efforts have a
-    potential, and some, drawn at random, of those along which nothing pushes."""
+    """Unstable and neutral motions (nu,) of an equilibrium.
+
+    Unstable motions are found only if efforts have a potential; of the neutral motions some are
+    selected at random.
+    """
 
     unstable: list[Array] = field(default_factory=list)
     neutral: list[Array] = field(default_factory=list)
 
 
 def find_stability(stiffness: ShiftedStiffness, q: Array) -> Stability:
-    """The stability of an equilibrium q (nq,)."""
+    """Find the unstable and neutral motions of an equilibrium q (nq,)."""
     return _Search(stiffness).at(q)
 
 
@@ -74,7 +76,7 @@ class _Search:
         return Stability([] if skewed else unstable, neutral)
 
     def _largest(self) -> float:
-        """The size of the largest kappa: a few powers of W^-1 K."""
+        """Magnitude of the largest kappa, by a few powers of W^-1 K."""
         self.stiffness.factor(_ALONE)
         motion, size = self._drawn(), 0.0
         for _ in range(_POWERS):
@@ -86,17 +88,17 @@ class _Search:
         return size
 
     def _size(self, motion: Array) -> float:
-        """Beside W."""
+        """Norm of a motion with the inertia W."""
         return math.sqrt(max(0.0, float(motion @ self.stiffness.inertia(motion))))
 
     def _drawn(self) -> Array:
-        """A motion that loops allow, by the tangent in hand."""
+        """Random motion that loops permit, by the present factorisation."""
         draw = np.random.default_rng(0).standard_normal(len(self.stiffness.still))
         motion = self.stiffness.solve(draw)
         return np.asarray(motion / (float(np.abs(motion).max(initial=0.0)) or 1.0))
 
     def _softest(self, sigma: float, soft: float) -> tuple[list[tuple[complex, Array]], bool]:
-        """Motions with kappa below `soft`, as far as this sigma shows them; is K skew?"""
+        """Motions with kappa below `soft`, as far as this sigma reveals them; whether K is skew."""
         try:
             self.stiffness.factor(sigma)
             basis, matrix = self._sequence()
@@ -114,7 +116,7 @@ class _Search:
         return found, bool(skew)
 
     def _sequence(self) -> tuple[Array, Array]:
-        """Motions (m, nu), orthonormal beside W, and (K + sigma W)^-1 W (m, m) among them."""
+        """Motions (m, nu), orthonormal with W, and (K + sigma W)^-1 W (m, m) in their basis."""
         basis, pushed, matrix = list[Array](), list[Array](), np.zeros((_VECTORS + 1, _VECTORS))
         motion, size = self._drawn(), 1.0
         for k in range(_VECTORS + 1):
@@ -135,7 +137,7 @@ class _Search:
         return np.array(basis).reshape(n, len(motion)), matrix[:n, :n]
 
     def _stiffness(self, q: Array, motion: Array) -> tuple[float, float]:
-        """Of one motion beside its inertia, and what of it may be rounding of q."""
+        """Stiffness of a motion relative to its inertia, and its error by rounding of q."""
         draw, found = np.random.default_rng(0), list[float]()
         for k in range(1 + _NUDGES):
             self.stiffness.residual(

@@ -256,7 +256,10 @@ def test_equal_runs_give_equal_bits(bar: mstmm.Model) -> None:
     ("asked", "words"),
     [
         ({"method": "genalpha-index3", "radius": 1.0}, "radius = 1: .* would have no damping"),
-        ({"method": "newmark-index3"}, "newmark-index3.* would have no damping.*, or newmark, which"),
+        (
+            {"method": "newmark-index3"},
+            "newmark-index3.* would have no damping.*, or newmark, which",
+        ),
         ({"method": "rk4-index3"}, 'method "rk4-index3" is not known'),
     ],
 )

@@ -50,7 +50,9 @@ def fast(**speeds: float) -> Scene:
 
 
 REST = angles(0.9)[1]
-SHARED = r'the drives of hinges "foot" and "end" move the same freedom .*; leave out one of these'
+SHARED = (
+    r'the drives of hinges "foot" and "end" move the same degree of freedom .*; omit one of these'
+)
 LEAD = {"name": "lead", "expression": "end.q", "equals": "1 + t"}
 REFUSED = {
     "drives that cannot be": (driven(foot="0.9", end="1.2"),
@@ -58,15 +60,15 @@ REFUSED = {
     "drives at odds in speed": (driven(foot="0.9 + t", end=f"{REST!r}"),
                                 r'speeds given for "foot", "end" contradict .* m/s.*; ' + SHARED),
     "drives a little apart": (driven(foot="0.9 + t", end=f"{REST + 4e-3!r} + t"),
-                              r"(gap of|leaves) 0\.00.*[:;] " + SHARED),
+                              r"(violated by|leaves) 0\.00.*[:;] " + SHARED),
     "drives of cut hinges": (driven(foot="0.9 + t", tip="0.3 + t"),
                              r'rad with "foot", "tip" held; '
-                             r'the drives of hinges "foot" and "tip" move the same freedom'),
+                             r'the drives of hinges "foot" and "tip" move the same degree of freedom'),
     "a drive and a wish": (driven(foot="0.9 + t") | {"coupling": [LEAD]},
                            r'with "foot" held.*drive less'),
     "more held than is free": (held("foot", "end", off=0.2),
                                r'with "foot", "end" held.*hold or drive less.*; hold keeps 2 '
-                               r"coordinates, the mechanism has 1 freedom$"),
+                               r"coordinates, the mechanism has 1 degree of freedom$"),
     "one held out of reach": (held("end", off=-1.3), r'with "end" held; [^;]*$'),
     "speeds at odds": (fast(foot=1.0, end=5.0), r'speeds given for "foot", "end" contradict'),
     "an axis off by a hundredth": (four_bar(end={"axis": [math.sin(0.01), 0, math.cos(0.01)]}),
@@ -110,7 +112,7 @@ def test_one_drive_too_many_of_a_chain_of_windows() -> None:
         foot = hinge(scene, f"foot{k}")
         foot.pop("initial")
         foot["drive"] = f"1.1 + {pace}*t"
-    told = '"foot0", "foot1", "foot2" move the same freedom .*; leave out all but one of these'
+    told = '"foot0", "foot1", "foot2" move the same degree of freedom .*; omit all but one of these'
     with pytest.raises(mstmm.SceneError, match=told):
         compiled(scene)
 
@@ -165,7 +167,7 @@ def test_a_crank_too_long_by_more_than_a_misfit_is_a_structure() -> None:
         if moves:
             assert compiled(scene).loops.mobility == 1
         else:
-            with pytest.raises(mstmm.SceneError, match="no freedom is left"):
+            with pytest.raises(mstmm.SceneError, match="no degree of freedom is left"):
                 compiled(scene)
 
 

@@ -39,8 +39,8 @@ def test_a_tilted_axis_is_named(name: str, tilt: float) -> None:
     told = refused(four_bar(tilt=OBLIQUE, **changed(name, axis=axis)))
     assert f'; the axis of hinge "{name}" is {off(tilt)} from parallel to those of ' in told
     assert f'"{before}" and "{behind}"' in told or f'"{behind}" and "{before}"' in told
-    assert told.endswith("; make it parallel by an exact axis and orientation, or take a ball "
-                         "hinge in its place")  # fmt: skip
+    assert told.endswith("; make it parallel by an exact axis and orientation, or replace it "
+                         "by a ball hinge")  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -131,7 +131,7 @@ def test_what_angles_do_not_explain() -> None:
     """Feet too far apart, an axis that is a little off, and one that is meant to be oblique."""
     scene = four_bar(end={"axis": [math.sin(1e-3), 0, math.cos(1e-3)]})
     scene["hinge"][3]["position"] = [4.0, 0, 0]
-    assert refused(scene).endswith("correct lengths or axes, or start nearer to where it closes")
+    assert refused(scene).endswith("correct lengths or axes, or start nearer to a closed state")
     told = refused(four_bar(end={"axis": [math.sin(0.3), 0, math.cos(0.3)]}))
     assert "from parallel" not in told
 
@@ -168,7 +168,7 @@ def test_three_pins_are_a_structure_however_parallel() -> None:
 
 @pytest.mark.parametrize(
     ("mass", "found"),
-    [(1.3, 'the axis of hinge "knee" is'), (1e6, '"coupler" (1e+06 kg) hangs behind light')],
+    [(1.3, 'the axis of hinge "knee" is'), (1e6, '"coupler" (1e+06 kg) outboard of light')],
 )
 def test_lost_digits_are_put_down_to_masses_only_where_these_are_unlike(
     mass: float, found: str
