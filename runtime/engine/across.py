@@ -1,13 +1,13 @@
-"""What the elimination of a tangent does not see, as it reaches across the tree: which unknowns
-there are, and which of them know nothing of each other.
+"""Unknowns of loads and constraints that couple distant bodies, and which of them are independent.
 
-Unknowns are changes of loads and efforts, then accelerations and multipliers of what closes loops.
-Those of one `group` move the same part of the scene: all that stands on the ground by one hinge, or
-one hinge that closes a loop.  Where no load and no row feels two groups at once, the tree answers
-one unknown of each in the same pass, so that the number of passes does not grow with that of the
-loops that stand side by side; the matrix that is left has a band (E. Cuthill, J. McKee, Proc. 24th
-ACM National Conference (1969) 157-172; A. R. Curtis, M. J. D. Powell, J. K. Reid, J. Inst. Math.
-Appl. 13 (1974) 117-119).  Where there are couplings, there is one group.
+The elimination of a tangent along the tree does not contain them.  Unknowns are changes of loads
+and efforts, then accelerations and multipliers of closing hinges.  Those of one `group` move the
+same part of the scene: a branch on the ground, or one hinge that closes a loop.  If no load and no
+row depends on two groups at once, the tree is solved for one unknown of each in the same pass.  The
+number of passes then does not grow with the number of independent loops, and the remaining matrix
+is banded (E. Cuthill, J. McKee, Proc. 24th ACM National Conference (1969) 157-172; A. R. Curtis,
+M. J. D. Powell, J. K. Reid, J. Inst. Math. Appl. 13 (1974) 117-119).  With couplings there is one
+group.
 """
 
 from __future__ import annotations
@@ -29,11 +29,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Across:
-    """`bodies`, `efforts` (place in the workspace, speed) and `rows` (frame, direction, speed, row)
-    make the unknowns, 6 of each body first.  By group: the `members`, the `readers` among the
-    unknowns, and the speeds that are `moved`; `passes` are those that are answered together.
-    `ranks` (count,) are the places of unknowns in the matrix, which is filled so far `below` and
-    `above` its diagonal."""
+    """Unknowns outside the tree, their groups and passes.
+
+    The unknowns are 6 of each of `bodies`, then `efforts` (index in the workspace, speed) and
+    `rows` (frame, direction, speed, row).  By group: the `members`, the `readers` (unknowns that
+    depend on the group), and the speeds that are `moved`; `passes` are the unknowns solved
+    together.  `ranks` (count,) are the positions of the unknowns in the matrix, which has `below`
+    and `above` diagonals below and above the main one.
+    """
 
     bodies: Sequence[int]
     efforts: Sequence[tuple[int, int]]
@@ -48,16 +51,16 @@ class Across:
 
     @property
     def count(self) -> int:
-        """How many unknowns there are."""
+        """Number of unknowns."""
         return 6 * len(self.bodies) + len(self.efforts) + len(self.rows)
 
     @property
     def width(self) -> int:
-        """Numbers of a row of the factored matrix, with those that exchanged rows fill."""
+        """Numbers in a row of the factored matrix, including the fill by row exchanges."""
         return min(self.count, 2 * self.below + self.above + 1)
 
     def written(self, engine: Engine) -> list[Any]:
-        """The record of it for C, followed by what keeps it."""
+        """C record of the unknowns, followed by the memory that it refers to."""
         ffi, blocks = engine.ffi, engine.packed.written.blocks
         record = ffi.new("mstmm_couplings *")
         kept = [record]
@@ -94,7 +97,7 @@ def _firsts(lists: Sequence[Sequence[int]]) -> list[int]:
 
 
 def across_of(engine: Engine) -> Across:
-    """What reaches across the tree of a packed scene."""
+    """Find the unknowns outside the tree of a packed scene."""
     packed = engine.packed
     reach, loops = packed.written.reach, packed.written.loops
     efforts, rows = list(_efforts(engine)), _rows_of_loops(engine)
@@ -124,7 +127,7 @@ def across_of(engine: Engine) -> Across:
 
 
 def at_once(bodies: Sequence[int], efforts: Any, rows: Any, nu: int) -> Across:
-    """All unknowns in one group, so that each has a pass and the matrix is full."""
+    """Put all unknowns in one group: each has its own pass, and the matrix is full."""
     count = 6 * len(bodies) + len(efforts) + len(rows)
     alone, last = [range(count)], max(count - 1, 0)
     return Across(bodies, efforts, rows, alone, alone, [range(nu)], [[k] for k in range(count)],
@@ -137,7 +140,10 @@ def _apart(
     feeling: Sequence[set[int]],
     speeds: dict[int, list[int]],
 ) -> Across:
-    """Groups, passes and places of unknowns: what each moves, and all that each feels."""
+    """Find groups, passes and positions of unknowns.
+
+    `moving` is the group that each unknown moves, `feeling` the groups on which it depends.
+    """
     names = _in_order(sorted(set(moving)), {frozenset(one) for one in feeling})
     members, readers = {name: list[int]() for name in names}, {name: list[int]() for name in names}
     for k, (name, felt) in enumerate(zip(moving, feeling, strict=True)):
@@ -160,7 +166,7 @@ def _apart(
 
 
 def _in_order(names: list[int], together: set[frozenset[int]]) -> list[int]:
-    """Groups in an order in which those that are felt together stand near each other."""
+    """Order groups so that those on which the same unknown depends are near each other."""
     near = {name: {name} for name in names}
     for felt in together:
         for name in felt & near.keys():
@@ -176,7 +182,7 @@ def _in_order(names: list[int], together: set[frozenset[int]]) -> list[int]:
 
 
 def _outwards(start: int, near: Mapping[int, set[int]]) -> list[int]:
-    """Groups that hang together with one, the nearest first, those with few neighbours before."""
+    """Groups connected with one, the nearest first, among these those with few neighbours."""
     found, seen = [start], {start}
     for name in found:
         found += sorted(near[name] - seen, key=lambda other: (len(near[other]), other))
@@ -187,7 +193,7 @@ def _outwards(start: int, near: Mapping[int, set[int]]) -> list[int]:
 def _passes(
     members: dict[int, list[int]], readers: dict[int, list[int]], feeling: Sequence[set[int]]
 ) -> list[list[int]]:
-    """Unknowns that are answered together, where nothing feels two of them."""
+    """Unknowns that are solved together because nothing depends on two of them."""
     found, taken = list[list[int]](), {name: set[int]() for name in members}
     for name, own in members.items():
         felt_with = set[int]().union(*(feeling[k] for k in readers[name])) & members.keys()
@@ -204,7 +210,7 @@ def _passes(
 
 
 def _branches(system: System) -> list[int]:
-    """Of each body the first on its way from the ground that a load can move."""
+    """First movable body on the path from the ground to each body, or GROUND."""
     found = list[int]()
     stiff = system.rows(lambda one: not one.nu and one.modal is None and one.section is None)
     for place, parent in enumerate(system.parents.tolist()):
@@ -214,7 +220,7 @@ def _branches(system: System) -> list[int]:
 
 
 def _speeds(system: System, group: Mapping[int, int]) -> dict[int, list[int]]:
-    """The speeds by group, of which every body has one."""
+    """Speeds by group; every body belongs to one."""
     found, first = dict[int, list[int]](), system.places["u"].tolist()
     of_hinges = system.rows(lambda one: one.nu).tolist()
     bent = system.rows(lambda one: one.modal is not None)
@@ -227,8 +233,10 @@ def _speeds(system: System, group: Mapping[int, int]) -> dict[int, list[int]]:
 
 
 def _efforts(engine: Engine) -> Iterator[tuple[int, int]]:
-    """(place in the workspace, speed) of efforts that expressions of the state and couplings give,
-    these for hinges of the tree."""
+    """Efforts by expressions of the state, and by couplings on hinges of the tree.
+
+    Yields (index in the workspace, speed).
+    """
     packed, lib, model = engine.packed, engine.lib, engine.packed.model
     values = packed.scratch + engine.nq + engine.nu
     for value, speed in packed.written.reach.efforts:
@@ -244,9 +252,11 @@ def _efforts(engine: Engine) -> Iterator[tuple[int, int]]:
 
 
 def _rows_of_loops(engine: Engine) -> list[tuple[int, int, int, int]]:
-    """(frame, direction, speed, row) of what hinges that close loops leave unknown: accelerations
-    of their speeds, and multipliers of their rows; -1 for the other of the two, and for the frame
-    of a coupling."""
+    """Unknowns (frame, direction, speed, row) of closing hinges and couplings.
+
+    These are accelerations of their speeds, with row -1, and multipliers of their rows, with speed
+    -1; the frame of a coupling is -1.
+    """
     packed, loops = engine.packed, engine.packed.written.loops
     found = list[tuple[int, int, int, int]]()
     if loops is None:

@@ -1,4 +1,4 @@
-"""Calls into the looped engine: numpy in, numpy out, failures as sentences naming the element."""
+"""Calls of the looped engine with numpy arrays; messages of failures name the element."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .failures import failure_text
 
 @dataclass(frozen=True)
 class Probe:
-    """A point with axes: body in the topology (-1 ground), axes (9), offset (3), internal axes."""
+    """Point with axes: body in the topology (-1: ground), axes (9), offset (3), internal axes."""
 
     body: int
     axes: tuple[float, ...]
@@ -27,7 +27,7 @@ class Probe:
 
 @dataclass(frozen=True)
 class Observation:
-    """What a batch of n states shows; inertial axes.
+    """Observed quantities of a batch of n states, in inertial axes.
 
     points: (n, probes, 24): position, velocity, acceleration, angular velocity, angular
     acceleration, rotation matrix (row by row).  loads: (n, bodies, 6) force and moment of each
@@ -45,18 +45,18 @@ class Observation:
     failures: tuple[str, ...] = ()
 
 
-#: The arrays of an Observation.
+#: Names of the arrays of an Observation.
 PARTS = ("points", "loads", "efforts", "udot", "sums", "rows")
 
 
 class Calls:
-    """The compiled engine on one packed scene.  Safe to call from several threads."""
+    """Calls of the compiled engine on one packed scene.  Safe to call from several threads."""
 
     def __init__(self, packed: Packed) -> None:
         self.packed = packed
         self.ffi, self.lib = packed.ffi, packed.lib
         self.nq, self.nu = packed.layout.nq, packed.layout.nu
-        #: What each thread keeps for itself.
+        #: Data of each thread.
         self.local = threading.local()
 
     def workspace(self) -> Any:
@@ -69,7 +69,7 @@ class Calls:
         return self.local.pointer
 
     def workspace_array(self) -> Array:
-        """The numbers this thread's last call left in its workspace, a view."""
+        """View of this thread's workspace, as its last call left it."""
         self.workspace()
         return np.asarray(self.local.array)
 
@@ -78,7 +78,7 @@ class Calls:
         return self.ffi.from_buffer("real[]", array)
 
     def start_memory(self) -> Array:
-        """Memory at the start: nothing released, no turns counted, inputs held where they begin."""
+        """Initial memory: no releases, no turns counted, held inputs at their initial values."""
         system = self.packed.system
         memory = np.zeros(max(1, system.n_memory))
         memory[system.held.first : system.n_memory] = system.held.start
@@ -86,17 +86,17 @@ class Calls:
 
     @cached_property
     def inertia_alone(self) -> Self:
-        """The same tree without gravity, laws, drives and loads."""
+        """Calls on the same tree without gravity, laws, drives and loads."""
         return self._pulled((0.0, 0.0, 0.0))
 
     @cached_property
     def weighed(self) -> Self:
-        """The same tree under its gravity, without laws, drives and loads."""
+        """Calls on the same tree with its gravity, without laws, drives and loads."""
         return self._pulled(tuple(self.packed.model.gravity))
 
     @cached_property
     def pulled(self) -> tuple[Self, ...]:
-        """The same under a gravity of 1 m/s^2 along each inertial axis."""
+        """Calls as `weighed` with a gravity of 1 m/s^2 along each inertial axis."""
         return tuple(self._pulled(tuple(row)) for row in np.eye(3).tolist())
 
     def _pulled(self, gravity: tuple[float, ...]) -> Self:
@@ -109,7 +109,7 @@ class Calls:
         return type(self)(replace(self.packed, model=model))
 
     def probes(self, probes: Sequence[Probe]) -> Any:
-        """`mstmm_probe[]`."""
+        """C array `mstmm_probe[]` of probes."""
         records = self.ffi.new("mstmm_probe[]", max(1, len(probes)))
         for record, probe in zip(records, probes, strict=False):
             record.body = probe.body
@@ -126,10 +126,10 @@ class Calls:
         probes: Sequence[Probe] = (),
         parts: Collection[str] = PARTS,
     ) -> Observation:
-        """What `parts` name of n states.
+        """Compute the arrays named in `parts` for n states.
 
-        A state that cannot be evaluated gives nan in its row; `failures` has a sentence for the
-        first of each kind.  Arrays that are not asked for have no columns.
+        A state that cannot be evaluated gives nan in its row; `failures` has a message for the
+        first of each kind.  Arrays that are not requested have no columns.
         """
         n, place = len(t), {name: i for i, name in enumerate(PARTS)}
         bodies, numbers = self.packed.topology.count, int(self.lib.MSTMM_PROBE_NUMBERS)
@@ -167,7 +167,7 @@ class Calls:
         )
 
     def sums(self, t: float, q: Array, u: Array, memory: Array) -> tuple[Array, str]:
-        """`sums` of one state (nq,), (nu,), nan where it cannot be evaluated, and why not."""
+        """Compute `sums` of one state (nq,), (nu,): nan, and the reason, if that fails."""
         found = np.full(int(self.lib.MSTMM_SUM_NUMBERS), np.nan)
         wanted, failure = self.ffi.new("mstmm_observation *"), self.ffi.new("mstmm_failure *")
         wanted.sums = self.pointer(found)
@@ -179,32 +179,32 @@ class Calls:
     # --- words ----------------------------------------------------------------------------------
 
     def hinge_name(self, position: int) -> str:
-        """Name of the inboard hinge of the body at this place of the topology."""
+        """Name of the inboard hinge of the body at a place of the topology."""
         packed = self.packed
         return packed.scene.hinges.name(packed.topology.at(position)[1])
 
     def closing(self, position: int) -> str:
-        """What closes a loop by the frame at this place of the topology, for a message."""
+        """Name for messages of the element that closes a loop with the frame at a place."""
         name, _, table = self.hinge_name(position).partition("/")
         return f'{table or "hinge"} "{name}"'
 
     def is_flexible(self, position: int) -> bool:
-        """Whether the body at this place of the topology belongs to a flexible one."""
+        """True if the body at a place of the topology is a node of a flexible body."""
         expanded = self.packed.expanded
         return expanded is not None and expanded.is_node(self.body_name(position))
 
     def body_name(self, position: int) -> str:
-        """Name of the body at this place of the topology."""
+        """Name of the body at a place of the topology."""
         packed = self.packed
         return packed.scene.bodies.name(packed.topology.at(position)[0])
 
     def failure_text(self, failure: Any, t: float) -> str:
-        """A failure of the engine as a sentence: element, cause, time, one way out."""
+        """Message for a failure of the engine: element, time, cause, remedy."""
         reason, element, code = int(failure.reason), int(failure.element), int(failure.code)
         return failure_text(self, reason, element, code, t)
 
 
 def _first(texts: list[str]) -> str:
-    """The first of equal failures, with how many follow."""
+    """First of equal failures, with the number of the others."""
     more = len(texts) - 1
-    return texts[0] + (f" ({more} more samples alike)" if more else "")
+    return texts[0] + (f" (and {more} more samples)" if more else "")

@@ -1,4 +1,4 @@
-"""What a model knows of the fused code of its scene; how it is made is not this room's affair."""
+"""Interface to the fused code of a scene; other packages generate and compile it."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ if TYPE_CHECKING:
 
 
 class Fusing(Protocol):
-    """Fused libraries of a scene: `library` for one state, `lanes` for several side by side,
-    `implicit` for what implicit methods ask, `inverse` for inverse dynamics and the mass matrix, as
-    far as they are there.
+    """Fused libraries of a scene, None for those not available.
 
-    `numbers` is the vector p they read, `inputs` where inputs stand in it; `note` says where the
-    library came from, `obstacle` why there can be none.  `ready(n)` gives a library if it is there
-    or if n evaluations are worth a compiler run; `find()` only looks; `build()` raises
-    EnvironmentFailure where there can be none; `follow(other)` takes over the libraries of the same
-    scene with other numbers, `under(system)` is the same of a system that differs in its inputs.
-    `symbolic` is a linear model as formulas.
+    `library` is for one state, `lanes` for several states in SIMD lanes, `implicit` for residuals
+    and tangents of implicit methods, `inverse` for inverse dynamics and the mass matrix.
+
+    `numbers` is the parameter vector p that they read, `inputs` the positions of inputs in it;
+    `note` says where the library came from, `obstacle` why there can be none.  `ready(n)` returns a
+    library if it exists or if n evaluations justify a compiler run; `find()` never compiles;
+    `build()` raises EnvironmentFailure if no library is possible.  `follow(other)` adopts the
+    libraries of the same scene with other numbers; `under(system)` is the code for a system with
+    other inputs.  `symbolic` is a linear model as formulas.
     """
 
     numbers: Array
@@ -64,9 +65,9 @@ class Fusing(Protocol):
 
 @dataclass
 class NotFused:
-    """A scene that runs on the looped engine alone."""
+    """Placeholder for scenes that only the looped engine evaluates."""
 
-    obstacle: str = "this model was made without the means to compile fused code"
+    obstacle: str = "this model was created without support for fused code"
     library: FusedLibrary | None = None
     lanes: FusedLibrary | None = None
     implicit: FusedLibrary | None = None

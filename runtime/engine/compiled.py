@@ -1,4 +1,4 @@
-"""Compiled: a scene packed for the engines, which runs, results and models are made from."""
+"""Compiled scene: packed for the engines, the basis of runs, results and models."""
 
 from __future__ import annotations
 
@@ -28,19 +28,18 @@ from .renewed import with_values
 from .sizes import speed_sizes
 from .slopes import Slopes
 
-#: What a scene is compiled with: fused code, accuracy of the plain product, the sweep, and what may
-#: be simplified.
+#: Options of a compilation: fused code, accuracy of the plain product, sweep, simplifications.
 Asked = tuple[Callable[[Packed, Known], Fusing] | None, float | None, str, Words]
 
 
 class Compiled:
-    """A scene ready for evaluation.
+    """Scene that is ready for evaluation.
 
     Attributes:
-        scene: as it was given.
+        scene: the given scene.
         known: elements that are not prebuilt, by (kind, name).
-        looped: the looped engine on the packed scene.
-        fusion: what is known of the fused code of the scene.
+        looped: looped engine on the packed scene.
+        fusion: fused code of the scene.
         closed: its closed loops, assembled; None for a tree.
         sweep: "riccati", "refined" or "qr".
     """
@@ -76,7 +75,7 @@ class Compiled:
         self.fusion: Fusing = fusing(self.packed, self.known) if fusing else NotFused()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled are the scene and what was asked; compiled code is looked for again."""
+        """Pickle the scene and the options; compiled code is looked for again when unpickled."""
         return _again, (type(self), self.scene, self._asked, self.fusion.library is not None)
 
     @property
@@ -85,8 +84,7 @@ class Compiled:
 
     @cached_property
     def apart(self) -> Engine:
-        """The looped engine with every body by itself: for what is asked of a body or a hinge that
-        is part of another one."""
+        """Looped engine without merged bodies, for quantities of merged bodies or hinges."""
         packed = unmerged(self.packed)
         if packed is self.packed:
             return self.looped
@@ -95,22 +93,22 @@ class Compiled:
 
     @property
     def simplifications(self) -> tuple[Simplification, ...]:
-        """What is packed otherwise than the scene says it, without changing what it does."""
+        """Simplifications of the packed scene, which do not change its motion."""
         return self.packed.simplified
 
     @property
     def packed(self) -> Packed:
-        """The numbers of the scene in internal frames."""
+        """Packed scene: its numbers in internal frames."""
         return self.looped.packed
 
     @property
     def engine(self) -> str:
-        """The engine in use: "fused" or "looped"."""
+        """Engine in use: "fused" or "looped"."""
         return "looped" if self.fusion.library is None else "fused"
 
     @property
     def engine_choice(self) -> str:
-        """The engine in use and why, in words."""
+        """Engine in use, with the reason."""
         f = self.fusion
         if f.library is not None:
             return f"fused: {f.note}"
@@ -120,17 +118,17 @@ class Compiled:
 
     @property
     def layout(self) -> Layout:
-        """Places of hinges in q and u."""
+        """Layout of hinges and modes in q and u."""
         return self.packed.layout
 
     @property
     def flexible(self) -> Mapping[str, ModalBody]:
-        """Numbers of the flexible bodies by their names: modes, moments, stiffness, ports."""
+        """Data of the flexible bodies by name: modes, moments, stiffness, interface nodes."""
         return self.packed.flexible
 
     @cached_property
     def free_speeds(self) -> tuple[int, ...]:
-        """Places in u of the speeds that no drive imposes."""
+        """Indices in u of the speeds that no drive prescribes."""
         free = list[int]()
         for number, hinge in enumerate(self.packed.scene.hinges):
             slots = self.layout.slots(number)
@@ -143,8 +141,10 @@ class Compiled:
 
     @cached_property
     def increments(self) -> tuple[tuple[str, str], ...]:
-        """Name and unit of the tangent increment of every free speed: of the coordinate where its
-        rate is the speed."""
+        """Name and unit of the tangent increment of every free speed.
+
+        They are those of the coordinate if its rate is the speed.
+        """
         found = list[tuple[str, str]]()
         for speed in self.free_speeds:
             slots = self.layout.hinge_of_speed(speed)
@@ -158,14 +158,14 @@ class Compiled:
 
     @cached_property
     def freedom(self) -> Freedom | None:
-        """The motions that closed loops leave; None for a tree."""
+        """Independent speeds of closed loops; None for a tree."""
         if self.closed is None:
             return None
         return Freedom(self.looped, self.free_speeds, speed_sizes(self), self.closed)
 
     @cached_property
     def slopes(self) -> Slopes:
-        """The scene about its states, by code of its own."""
+        """Linearisation of the scene by its fused code."""
         return Slopes(self.looped, self.fusion, self.free_speeds)
 
     @property
@@ -178,27 +178,27 @@ class Compiled:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Every number of the scene that has a name, such as "rod1.mass"."""
+        """Values of all parameters of the scene by name, such as "rod1.mass"."""
         return named_parameters.read(self.scene)
 
     def with_parameters(self, changes: Mapping[str, float]) -> Self:
-        """The same scene with other numbers.
+        """Copy of this model with other parameter values.
 
-        Nothing is compiled again, but where the model is fused and a number that was exactly zero
-        (or an axis along a coordinate axis) changes; then other code is compiled or found.
+        Nothing is recompiled, unless the model is fused and a number that was exactly zero (or an
+        axis along a coordinate axis) changes; then other code is compiled or found in the cache.
 
-        Raises SceneError for an unknown name (the nearest one is suggested) or an impossible value.
+        Raises SceneError for an unknown name (the nearest one is suggested) or an invalid value.
         """
         return self._with(named_parameters.changed(self.scene, changes))
 
     def with_inputs(self, inputs: Mapping[str, GivenInput]) -> Self:
-        """The same scene with other inputs, by their names; nothing is compiled again.
+        """Copy of this model with other inputs, by name; nothing is recompiled.
 
-        An input is given as a number, as the name of a signal of the scene, as (times, values)
-        between which it goes on lines (s; each time after the one before), or as the keys of a
-        [[signal]] that it follows: {"times": ..., "values": ..., "interpolation": "cubic"}.
+        An input is given as a number, as the name of a signal of the scene, as (times, values) with
+        linear interpolation (s; times increase), or as the keys of a [[signal]] that it follows:
+        {"times": ..., "values": ..., "interpolation": "cubic"}.
 
-        Raises SceneError for an unknown name (the nearest one is suggested) or an impossible value.
+        Raises SceneError for an unknown name (the nearest one is suggested) or an invalid value.
         """
         values = at_once(self.scene, inputs)
         if values is not None:
@@ -206,8 +206,10 @@ class Compiled:
         return self._with(with_inputs(self.scene, inputs))
 
     def renewed(self, packed: Packed) -> Self:
-        """The same of its packed scene under other inputs, which fits the compiled code that there
-        is; nothing is validated."""
+        """Copy of this model with the packed scene under other inputs, without validation.
+
+        The packed scene must fit the existing compiled code.
+        """
         known = {
             name: value for name, value in vars(self).items()
             if not isinstance(getattr(type(self), name, None), cached_property)
@@ -218,7 +220,7 @@ class Compiled:
         return found
 
     def _with(self, scene: Scene) -> Self:
-        """What was asked of this scene, of the same one with other numbers."""
+        """Compile the same scene with other numbers, with the same options."""
         changed = type(self)(scene, self.known, *self._asked)
         changed.fusion.follow(self.fusion)
         return changed
@@ -230,7 +232,7 @@ def _again(
     asked: Asked,
     fused: bool,
 ) -> Compiled:
-    """What was pickled; with the fused code that it had where that is in the cache here."""
+    """Restore a pickled model, with its fused code if that is in the cache here."""
     known, definitions = store.known(store.needed(scene))
     scene.check_types(definitions)
     made = kind(scene, known, *asked)

@@ -1,5 +1,4 @@
-"""Which expression of a scene, or quaternion, makes the motion at a state no number, or its
-tangent."""
+"""Find the expression or quaternion that makes a state's motion or tangent not finite."""
 
 from __future__ import annotations
 
@@ -22,26 +21,26 @@ if TYPE_CHECKING:
     from mstmm.scene import Constraint, Hinge, Scene
     from mstmm.scene.tables.loads import Spring
 
-#: A motion has come to the end of a curve where it is this near, in parts of 1 or of s.
+#: Distance from the end of a curve, relative to 1 or to s, at which a motion has reached it.
 _BESIDE = 1e-6
 
-#: What the messages that name an expression end with.
+#: End of the messages that name an expression.
 REMEDY = "keep it finite where the motion goes"
 
 
 def culprit(engine: Calls, t: float, q: Array, u: Array) -> str:
-    """'load "wind": force[1] = "sqrt(1-t)" is nan at t = 1.1 s'; empty if there is none.
+    """Message that names an expression that is not finite at one state q (nq,), u (nu,), or "".
 
-    q (nq,) and u (nu,) of one state.  A quaternion without length is named as well; an expression
-    that the engine does not evaluate is not.
+    Example: 'load "wind": force[1] = "sqrt(1-t)" is nan at t = 1.1 s'.  A quaternion of zero length
+    is named too; expressions that the engine does not evaluate are ignored.
     """
     evaluated = engine.packed.model
     scene, layout = engine.packed.described, engine.packed.layout
     for first in layout.quaternions:
         if not np.linalg.norm(q[first : first + 4]) > 0:
             return (
-                f"the quaternion that begins with {layout.q_name(int(first))} has no length at "
-                f"t = {t:.9g} s; no rotation is 1, 0, 0, 0"
+                f"the quaternion that begins with {layout.q_name(int(first))} has zero length at "
+                f"t = {t:.9g} s; the identity rotation is 1, 0, 0, 0"
             )
     for where, drive in _drives(scene) if evaluated.n_drives else ():
         moves = motion_at(drive, t, scene.channels)
@@ -56,24 +55,29 @@ def culprit(engine: Calls, t: float, q: Array, u: Array) -> str:
 
 
 def steep(engine: Calls, t: float, q: Array, u: Array) -> str:
-    """'hinge "pin": law.effort[0] = "sqrt(q)" has no finite slope along q at t = 0 s'; empty if
-    every slope that implicit methods ask for at a state is a number."""
+    """Message that names an expression with a derivative that is not finite at a state, or "".
+
+    Example: 'hinge "pin": law.effort[0] = "sqrt(q)" has no finite slope along q at t = 0 s'.  Only
+    derivatives that implicit methods need are tested.
+    """
     for where, expression, values in _with_values(engine, t, q, u):
         for name, slope in slopes(expression, values).items():
             moves = name.text == "t" or name.quantity in ("q", "u")
             if moves and not math.isfinite(slope):
                 return (
                     f"{_equation(where, expression)} has no finite slope along {name.text} at "
-                    f"t = {t:.9g} s, which implicit methods ask for; make it smooth there, such as "
-                    "sqrt(abs(u) + 1e-6) for sqrt(abs(u)), or take an explicit method such as "
+                    f"t = {t:.9g} s, which implicit methods need; make it smooth there, such as "
+                    "sqrt(abs(u) + 1e-6) for sqrt(abs(u)), or use an explicit method such as "
                     "dop853"
                 )
     return ""
 
 
 def ended(engine: Calls, t: float, q: Array, u: Array, ahead: float) -> str:
-    """'constraint "wire": curve[1] = "sqrt(1-s)" ends at s = 1, ...' where a curve ends on the way
-    within `ahead` (s) of a state, or next to it; empty where none does."""
+    """Message that names a curve that ends next to a state or within `ahead` (s) of it, or "".
+
+    Example: 'constraint "wire": curve[1] = "sqrt(1-s)" ends at s = 1, ...'.
+    """
     seen = _State(engine, t, q, u)
     for constraint in engine.packed.described.constraint if engine.packed.system.closes else ():
         for k, entry in enumerate(constraint.curve or ()):
@@ -83,7 +87,7 @@ def ended(engine: Calls, t: float, q: Array, u: Array, ahead: float) -> str:
                 where = _equation(f'constraint "{constraint.name}": curve[{k}]', entry)
                 return (
                     f"{where} ends at s = {end:.9g}, which the motion reaches near t = {t:.9g} s; "
-                    f"{REMEDY}, or stop the run before by an [[event]]"
+                    f"{REMEDY}, or stop the run before that by an [[event]]"
                 )
     return ""
 
@@ -93,7 +97,7 @@ def _along(entry: Expression, s: float) -> float:
 
 
 def _end(value: Callable[[float], float], s: float, rate: float, ahead: float) -> float | None:
-    """The last s next to `s`, or within `ahead` (s) at a rate, at which a value is a number."""
+    """Last s next to `s`, or within `ahead` seconds at a rate, at which a value is finite."""
     if not math.isfinite(value(s)):
         return None
     rate = rate if math.isfinite(rate) else 0.0
@@ -136,7 +140,7 @@ def _drives(scene: Scene) -> Iterator[tuple[str, Expression]]:
 
 
 def _efforts(scene: Scene) -> Iterator[tuple[str, Expression, Hinge | None]]:
-    """Place, expression and own hinge of whatever is no constant; those of springs not."""
+    """Location, expression and hinge of every variable effort and load; without springs."""
     for hinge in scene.hinge:
         yield from _of_hinge(f'hinge "{hinge.name}"', hinge)
     for first, chain in zip(scene.hinges.starts, scene.chain, strict=False):
@@ -160,8 +164,10 @@ def _of_hinge(where: str, hinge: Hinge) -> Iterator[tuple[str, Expression, Hinge
 def _with_values(
     engine: Calls, t: float, q: Array, u: Array
 ) -> Iterator[tuple[str, Expression, Callable[[Name], float]]]:
-    """Place and expression of every effort, load, coupling and curve that the engine evaluates and
-    that is no constant, and what its names stand for at a state."""
+    """Variable efforts, loads, couplings and curves that the engine evaluates.
+
+    Yields location, expression and the function that gives the values of its names at a state.
+    """
     evaluated, scene = engine.packed.model, engine.packed.described
     seen = _State(engine, t, q, u)
     for where, expression, own in _efforts(scene) if evaluated.n_values else ():
@@ -184,13 +190,13 @@ def _with_values(
 
 
 class _State:
-    """The numbers that names of expressions stand for at one state."""
+    """Values of the names in expressions at one state."""
 
     def __init__(self, engine: Calls, t: float, q: Array, u: Array) -> None:
         self.engine, self.t, self.q, self.u = engine, t, q, u
 
     def of(self, name: Name, own: Hinge | None) -> float:
-        """t, inputs, q and u of hinges, the own ones, parameters of the own hinge."""
+        """Value of t, an input, q or u of a hinge, or a parameter of the hinge `own`."""
         if name.text == "t":
             return self.t
         inputs = self.engine.packed.channels
@@ -206,32 +212,32 @@ class _State:
         return float(values[first + index])
 
     def of_coupling(self, name: Name) -> float:
-        """The coordinate or speed that a name in a coupling means."""
+        """Coordinate or speed to which a name in a coupling refers."""
         scene = self.engine.packed.described
         number, quantity, entry = coordinate(scene, name)
         slots = self.engine.packed.layout.hinges[scene.hinges.name(number)]
         return float(self.q[slots.q + entry] if quantity == "q" else self.u[slots.u + entry])
 
     def of_curve(self, _: Name, own: Constraint) -> float:
-        """How far along its curve a constraint is: s, the one name in it."""
+        """Curve parameter s of a constraint, the only name in its expressions."""
         return self.along(f"{own.name}.s")
 
     def along(self, name: str) -> float:
-        """s of a constraint, or its rate."""
+        """Curve parameter s of a constraint, or its rate, by name."""
         layout = self.engine.packed.layout
         if name in (names := layout.q_names):
             return float(self.q[names.index(name)])
         return float(self.u[layout.u_names.index(name)])
 
     def of_spring(self, name: Name, own: Spring) -> float:
-        """The same, where q and u alone are the spring's length and its rate."""
+        """Value of a name in a spring's law, where q and u are its length and its rate."""
         if name.text not in ("q", "u"):
             return self.of(name, None)
         length, rate = self._length(own)
         return length if name.text == "q" else rate
 
     def _length(self, spring: Spring) -> tuple[float, float]:
-        """Length in m and its rate in m/s; nan where the ends coincide."""
+        """Length of a spring, m, and its rate, m/s, which is nan if the ends coincide."""
         bare, probes = self.engine.inertia_alone, []
         for reference in (spring.from_, spring.to):
             body, axes, offset = self.engine.packed.end(reference)

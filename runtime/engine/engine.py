@@ -1,4 +1,4 @@
-"""The looped engine: accelerations, inverse dynamics and mass matrix of a packed scene."""
+"""Looped engine: accelerations, inverse dynamics and mass matrix of a packed scene."""
 
 from __future__ import annotations
 
@@ -16,13 +16,12 @@ from .culprit import culprit
 
 
 class Engine(Calls):
-    """The compiled engine on one packed scene; its errors name the expression or element behind
-    them."""
+    """Looped engine on one packed scene; its errors name the causing expression or element."""
 
     def accelerations(
         self, t: ArrayLike, q: Array, u: Array, memory: Array, efforts: Array | None = None
     ) -> tuple[Array, Array]:
-        """(qdot, udot) of n states: q (n, nq), u (n, nu), memory (n, m), efforts (n, nu)."""
+        """Compute qdot, udot of n states: q (n, nq), u (n, nu), memory (n, m), efforts (n, nu)."""
         n = len(q)
         times = np.empty(n)
         times[:] = t
@@ -44,7 +43,7 @@ class Engine(Calls):
         return qdot, udot
 
     def failed(self, failure: Any, t: float, q: Array, u: Array) -> NumericalFailure:
-        """The error of a state that cannot be evaluated: an expression's, else the element's."""
+        """Error for a state that cannot be evaluated; it names an expression, else the element."""
         cause = culprit(self, t, q, u)
         if cause:
             return NumericalFailure(cause)
@@ -54,12 +53,12 @@ class Engine(Calls):
         return NumericalFailure(text)
 
     def not_finite(self, what: str, t: float, q: Array, u: Array) -> NumericalFailure:
-        """The error of a state at which `what` is no number; names the expression behind it."""
+        """Error for a state at which `what` is not finite; it names the causing expression."""
         cause = culprit(self, t, q, u)
         return NumericalFailure(f"{what} is not finite at t = {t:.9g} s{cause and ': '}{cause}")
 
     def inverse_dynamics(self, t: float, q: Array, u: Array, udot: Array, memory: Array) -> Array:
-        """Efforts (nu,) of one state that `udot` needs beyond the laws' own."""
+        """Efforts (nu,) that `udot` needs at one state in addition to those of laws."""
         efforts = np.empty(self.nu)
         failure = self.ffi.new("mstmm_failure *")
         code = self.lib.mstmm_inverse_dynamics(
@@ -74,7 +73,7 @@ class Engine(Calls):
         return efforts
 
     def required_by_inertia(self, q: Array, accelerations: Array) -> Array:
-        """M(q) times n rows of accelerations (n, nu), all speeds as if free; O(bodies) each."""
+        """Product of M(q) and n rows of accelerations (n, nu), all speeds free; O(bodies) each."""
         engine, still = self.inertia_alone, np.zeros(self.nu)
         memory = engine.start_memory()
         strained = engine.inverse_dynamics(0.0, q, still, still, memory)
@@ -85,8 +84,11 @@ class Engine(Calls):
         return np.reshape(rows, (len(rows), self.nu))
 
     def kinetic_energies(self, q: Array, speeds: Array) -> Array:
-        """(n, bodies) in J by place in the topology, rotors with the hinge's outboard, at q (nq,)
-        and n speeds (n, nu), O(bodies) each; drives are left out."""
+        """Kinetic energies (n, bodies), J, at q (nq,) and n speeds (n, nu), O(bodies) each.
+
+        By place in the topology; rotors count with the outboard body of their hinge, drives are
+        ignored.
+        """
         engine, n, still = self.inertia_alone, len(speeds), np.zeros(self.nu)
         energies = np.empty((n, self.packed.topology.count))
         failure = self.ffi.new("mstmm_failure *")
@@ -101,7 +103,7 @@ class Engine(Calls):
         return energies
 
     def mass_matrix(self, q: Array) -> Array:
-        """(nu, nu) symmetric, of one state; driven coordinates as if free."""
+        """Symmetric mass matrix (nu, nu) of one state, with driven coordinates as if free."""
         if self.packed.layout.modal:
             matrix = self.required_by_inertia(q, np.eye(self.nu)).T
             return np.asarray((matrix + matrix.T) / 2)
@@ -116,15 +118,16 @@ class Engine(Calls):
         return found
 
     def solve(self, q: Array, columns: Array, memory: Array | None = None) -> Array:
-        """M(q)^-1 times n columns of efforts (n, nu), on the speeds that nobody imposes; zero on
-        the others.  q (nq,) of one state; S is factored once, each column is O(bodies); of least
-        squares, refined and with closed loops no factor is kept, and each column is a sweep at rest
-        with its efforts.
-        Without `memory` nothing is released."""
+        """Product of M(q)^-1 and n columns of efforts (n, nu) at one state q (nq,).
+
+        It is zero on prescribed speeds.  The mass matrix is factored once, and each column is
+        O(bodies); with sweeps "qr" and "refined" and with closed loops no factor is kept, and each
+        column is a sweep at rest with its efforts.  Without `memory` no hinge is released.
+        """
         engine = self.inertia_alone
         memory = engine.start_memory() if memory is None else memory
         if self.packed.qr or self.packed.refined or self.packed.system.closes:
-            # Couplings whose values go by time move without efforts, which the last column has not.
+            # Couplings that depend on time move without efforts: the last column subtracts this.
             columns = np.vstack([columns, np.zeros(self.nu)])
             n, still = len(columns), np.zeros(columns.shape)
             many = np.tile(q, (n, 1)), still, np.tile(memory, (n, 1))
@@ -140,11 +143,11 @@ class Engine(Calls):
             raise engine.failed(failure, 0.0, q, np.zeros(self.nu))
         if not np.isfinite(answers).all():
             name = self.packed.layout.u_name(int(np.nonzero(~np.isfinite(answers))[1][0]))
-            raise engine.not_finite(f"the answer of {name}", 0.0, q, np.zeros(self.nu))
+            raise engine.not_finite(f"the solution for {name}", 0.0, q, np.zeros(self.nu))
         return answers
 
     def rates(self, t: float, q: Array, u: Array, memory: Array) -> Array:
-        """qdot (nq,) of one state: kinematics alone, so that no inertia has to be positive."""
+        """Rates qdot (nq,) of one state, by kinematics only: no inertia need be positive."""
         self.inverse_dynamics(t, q, u, np.zeros(self.nu), memory)
         model = self.packed.model
         first = int(model.scratch) + self.nq + self.nu + int(model.n_values)

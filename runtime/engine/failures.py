@@ -1,4 +1,4 @@
-"""Failures of the engine as sentences: element, cause, time, one way out."""
+"""Messages for failures of the engine: element, time, cause, remedy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..pack.packed import Packed
 
 
 class Naming(Protocol):
-    """An engine that knows what stands at a place of the topology."""
+    """Engine that names the elements at a place of the topology."""
 
     packed: Packed
 
@@ -25,7 +25,7 @@ class Naming(Protocol):
 
 
 def failure_text(engine: Naming, reason: int, element: int, code: int, t: float) -> str:
-    """The sentence of `element`, failed by `reason` at t; `code` is what its kernel says."""
+    """Message for `element`, which failed for `reason` at t (s); `code` is that of its kernel."""
     sentence = _SENTENCES.get(reason, _expression)
     return sentence(engine, element, f"at t = {t:.9g} s", code)
 
@@ -36,7 +36,7 @@ def _undetermined(engine: Naming, element: int, at: str, code: int) -> str:
         body = engine.body_name(element).split("/")[0]
         return (
             f'hinge "{hinge}" {at}: what it moves has no positive inertia left: the shapes of the '
-            f'flexible body "{body}" carry it all, or its deflection is beyond the stiffened '
+            f'flexible body "{body}" take all of it, or its deflection is beyond the stiffened '
             'model; use fewer shapes, frame = "chord" or "mean", quadrature = true, or split it '
             "into welded beams"
         )
@@ -44,7 +44,7 @@ def _undetermined(engine: Naming, element: int, at: str, code: int) -> str:
         f'hinge "{hinge}" {at}: a motion of it is undetermined, because what it carries has no '
         "positive inertia in that direction (a thin rod on a ball, a point mass, collinear axes, "
         "three angles at their lock, a negative principal moment); give the body inertia, give the "
-        "hinge rotor inertia (law.inertia), fix that motion, or take a ball hinge for three angles"
+        "hinge rotor inertia (law.inertia), fix that motion, or use a ball hinge for three angles"
     )
 
 
@@ -52,12 +52,12 @@ def _force(engine: Naming, element: int, at: str, code: int) -> str:
     one = engine.packed.scene.forces[element]
     if isinstance(one, Bushing):
         return (
-            f'bushing "{one.name}" {at}: its ends are turned by more than 170 degrees from rest, '
-            "beyond its law; make it stiffer, or put a hinge with a law in its place"
+            f'bushing "{one.name}" {at}: its ends are rotated by more than 170 degrees from rest, '
+            "beyond its law; make it stiffer, or replace it by a hinge with a law"
         )
     return (
         f'spring "{one.name}" {at}: its direction is undefined because its ends coincide; move one '
-        "of them, or put an elastic hinge or a bushing in its place"
+        "of them, or replace it by an elastic hinge or a bushing"
     )
 
 
@@ -69,7 +69,7 @@ def _hinge(engine: Naming, element: int, at: str, code: int) -> str:
     name = engine.hinge_name(element)
     if name.endswith(OF_CONSTRAINT):
         curve = name.removesuffix(OF_CONSTRAINT)
-        return f'constraint "{curve}" {at}: its curve, or a slope of it, is no number there'
+        return f'constraint "{curve}" {at}: its curve, or a slope of it, is not finite there'
     return f'hinge "{name}" {at}: its definition fails in this state'
 
 
@@ -83,7 +83,7 @@ def _product_pivot(engine: Naming, element: int, at: str, code: int) -> str:
 def _product_error(engine: Naming, element: int, at: str, code: int) -> str:
     return (
         f"the product of transfer matrices {at}: its deviation from the Riccati sweep exceeds the "
-        "accuracy asked for (errors grow geometrically along the chain); "
+        "requested accuracy (errors grow geometrically along the chain); "
         'use sweep = "riccati"'
     )
 
@@ -105,16 +105,16 @@ def _modes(engine: Naming, element: int, at: str, code: int) -> str:
 
 def _tangent(engine: Naming, element: int, at: str, code: int) -> str:
     name = engine.hinge_name(element) if element >= 0 else ""
-    what = f'hinge "{name}"' if name else "what acts between bodies"
+    what = f'hinge "{name}"' if name else "force elements between bodies"
     if code == NEGATIVE:
         return (
-            f"{what} {at}: a motion leaves by itself faster than the step allows (a negative "
-            "stiffness, a body that topples or buckles, inertia that vanishes); take a shorter "
+            f"{what} {at}: an unstable motion grows faster than the step allows (a negative "
+            "stiffness, a body that topples or buckles, inertia that vanishes); use a shorter "
             "step, or give the motion inertia (law.inertia) or a spring"
         )
     return (
-        f"{what} {at}: the equations of an implicit step leave a motion undetermined: no inertia, "
-        "stiffness or damping holds it, or a negative stiffness cancels them; take a shorter step, "
+        f"{what} {at}: the equations of an implicit step leave a motion undetermined: it has no "
+        "inertia, stiffness or damping, or a negative stiffness cancels them; use a shorter step, "
         "or give the motion inertia (law.inertia) or a spring"
     )
 
@@ -122,15 +122,15 @@ def _tangent(engine: Naming, element: int, at: str, code: int) -> str:
 def _controller(engine: Naming, element: int, at: str, code: int) -> str:
     name = engine.packed.described.controller[element].name
     return (
-        f'controller "{name}" {at}: what it measures or gives is not finite; see whether the '
-        "closed loop is stable, with a shorter sample_time perhaps"
+        f'controller "{name}" {at}: its measurement or output is not finite; check whether the '
+        "closed loop is stable, perhaps with a shorter sample_time"
     )
 
 
 def _loop(engine: Naming, element: int, at: str, code: int) -> str:
     way = engine.packed.behind() or (
-        "start from model.assemble(q, u), or see whether links are stretched out in line "
-        "(model.loops.singular), or a drive asks for more than the mechanism can do"
+        "start from model.assemble(q, u), or check whether links are stretched out in line "
+        "(model.loops.singular), or a drive requires a motion that the mechanism cannot make"
     )
     return (
         f"{engine.closing(element)} {at}: the loop that it closes is open, and no state near "
@@ -140,23 +140,23 @@ def _loop(engine: Naming, element: int, at: str, code: int) -> str:
 
 def _coupling(engine: Naming, element: int, at: str, code: int) -> str:
     return (
-        f'coupling "{engine.packed.system.couplings[element].name}" {at}: it does not hold, and no '
-        "state near makes it hold; see whether drives and other couplings ask for something else"
+        f'coupling "{engine.packed.system.couplings[element].name}" {at}: it is not satisfied, and '
+        "no state near satisfies it; check whether drives or other couplings contradict it"
     )
 
 
 def _flat(engine: Naming, element: int, at: str, code: int) -> str:
     return (
-        f"{engine.closing(element)} {at}: the disc lies flat on its plane and touches it in more "
-        "than a point; end the run before, by an [[event]], or start it upright"
+        f"{engine.closing(element)} {at}: the disc is flat on its plane and touches it in more "
+        "than a point; end the run before that by an [[event]], or start it upright"
     )
 
 
 def _bounce(engine: Naming, element: int, at: str, code: int) -> str:
     return (
-        f"{engine.packed.described.happening(element)} {at}: nothing can give way to its "
-        "strike, because what it strikes is driven or held; let another place bounce, or release "
-        "the hinge"
+        f"{engine.packed.described.happening(element)} {at}: no motion can respond to its "
+        "impact, because what it hits is driven or held; use another place for the bounce, or "
+        "release the hinge"
     )
 
 

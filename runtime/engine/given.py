@@ -1,4 +1,4 @@
-"""Inputs of a scene that somebody sets: to a number, or to what they are over time."""
+"""Input values set by the caller: numbers, or functions of time."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _EXPECTED = "a number, the name of a signal, (times, values) or the keys of a [[
 
 
 def at_once(scene: Scene, inputs: Mapping[str, GivenInput]) -> dict[str, float | str] | None:
-    """What inputs are given, where they are numbers or names of signals and drive nothing: then
-    nothing but their values changes.  None where the scene has to be validated afresh.
+    """Check given inputs that change only values: numbers or names of signals, without drives.
 
-    Raises SceneError for names of no input, and for what no input can be.
+    Returns them by name, or None if the scene must be validated again.  Raises SceneError for
+    unknown inputs and invalid values.
     """
     known, signals = {one.name for one in scene.input}, {one.name for one in scene.signal}
     driving = {name for one in acting(scene) if one.drive for name in one.inputs}
@@ -43,9 +43,9 @@ def at_once(scene: Scene, inputs: Mapping[str, GivenInput]) -> dict[str, float |
 
 
 def with_inputs(scene: Scene, inputs: Mapping[str, GivenInput]) -> Scene:
-    """The scene with other inputs, validated afresh: what is given over time is a signal of it.
+    """Scene with other inputs, validated again; inputs over time become signals of it.
 
-    Raises SceneError for names of no input, and for what no input can be.
+    Raises SceneError for unknown inputs and invalid values.
     """
     data = data_of(scene)
     tables = {table["name"]: table for table in data.get("input", [])}
@@ -77,8 +77,8 @@ def _refuse_controlled(name: str, scene: Scene) -> None:
 def _unknown(name: str, scene: Scene) -> SceneError:
     if any(signal.name == name for signal in scene.signal):
         return SceneError(
-            f"{_at(name)}: this is a signal of the scene; let an [[input]] follow it, with "
-            f'value = "{name}", which can be set'
+            f"{_at(name)}: this is a signal of the scene and cannot be set; add an [[input]] with "
+            f'value = "{name}" and set that'
         )
     hint = near(name, (one.name for one in scene.input))
     return SceneError(f"{_at(name)}: there is no such input in the scene{hint}")
@@ -89,7 +89,7 @@ def _at(name: str) -> str:
 
 
 def _signal(name: str, given: Any) -> dict[str, Any] | None:
-    """The table of what is given over time; None for a number or a name."""
+    """Signal table of an input over time; None for a number or a name."""
     if isinstance(given, Mapping):
         return {key: _plain(name, key, value) for key, value in given.items()}
     if not _over_time(given):
@@ -111,8 +111,10 @@ def _plain(name: str, key: str, value: Any) -> Any:
 
 
 def _free_name(scene: Scene, name: str) -> str:
-    """What the signal is called that an input follows from now on; that of such a run before is
-    replaced."""
+    """Name of the signal that an input follows from now on.
+
+    A signal of an earlier call that only this input uses is replaced.
+    """
     taken = {*scene.channels, *scene.constants}
     alone = {signal for signal, user in users(scene) if user == name}
     alone -= {signal for signal, user in users(scene) if user != name}

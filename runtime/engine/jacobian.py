@@ -1,10 +1,10 @@
 """Jacobian of the equations of motion, for implicit integrators: exact, else by differences.
 
-Exact is the fused kernel differentiated (`mstmm.ir.tangent`), run on the tape that is always there.
-Scenes without that kernel (releases change its form) or with so many bodies that writing it takes
-longer than it saves, and states in which a derivative does not exist, get central differences with
-increments that never grow: nothing can be learnt from larger ones along a coordinate that the
-equations do not contain.
+The exact Jacobian is the derivative of the fused kernel (`mstmm.ir.tangent`), run by the
+interpreter.  Central differences are used for scenes without that kernel (releases change its form)
+or with so many bodies that its generation takes longer than it saves, and for states at which a
+derivative does not exist.  Their increments never grow: larger ones give no information along a
+coordinate that the equations do not contain.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ if TYPE_CHECKING:
 
 Rates = Callable[[float, Array], Array]
 
-#: Numbers p of compiled code at a time (s) with the memory of a run.
+#: Function from a time (s) and the memory of a run to the numbers p of compiled code.
 Numbers = Callable[[float, Array], Array]
 
-#: More bodies than this are differenced: writing the tangent kernel would take many seconds.
+#: Scenes with more bodies use differences: generating the tangent kernel would take many seconds.
 MOST_BODIES = 64
 
-#: Increment of a difference, in rad, m and their rates or as part of a larger number.
+#: Increment of a difference, in rad, m and their rates, or relative to a larger number.
 _INCREMENT = 1e-6
 
 
 class Jacobian:
-    """d(dy/dt)/dy of a model's state y = (q, u) and, `with_work`, the work behind them.
+    """Jacobian d(dy/dt)/dy for the state y = (q, u), with `with_work` followed by the work.
 
-    `rates(t, y)` are the equations themselves, nan where they cannot be evaluated; `memory` (m,) is
-    read anew every time.  `exact` says which kind it is.
+    `rates(t, y)` are the equations, nan where they cannot be evaluated; `memory` (m,) is read at
+    every call.  `exact` says which kind it is.
     """
 
     def __init__(self, model: Compiled, with_work: bool, memory: Array, rates: Rates) -> None:
@@ -53,11 +53,11 @@ class Jacobian:
 
     @property
     def exact(self) -> bool:
-        """Whether the equations are differentiated; else they are differenced."""
+        """True if the equations are differentiated, False for differences."""
         return self._tape is not None
 
     def __call__(self, t: float, y: Array) -> Array:
-        """(n, n); columns along which the equations cannot be evaluated are zero."""
+        """Jacobian (n, n) at y (n,); columns that cannot be evaluated are zero."""
         if self._tape is not None:
             found = self._differentiated(self._tape, t, y)
             if np.isfinite(found).all():
@@ -76,7 +76,7 @@ class Jacobian:
         for j, unit in enumerate(units):
             directions = {PREFIX + "q": unit[:nq], PREFIX + "u": unit[nq:]}
             _, outputs = tape.run({**given, **directions})
-            given = {}  # the state stays
+            given = {}  # the kernel keeps the inputs of the state
             column = np.concatenate(
                 [outputs[PREFIX + name][:length]
                  for name, length in zip(self._outputs, (nq, nu, 1), strict=False)
@@ -95,8 +95,7 @@ class Jacobian:
 
 
 def _tape(model: Compiled, outputs: list[str]) -> tuple[TapeKernel | None, Numbers]:
-    """The tangent of the equations with respect to q and u, None where there is none; and the
-    numbers that it reads."""
+    """Tangent kernel of the equations with respect to q and u, or None, and its numbers p."""
     packed, known = model.packed, model.known or {}
     if packed.releases or packed.system.count > MOST_BODIES:
         return None, _nothing
@@ -106,7 +105,7 @@ def _tape(model: Compiled, outputs: list[str]) -> tuple[TapeKernel | None, Numbe
     except (ElementError, EnvironmentFailure):
         return None, _nothing
     kernel = kernels["accelerations"]
-    if "power" in outputs:  # of a scene without that kernel it is zero: only blows do work in it
+    if "power" in outputs:  # zero in a scene without that kernel: only impacts do work there
         kernel = kernels.get("accelerations_power", kernel)
     there = [port.name for port in kernel.outputs if port.name in outputs]
     tape = TapeKernel(tangent(kernel, ["q", "u"], there, values=False, guards=False))

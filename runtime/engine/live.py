@@ -1,4 +1,4 @@
-"""Inputs in the numbers p of compiled code: where they stand, and what they are at other times."""
+"""Inputs among the numbers p of compiled code: their positions, and their values over time."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
 Places = Sequence[tuple[int, int]]
 
-#: Place of its value among the numbers of a constant input; see `mstmm_input_now`.
+#: Index of the value among the numbers of a constant input; see `mstmm_input_now`.
 _VALUE = 1
 
 
 class LiveInputs:
-    """The numbers of a system's inputs among those that code compiled for it reads.
+    """Inputs of a system in the numbers p that its compiled code reads.
 
-    `read` are (place among the numbers of inputs, place in p).  `places` (inputs, COUNT) are the
-    latter, -1 for what is not read; `varies` says whether any of it changes with time, or is `held`
-    in memory.
+    `read` are pairs (index among the numbers of all inputs, index in p).  `places` (inputs, COUNT)
+    are the indices in p, -1 for numbers that are not read; `varies` says whether any of them
+    changes with time or is `held` in memory.
     """
 
     def __init__(self, system: System, read: Places) -> None:
@@ -43,11 +43,11 @@ class LiveInputs:
 
     @property
     def varies(self) -> bool:
-        """Whether p is not the same at all times."""
+        """True if p changes with time."""
         return bool(self._moving or self._held)
 
     def now(self, p: Array, t: float, memory: Array) -> Array:
-        """p (np,) at the time t (s) of a run, whose `memory` gives the values of held inputs."""
+        """Numbers p (np,) at time t (s) of a run, with held inputs from its `memory`."""
         numbers = self.at(p, np.array([t])).reshape(-1).copy()
         for i, place in self._held:
             there = self.places[i] >= 0
@@ -56,7 +56,7 @@ class LiveInputs:
         return numbers
 
     def at(self, p: Array, t: Array) -> Array:
-        """p (np,) at the times t (n,): (n, np); p itself where it is always the same."""
+        """Numbers p (n, np) at times t (n,), s; p itself, (np,), if it is constant."""
         if not self._moving:
             return p
         rows = np.repeat(p[None], len(t), axis=0)

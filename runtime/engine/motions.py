@@ -1,7 +1,7 @@
-"""Motions of a scene at a state: eigenvalues of the Jacobian of its right-hand side.
+"""Eigenvalues of the Jacobian of a scene's right-hand side at a state.
 
-The Jacobian is taken by central differences.  For a hinge with stiffness k, damping c and effective
-inertia mu the fastest motion is about c/mu + sqrt(k/mu).
+The Jacobian is computed by central differences.  For a hinge with stiffness k, damping c and
+effective inertia mu the largest eigenvalue is about c/mu + sqrt(k/mu).
 """
 
 from __future__ import annotations
@@ -17,27 +17,30 @@ from .engine import Engine
 
 Complex = NDArray[np.complex128]
 
-#: States with more components than this get their fastest motion from a Krylov method.
+#: For states with more components only the fastest motion is computed, by a Krylov method.
 DENSE = 160
 
 
 def fastest(engine: Engine, t: float, y: Array, memory: Array) -> tuple[complex, Complex]:
-    """(lambda, eigenvector (nq + nu)) of the fastest motion at a state that does not just grow."""
+    """Eigenvalue, 1/s, and eigenvector (nq + nu,) of the fastest motion that does not only grow."""
     values, vectors = motions(engine, t, y, memory)
     k = int(np.abs(values).argmax())
     return complex(values[k]), vectors[:, k]
 
 
 def motions(engine: Engine, t: float, y: Array, memory: Array) -> tuple[Complex, Complex]:
-    """(lambda (k,), eigenvectors (nq + nu, k)) of the motions at a state, 0 for those that just
-    grow and without what others grow; of large scenes the fastest one alone."""
+    """Eigenvalues (k,), 1/s, and eigenvectors (nq + nu, k) of the motions at a state.
+
+    Eigenvalues of monotonic growth are replaced by 0, positive real parts of the others by 0.  For
+    large scenes only the fastest motion is computed.
+    """
     n = len(y)
     sizes = np.maximum(1e-6, 1e-6 * np.abs(y))
     if n <= DENSE:
         values, vectors = np.linalg.eig(_differences(engine, t, y, memory, np.diag(sizes)) / sizes)
     else:
         values, vectors = _krylov(engine, t, y, memory)
-    grows = values.real > np.abs(values.imag)  # by itself, not by the method
+    grows = values.real > np.abs(values.imag)  # physical growth, not a stability limit of a method
     kept = np.minimum(values.real, 0.0) + 1j * values.imag
     return np.where(grows, 0.0, kept).astype(np.complex128), vectors
 
@@ -56,7 +59,7 @@ def _rates(engine: Engine, t: float, states: Array, memory: Array) -> Array:
 
 
 def _krylov(engine: Engine, t: float, y: Array, memory: Array) -> tuple[Complex, Complex]:
-    """The fastest motion alone, from products of the Jacobian with vectors."""
+    """Fastest motion only, from products of the Jacobian with vectors."""
     from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
     n, rest = len(y), _rates(engine, t, y[None], memory)[0]
@@ -64,7 +67,7 @@ def _krylov(engine: Engine, t: float, y: Array, memory: Array) -> tuple[Complex,
     def product(vector: Any) -> Array:
         size = float(np.linalg.norm(vector)) or 1.0
         move = 1e-6 * np.sqrt(n) * np.asarray(vector, dtype=float).reshape(1, n) / size
-        change = _rates(engine, t, y + move, memory)[0] - rest  # a hundredth is all that is asked
+        change = _rates(engine, t, y + move, memory)[0] - rest  # 1 per cent accuracy is sufficient
         return np.asarray(change * size / (1e-6 * np.sqrt(n)))
 
     operator = LinearOperator((n, n), matvec=product, dtype=np.float64)
@@ -76,6 +79,6 @@ def _krylov(engine: Engine, t: float, y: Array, memory: Array) -> tuple[Complex,
         )
     except ArpackNoConvergence as error:
         values, vectors = error.eigenvalues, error.eigenvectors
-    except ArpackError:  # a motion without any rate: nothing that a step could be too long for
+    except ArpackError:  # all rates are zero: no step is too long
         return nothing
     return (values, vectors) if len(values) else nothing

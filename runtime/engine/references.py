@@ -1,4 +1,4 @@
-"""Bodies and ends of a scene by the names that results and measurements have for them."""
+"""Names of the bodies and ends of a scene in results and measurements."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ from mstmm.scene.tables.body import BodyTable
 
 
 class References(Collection[str]):
-    """Every body and every end of the scene: "rod1", "rod1.tip".
+    """Collection of the names of all bodies and ends of a scene: "rod1", "rod1.tip".
 
-    `scene` is the skeleton: flexible bodies count as bodies with ends like all others.
+    `scene` is the skeleton, in which flexible bodies are bodies with ends like all others.
     """
 
     def __init__(self, scene: SceneTables) -> None:
         self.scene, self.bodies = scene, scene.bodies
 
     def canonical(self, reference: str) -> str | None:
-        """The reference as the scene has it: with the number of a chain's member, and for what has
-        this name elsewhere; None if there is no such end."""
+        """Name of a reference in the scene, or None if there is no such body or end.
+
+        Members of chains get their index; synonyms of other programs are resolved.
+        """
         return self._known(reference) or self._known(self.scene.names.reference(reference))
 
     def _known(self, reference: str) -> str | None:
@@ -35,7 +37,7 @@ class References(Collection[str]):
         return self.bodies.name(number) + (f".{at}" if at else "")
 
     def place(self, reference: str) -> str:
-        """`canonical`, or the ground; SceneError for what there is not."""
+        """Canonical name of a reference, or the ground; SceneError for an unknown one."""
         found = self.canonical(reference)
         if found is not None:
             return found
@@ -44,7 +46,7 @@ class References(Collection[str]):
         raise SceneError(self.unknown(reference))
 
     def unknown(self, reference: str) -> str:
-        """That there is no such body or end, and what is near."""
+        """Message that there is no such body or end, with the nearest name."""
         body = split(reference)[0]
         if self.bodies.of_chain(body) and self.bodies.find(body) is None:
             return f'"{reference}": {self.bodies.missing(body)}'

@@ -1,4 +1,4 @@
-"""A packed scene under other inputs: its records of inputs are written anew, and nothing else."""
+"""Packed scenes with other inputs: only the records of inputs are written again."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from ..pack.system import Held, System
 
 
 def with_values(packed: Packed, values: Mapping[str, float | str]) -> Packed:
-    """The same with inputs at other numbers, or following other signals of the scene; none of them
-    drives anything."""
+    """Packed scene with other numbers or signals for inputs that no drive uses."""
     expanded = packed.expanded
     described = expanded.described.with_inputs(values)
     alone = expanded.scene is expanded.described
@@ -30,8 +29,10 @@ def with_values(packed: Packed, values: Mapping[str, float | str]) -> Packed:
 
 
 def with_held(packed: Packed, names: Sequence[str], t: float) -> Packed:
-    """The same with inputs in memory, behind what is there, beginning with what they are at t (s):
-    whoever makes a run may set them between its steps."""
+    """Packed scene with the named inputs in memory, so that a run's caller can set them.
+
+    They are appended to the memory with their values at t (s) and may be set between steps.
+    """
     system, places = packed.system, list(packed.system.held.places)
     start = [packed.described.channels[name].value(t) for name in names]
     for k, name in enumerate(names):
@@ -44,8 +45,10 @@ def with_held(packed: Packed, names: Sequence[str], t: float) -> Packed:
 
 
 def with_pieces(packed: Packed, named: Mapping[str, Pieces]) -> Packed:
-    """The same with some inputs as these over time; none of them drives anything.  The scene does
-    not know of it."""
+    """Packed scene with given functions of time for some inputs that no drive uses.
+
+    The scene itself is not changed.
+    """
     channels = packed.channels | dict(named)
     system = replace(
         packed.system, inputs=tuple(channels.values()), by_time=by_time(packed.scene, channels)
@@ -54,7 +57,7 @@ def with_pieces(packed: Packed, named: Mapping[str, Pieces]) -> Packed:
 
 
 def _rewritten(packed: Packed, system: System) -> Packed:
-    slopes, memory = packed.slopes(), Memory(packed.ffi)  # made once, for the records are shared
+    slopes, memory = packed.slopes(), Memory(packed.ffi)  # computed once: the records are shared
     model = memory.new("mstmm_model *", packed.model[0])
     model.n_memory = system.n_memory
     model.inputs = write_inputs(system.inputs, system.held.places, memory)

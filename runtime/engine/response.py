@@ -1,8 +1,9 @@
-"""Amplitudes of a packed scene under harmonic pushes, by the looped engine in O(bodies).
+"""Harmonic response of a packed scene, by the looped engine in O(bodies).
 
 Z(s) x = r with Z(s) = s^2 M + s C + K, the tangent of the residual in complex numbers
-(derive/print/complex.py): what bodies bring is put together once, every s is one elimination.
-Losses of elastic parts are i (K' - K) besides, K' that of a scene with so much more stiffness.
+(derive/print/complex.py).  The contributions of the bodies are computed once, and every s is one
+elimination.  Hysteretic damping adds i (K' - K), with K' of a scene whose stiffness is larger by
+the loss factors.
 """
 
 from __future__ import annotations
@@ -25,10 +26,10 @@ Complex = NDArray[np.complex128]
 
 
 class Exact(NamedTuple):
-    """Flexible bodies by their dynamic stiffness, at these places of the tree.
+    """Flexible bodies with dynamic stiffness, at these places of the tree.
 
-    `stiffness` gives at s (k,) for each of them in turn the loads (k, 6 + n, 6 + n) on the frame,
-    told by three rotations and three displacements, and on the n shapes.
+    `stiffness` gives at s (k,) for each of them in turn the matrix (k, 6 + n, 6 + n) of loads on
+    the frame, for three rotations and three displacements, and on the n shapes.
     """
 
     places: tuple[int, ...]
@@ -36,11 +37,11 @@ class Exact(NamedTuple):
 
 
 class Response:
-    """Z(s) of one scene about one state; each thread needs its own.
+    """Dynamic stiffness Z(s) of one scene about one state; each thread needs its own.
 
-    `lanes` is how many s go at a time, 2 or 4; 0 for as many as the processor takes.  `stiffer` is
-    the scene with more elastic stiffness by what it loses; `exact` are bodies by their
-    dynamic stiffness.
+    `lanes` is the number of s evaluated together, 2 or 4; 0 for the most that the processor
+    supports.  `stiffer` is the scene with elastic stiffness increased by the loss factors; `exact`
+    are bodies with dynamic stiffness.
     """
 
     def __init__(
@@ -78,11 +79,11 @@ class Response:
             record.n_exact = len(self._order)
 
     def amplitudes(self, s: Complex, columns: Array) -> tuple[Complex, Array, NDArray[np.int32]]:
-        """x (k, n, nu) at every s (k,) in 1/s of n right-hand sides (n, nu), by how much the
-        elimination made inertia larger (k,), and the body where (k,).
+        """Amplitudes x (k, n, nu) at every s (k,), 1/s, for n right-hand sides (n, nu).
 
-        An elimination loses as many digits as inertia grows; where it is singular the growth is
-        infinite, and x is zero.
+        Also returns the growth of inertia in the elimination (k,), and the body where it occurred
+        (k,).  An elimination loses as many digits as inertia grows; if it is singular, the growth
+        is infinite and x is zero.
         """
         points, rows = np.ascontiguousarray(s), np.ascontiguousarray(columns, float)
         x = np.zeros((len(points), len(rows), self.engine.nu), dtype=np.complex128)
@@ -108,12 +109,14 @@ class Response:
         return found
 
     def undamped(self) -> None:
-        """From now on nothing goes by the first power of s."""
+        """Remove the terms in the first power of s from now on."""
         self._kept["brought"][: len(self.tangent.numbers)] = 0.0
 
     def count_negative(self, squares: Array) -> Integers:
-        """How many pivots are negative at every s^2 (k,) < 0 of a symmetric Z: as many as
-        eigenvalues (see `Tangent.count_negative`); -1 where a pivot is zero."""
+        """Number of negative pivots at every s^2 (k,) < 0 of a symmetric Z; -1 for a zero pivot.
+
+        It is the number of negative eigenvalues (see `Tangent.count_negative`).
+        """
         sizes = self._sizes
         pivots = np.zeros((len(squares), int(np.square(sizes).sum())))
         record, points = self._record, np.sqrt(squares.astype(np.complex128))
@@ -126,12 +129,12 @@ class Response:
 
     @cached_property
     def _sizes(self) -> Integers:
-        """Sizes of the pivots one after the other."""
+        """Sizes of the successive pivots."""
         return self.tangent.pivots()[0]
 
 
 def _aligned(count: int) -> Array:
-    """So many zeros that begin where 64 divides the address."""
+    """Array of zeros whose address is a multiple of 64."""
     room = np.zeros(count + 8)
     first = -(room.ctypes.data // 8) % 8
     return room[first : first + count]

@@ -1,4 +1,4 @@
-"""What is shown of a state, by name: the columns of an observation, their units and labels."""
+"""Columns of an observation by the names of quantities, with units and labels."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Kind:
-    """A vector quantity of a body or hinge: unit, long name, columns, short names of those."""
+    """Vector quantity of a body or hinge: unit, long name, labels and short names of columns."""
 
     unit: str
     long_name: str
@@ -71,5 +71,5 @@ def acceleration_name(speed: str) -> str:
 
 
 def rate_unit(unit: str) -> str:
-    """Unit of the time derivative: m/s -> m/s2."""
+    """Unit of the time derivative of a quantity: m/s -> m/s2."""
     return f"{unit}2" if unit.endswith("/s") else f"{unit or '1'}/s"

@@ -1,4 +1,4 @@
-"""Motions of order one, by coordinate: what a step in it is small or large beside."""
+"""Characteristic scale of each coordinate, relative to which changes are small or large."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from ..flexible.modal_body import ModalBody
 from ..flexible.sizes import modal_sizes, radius_of_gyration
 from ..pack.layout import Layout
 
-#: Distances in a scene that are rounding of none: in parts of the radii of gyration, and in m where
+#: Distances in a scene that are rounding of zero: relative to the radii of gyration, and in m if
 #: all masses are points.
 _NO_LENGTH, _NO_METRES = 1e-3, 1e-5
 
 
 class Sized(Protocol):
-    """What has sizes: a compiled scene."""
+    """Compiled scene, as far as characteristic scales need it."""
 
     @property
     def scene(self) -> Scene: ...
@@ -33,7 +33,7 @@ class Sized(Protocol):
 
 
 def speed_sizes(model: Sized) -> Array:
-    """(nu,) of every speed: 1 rad, a length of the scene in m, the size of a modal coordinate."""
+    """Characteristic scales (nu,): 1 rad, a length of the scene, m, or that of a mode."""
     layout, sizes = model.layout, np.ones(model.nu)
     length = scene_length(model)
     for slots in layout.hinges.values():
@@ -45,9 +45,9 @@ def speed_sizes(model: Sized) -> Array:
 
 
 def scene_length(model: Sized) -> float:
-    """The largest distance within a body or from one hinge to the next, m.
+    """Largest distance within a body or between successive hinges, m.
 
-    Where all are zero, or rounding of zero beside the radii of gyration, it is 1.
+    It is 1 if all are zero, or rounding of zero compared with the radii of gyration.
     """
     scene = model.scene
     places = [hinge.position for hinge in scene.hinge]

@@ -1,4 +1,4 @@
-"""A scene about its states, by code compiled for it: accelerations and linear equations at once."""
+"""Linearisation of a scene at its states by fused code, together with accelerations."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ from .code import Fusing
 from .engine import Engine
 from .live import LiveInputs
 
-#: Seconds that a compiler takes, by the square of the speeds, and that its code saves a state, by
-#: the same; measured.  Only their ratio matters; fixed, so that the choice is always the same.
+#: Time of a compilation, s, per squared number of speeds, and time that its code saves per state,
+#: constant and per squared number of speeds; measured.  Only their ratio matters; the values are
+#: fixed for reproducible choices.
 _SECONDS_PER_PAIR = 0.035
 _SAVED, _SAVED_PER_PAIR = 2e-5, 4e-7
 
 
 class About:
-    """What is known of one state: n of nu speeds are imposed by nobody.
+    """Accelerations and linear model at one state; n of nu speeds are free.
 
-    `a` (nu,) accelerations; M, C, K (n, n) as of `linear.matrices`; G (n, n) of x' = G x + du; r_t
-    (n,) what the efforts change by with time; views of `numbers`.
+    `a` (nu,) accelerations; M, C, K (n, n) as in `linear.matrices`; G (n, n) of x' = G x + du; r_t
+    (n,) partial derivative of efforts with respect to time; all are views of `numbers`.
     """
 
     __slots__ = ("_n", "_nu", "numbers")
@@ -62,8 +63,10 @@ class About:
 
 
 class Slopes:
-    """What `About` tells of any state of one scene, by code that is looked for at first, and
-    compiled once so many states pay.  Safe to call from several threads."""
+    """Source of `About` for the states of one scene.  Safe to call from several threads.
+
+    Its code is looked for at the first call, and compiled once enough states justify it.
+    """
 
     def __init__(self, engine: Engine, fusion: Fusing, free: Sequence[int]) -> None:
         self._engine, self._fusion, self._n = engine, fusion, len(free)
@@ -72,19 +75,24 @@ class Slopes:
         self._looked, self._saved = False, 0.0
 
     def at(self, t: float, q: Array, u: Array) -> About | None:
-        """One state, q (nq,) and u (nu,), contiguous; None where there is no code or a guard fails:
-        the looped engine serves, and names what is wrong."""
+        """Evaluate one state, q (nq,) and u (nu,), contiguous.
+
+        None if there is no code or a guard fails: then use the looped engine, which names the
+        cause.
+        """
         call = self.call()
         return None if call is None else call.at(t, q, u)
 
     def state_matrix(self, about: About, turning: bool) -> Array | None:
-        """A (2 n, 2 n) of d/dt (x, x') = A (x, x'), x' = du or, `turning`, G x + du; None where M
-        is not positive definite."""
+        """State matrix A (2 n, 2 n) of d/dt (x, x') = A (x, x').
+
+        x' = du or, with `turning`, G x + du.  None if M is not positive definite.
+        """
         call = self.call(0.0)
         return None if call is None else call.state_matrix(about, turning)
 
     def call(self, saved: float = 1.0) -> Call | None:
-        """This thread's call, where there is code; `saved` counts what it saves, in states."""
+        """Call of this thread, None without code; `saved` is the saved work in states."""
         if self._library is None and not self._expect(saved):
             return None
         try:
@@ -94,7 +102,7 @@ class Slopes:
         return found
 
     def _expect(self, saved: float) -> bool:
-        """Whether there is code by now."""
+        """Count the saved work and get the code; True if there is code."""
         if not self._n:
             return False
         with self._lock:
@@ -104,7 +112,7 @@ class Slopes:
             if self._library is None and (pays or not self._looked):
                 self._looked = True
                 self._library = self._fusion.ready_linear(pays)
-                if pays:  # it cannot be: another try would be no better
+                if pays:  # compile only once: a second attempt would give the same result
                     self._saved = -np.inf
             return self._library is not None
 
@@ -115,7 +123,7 @@ class Slopes:
 
 
 class Call:
-    """One thread's record of the code, with what it reads."""
+    """C record of the code for one thread, with the memory that it reads."""
 
     def __init__(
         self, engine: Engine, library: FusedLibrary, numbers: Array, live: LiveInputs, n: int
@@ -136,8 +144,11 @@ class Call:
         self.derivatives = self._prepared(engine, self._numbers)
 
     def _prepared(self, engine: Engine, numbers: int) -> Prepared:
-        """A call on t, q (nq,) and u (nu,) of a scene without drives: udot, its slopes -M^-1 K,
-        -M^-1 C, M^-1 and -M^-1 r_t, G, and 1."""
+        """Prepared call on t, q (nq,) and u (nu,) of a scene without drives.
+
+        It returns udot, its derivatives -M^-1 K, -M^-1 C, M^-1 and -M^-1 r_t, then G and the
+        identity matrix.
+        """
         n, record = self._n, engine.ffi.new("mstmm_linear_alone *")
         record.code, record.efforts = self._record[0], self._no_efforts
         record.found = found = engine.pointer(np.empty(numbers))
@@ -147,7 +158,7 @@ class Call:
         )  # fmt: skip
 
     def at(self, t: float, q: Array, u: Array) -> About | None:
-        """See `Slopes.at`."""
+        """Evaluate one state, see `Slopes.at`."""
         buffer, real = self._ffi.from_buffer, self._real
         found = np.empty(self._numbers)
         failed = self._lib.mstmm_linear_at(
@@ -159,8 +170,10 @@ class Call:
     def with_slopes(
         self, t: float, q: Array, u: Array, efforts: Array | None = None
     ) -> tuple[About, Array] | None:
-        """The same, and of the accelerations -M^-1 K, -M^-1 C, M^-1 and -M^-1 r_t beside one
-        another (n, 3 n + 1)."""
+        """Evaluate one state with the derivatives (n, 3 n + 1) of the accelerations.
+
+        Their columns are those of -M^-1 K, -M^-1 C, M^-1 and -M^-1 r_t.
+        """
         buffer, real, n = self._ffi.from_buffer, self._real, self._n
         found, slopes = np.empty(self._numbers), np.empty((n, 3 * n + 1))
         given = self._no_efforts if efforts is None else buffer(real, efforts)
@@ -171,7 +184,7 @@ class Call:
         return None if failed else (About(found, self._nu, n), slopes)
 
     def state_matrix(self, about: About, turning: bool) -> Array | None:
-        """See `Slopes.state_matrix`."""
+        """State matrix, see `Slopes.state_matrix`."""
         n, buffer, real = self._n, self._ffi.from_buffer, self._real
         found = np.empty((2 * n, 2 * n))
         numbers = buffer(real, about.numbers)

@@ -1,4 +1,4 @@
-"""M^-1 times columns: by the looped engine, or by code compiled for the scene where that pays."""
+"""Solutions with the mass matrix, M^-1 times columns, by the looped engine or compiled code."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from .engine import Engine
 if TYPE_CHECKING:
     from ..kernels.columns import ColumnsLibrary
 
-#: Seconds that a compiler takes, by speeds, and that its code saves a state and a number of the
-#: right-hand sides; measured.  Only ratios matter; fixed, so that the choice is always the same.
+#: Time of a compilation, s, constant and per squared number of speeds, and time that its code saves
+#: per state and per number of the right-hand sides; measured.  Only ratios matter; the values are
+#: fixed for reproducible choices.
 _SECONDS, _SECONDS_PER_PAIR = 0.2, 0.005
 _SAVED_PER_STATE, _SAVED_PER_NUMBER = 1e-5, 3e-8
 
 
 class Solver:
-    """Solutions of one scene.  Safe to call from several threads."""
+    """Solver with the mass matrix of one scene.  Safe to call from several threads."""
 
     def __init__(self, engine: Engine, fusion: Fusing) -> None:
         self._engine, self._fusion = engine, fusion
@@ -34,9 +35,9 @@ class Solver:
         self._obstacle = ""
 
     def solve(self, q: Array, columns: Array) -> Array:
-        """Answers (n, k, nu) to columns (n, k, nu) of n states q (n, nq).
+        """Solutions (n, k, nu) for columns (n, k, nu) at n states q (n, nq).
 
-        Raises NumericalFailure naming a motion that no inertia determines.
+        Raises NumericalFailure that names a motion without inertia.
         """
         if not columns.size:
             return columns.copy()
@@ -49,17 +50,17 @@ class Solver:
         return np.array(rows).reshape(columns.shape)
 
     def build(self) -> None:
-        """Compile the scene's own code now.  EnvironmentFailure if that cannot be."""
+        """Compile the code of the scene now.  EnvironmentFailure if that fails."""
         with self._lock:
             self._library = self._fusion.solution(build=True)
 
     @property
     def compiled(self) -> bool:
-        """Whether code of the scene's own is in use."""
+        """True if compiled code of the scene is in use."""
         return self._library is not None
 
     def _expect(self, states: int, numbers: int) -> ColumnsLibrary | None:
-        """The compiled code once it is there or would have saved what the compiler takes."""
+        """Compiled code if it exists or would have saved the time of its compilation."""
         with self._lock:
             self._saved += states * _SAVED_PER_STATE + numbers * _SAVED_PER_NUMBER
             worth = self._saved > _SECONDS + _SECONDS_PER_PAIR * self._engine.nu**2
@@ -72,7 +73,7 @@ class Solver:
             return self._library
 
     def _fused(self, library: ColumnsLibrary, q: Array, columns: Array) -> Array | None:
-        """None where a guard fails: the looped engine names what and where."""
+        """Solutions by compiled code; None if a guard fails: the looped engine names the cause."""
         numbers, nu = self._fusion.numbers, self._engine.nu
         still = np.zeros((1, nu))
         memory = self._engine.start_memory()[None]

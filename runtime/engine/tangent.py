@@ -1,9 +1,9 @@
-"""The residual of a packed scene and its tangent, by the looped engine in O(bodies).
+"""Residual of a packed scene and its tangent, by the looped engine in O(bodies).
 
-R(t, q, u, a) are the efforts that the accelerations a need beyond everything that acts; where
-R = 0, a are the accelerations.  Where loops are closed the loads of their multipliers act too, and
-of hinges that close them R are the accelerations that their speeds lack.  What an implicit step, an
-equilibrium or a linear model asks for is R and its tangent, eliminated from the tips to the root
+R(t, q, u, a) are the efforts that the accelerations a need in addition to all acting loads; a are
+the accelerations of the motion if R = 0.  With closed loops the loads of their multipliers act too,
+and for closing hinges R is the error of their accelerations.  Implicit steps, equilibria and linear
+models need R and its tangent, which is eliminated from the tips to the root
 (derive/equations/tangent.py).
 """
 
@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 class Tangent:
     """Residual and tangent of one scene; each thread needs its own.
 
-    Speeds that a drive or a hold imposes have no rows: entries of residuals there are zero, and so
-    are those of solutions.
+    Prescribed and held speeds have no rows: their entries in residuals and solutions are zero.
     """
 
     def __init__(self, engine: Engine, memory: Array | None = None) -> None:
@@ -52,16 +51,21 @@ class Tangent:
             setattr(record, name, engine.pointer(getattr(self, name)))
 
     def residual(self, t: float, q: Array, u: Array, a: Array | None = None) -> Array:
-        """R (nu,) at a state, to which the other calls refer from now on; without `a` with the
-        accelerations there.  Multipliers of closed loops are those of the state."""
+        """Residual R (nu,) at a state, to which the other calls refer from now on.
+
+        Without `a` the accelerations of the state are used; multipliers of closed loops are those
+        of the state.
+        """
         r, null = np.empty(self.nu), self.engine.ffi.NULL
         self.state = np.array(q, float), np.array(u, float)
         self._call("residual", float(t), q, u, null if a is None else a, r, null)
         return r
 
     def accelerations_rate(self) -> Array:
-        """Derivative (nu,) of the accelerations by the time at given coordinates and speeds, at the
-        state of a residual without `a`; a tangent is factored anew behind it."""
+        """Partial derivative (nu,) of the accelerations with respect to time.
+
+        At the state of a residual without `a`; afterwards a tangent must be factored again.
+        """
         found = np.empty(self.nu)
         self._call("accelerations_rate", found)
         return found
@@ -73,8 +77,10 @@ class Tangent:
         return found
 
     def matrices(self, t: float, q: Array, u: Array, a: Array, free: Sequence[int]) -> Array:
-        """M, C and K (3, n, n) about a state: derivatives of R by the accelerations of some speeds,
-        by these speeds, and by how coordinates follow them; the state is referred to from now on.
+        """Matrices M, C and K (3, n, n) about a state, to which other calls refer from now on.
+
+        They are the derivatives of R with respect to the accelerations of the speeds `free`, to
+        these speeds, and to the increments of coordinates along them.
         """
         n, engine = len(free), self.engine
         found, work = np.empty((3, n, n)), np.empty(2 * self.nq + 3 * self.nu)
@@ -87,19 +93,26 @@ class Tangent:
         return found
 
     def factor(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:
-        """Factor the change of R along unknowns x: du = rate x, da = s x and
-        dq = (sq - kappa g_q)^-1 N x, where N u are the rates of the coordinates and g_q their
-        slopes by the coordinates."""
+        """Factor the derivative of R along unknowns x.
+
+        du = rate x, da = s x and dq = (sq - kappa g_q)^-1 N x, where N u are the rates of the
+        coordinates and g_q their derivatives with respect to the coordinates.
+        """
         self._call("tangent_factor", float(rate), float(s), float(sq), float(kappa))
 
     def factor_laws(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:
-        """The same with inertia and the slopes of laws and modes alone, of these no more than their
-        symmetric part: cheap, and an approximation."""
+        """Factor a cheap approximation of the tangent, with arguments as in `factor`.
+
+        It contains inertia and the symmetric part of the derivatives of laws and modes only.
+        """
         self._call("laws_factor", float(rate), float(s), float(sq), float(kappa))
 
     def solve(self, r: Array, d_q: Array | None = None, d_a: Array | None = None) -> Array:
-        """x (nu,) along which, beside known changes of coordinates (nq,) and accelerations (nu,),
-        R changes by r (nu,); what is known must be zero where somebody imposes."""
+        """Solve for x (nu,) that changes R by r (nu,), with known changes in addition.
+
+        Known are changes of coordinates (nq,) and accelerations (nu,), which must be zero for
+        prescribed speeds.
+        """
         x, known, kept = np.empty(self.nu), self.engine.ffi.NULL, None
         if d_q is not None or d_a is not None:
             kept = (
@@ -111,8 +124,10 @@ class Tangent:
         return x
 
     def solve_laws(self, r: Array, d_q: Array | None = None, d_u: Array | None = None) -> Array:
-        """Changes (nu,) of accelerations by which, behind `factor_laws` and beside known changes of
-        coordinates and speeds (nu,), R changes by r (nu,)."""
+        """Changes (nu,) of accelerations that change R by r (nu,), after `factor_laws`.
+
+        Known changes of coordinates (nq,) and speeds (nu,) are added.
+        """
         found = np.empty(self.nu)
         still = np.zeros(self.nu)
         known = (still if d_q is None else d_q, still if d_u is None else d_u)
@@ -120,11 +135,11 @@ class Tangent:
         return found
 
     def count_negative(self) -> int | None:
-        """How many eigenvalues of the last factorisation of a symmetric tangent are negative: as
-        many as of all its pivots, by Sylvester's law.  None where loads reach across the tree,
-        which the pivots do not see.
+        """Number of negative eigenvalues of the last factored, symmetric tangent.
 
-        Factorisations with negative pivots are refused unless `allow_negative` is called before.
+        By Sylvester's law of inertia it is that of its pivots.  None if loads couple distant
+        bodies, which the pivots do not contain.  Factorisations with negative pivots fail unless
+        `allow_negative` was called before.
         """
         if self.coupled:
             return None
@@ -132,8 +147,11 @@ class Tangent:
         return int(count_negative(pivots[None], sizes)[0])
 
     def pivots(self) -> tuple[Integers, Array]:
-        """Sizes n (2 bodies,) of the pivots of the last factorisation, of each body those of its
-        shapes and its hinge, and their numbers (sum of n^2,), of hinges those of the inverse."""
+        """Sizes n (2 bodies,) of the pivots of the last factorisation, and their numbers.
+
+        Each body has a pivot of its shapes and one of its hinge; the numbers (sum of n^2,) of
+        hinges are those of the inverse.
+        """
         engine, find = self.engine, self.engine.lib.mstmm_tangent_pivots
         sizes = np.zeros(2 * engine.packed.system.count, dtype=np.int32)
         places = engine.ffi.from_buffer("int[]", sizes)
@@ -142,17 +160,17 @@ class Tangent:
         return sizes.astype(np.int64), pivots
 
     def allow_negative(self) -> None:
-        """From now on negative pivots are no failure: somebody counts them."""
+        """Accept negative pivots from now on, for callers that count them."""
         self.record.counts = 1
 
     def rates(self, q: Array, u: Array) -> Array:
-        """N(q) u (nq,), zero on coordinates that somebody imposes; spoils the residual's state."""
+        """Rates N(q) u (nq,), zero for prescribed coordinates; invalidates the residual's state."""
         dq = np.zeros(self.nq)
         self._call("tangent_rates", q, u, dq)
         return dq
 
     def coordinates(self, x: Array, rho: Array | None = None) -> Array:
-        """dq (nq,) of an x: sq dq = kappa g_q dq + N x + rho."""
+        """Change dq (nq,) of coordinates along x: sq dq = kappa g_q dq + N x + rho."""
         dq = np.zeros(self.nq)
         null = self.engine.ffi.NULL
         self._call("tangent_coordinates", x, null if rho is None else rho, dq)
@@ -161,7 +179,7 @@ class Tangent:
     def _call(self, name: str, *arguments: Any) -> None:
         pointer = self.engine.pointer
         missing = self.engine.packed.workspace - len(self.workspace)
-        if missing > 0:  # tapes of events were laid out since, behind what there is
+        if missing > 0:  # tapes of events have been appended since
             self.workspace = np.append(self.workspace, np.zeros(missing))
             self.record.workspace = pointer(self.workspace)
         given = [
@@ -174,7 +192,7 @@ class Tangent:
 
 
 def tangent_of(engine: Engine) -> Tangent:
-    """This thread's, with nothing released and no turns counted."""
+    """Tangent of an engine for this thread, with no releases and no turns counted."""
     kept, size = engine.local, engine.packed.workspace
     if getattr(kept, "tangent_of", None) != size:
         kept.tangent = Tangent(engine)
@@ -183,8 +201,7 @@ def tangent_of(engine: Engine) -> Tangent:
 
 
 def count_negative(pivots: Array, sizes: Integers) -> Integers:
-    """(k,) how many eigenvalues of rows of pivots (k, sum of n^2) are negative, in all; zeros count
-    as none."""
+    """Count negative eigenvalues (k,) in rows of pivots (k, sum of n^2), without zeros."""
     squares = np.square(sizes)
     firsts = np.cumsum(squares) - squares
     found = np.zeros(len(pivots), dtype=np.int64)
@@ -197,8 +214,10 @@ def count_negative(pivots: Array, sizes: Integers) -> Integers:
 
 
 def _laid(engine: Engine) -> int:
-    """How many numbers the tangent keeps.  SceneError for elements that were generated before
-    there were derivatives."""
+    """Number of values that the tangent stores.
+
+    SceneError for elements that were generated by an old version without derivatives.
+    """
     packed = engine.packed
     count = int(engine.lib.mstmm_tangent_lay(packed.model))
     if count < 0:
@@ -209,7 +228,7 @@ def _laid(engine: Engine) -> int:
         else:
             culprit = f'"{packed.scene.forces[force].name}"'
         raise SceneError(
-            f"scene: {culprit} runs by an element that was generated by an earlier mstmm, without "
-            "the derivatives that implicit methods need; generate it again: mstmm generate FILE"
+            f"scene: {culprit} uses an element that was generated by an earlier mstmm, without "
+            "the derivatives that implicit methods need; regenerate it: mstmm generate FILE"
         )
     return count

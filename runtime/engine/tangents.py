@@ -1,4 +1,4 @@
-"""Tangent kernels of one scene, on the tape that is always there or compiled where that pays."""
+"""Tangent kernels of one scene, interpreted, or compiled if that saves time."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ from .code import Fusing
 #: Inputs of the kernel "accelerations", in its order.
 INPUTS = ("p", "t", "q", "u", "memory", "efforts")
 
-#: What is differentiated by what: (input, output).
+#: Pairs (input, output): the output is differentiated with respect to the input.
 PAIRS = (
     ("u", "qdot"), ("q", "qdot"), ("q", "udot"), ("u", "udot"), ("efforts", "udot"),
     ("t", "udot"), ("p", "udot"),
 )  # fmt: skip
 
-#: Directions that are worth a compiler run.  Its time and what a direction gains both grow with the
-#: size of the kernels; measured break-even between 130 000 (7 balls) and 490 000 (24 pins).
+#: Number of directions that justifies a compilation.  Its time and the saving per direction both
+#: grow with the size of the kernels; measured break-even from 130 000 (7 balls) to 490 000 (24
+#: pins).
 WORTH_COMPILING = 300_000
 
 
@@ -48,7 +49,7 @@ class Tangents:
         self._library = self._get(build=False)
 
     def expect(self, directions: int) -> None:
-        """So many directions are to come: the compiler is started once it pays in all."""
+        """Announce a number of directions; the kernels are compiled once the total justifies it."""
         with self._lock:
             self._directions += directions
             if self._library is None and self._directions > WORTH_COMPILING:
@@ -56,7 +57,7 @@ class Tangents:
 
     @property
     def compiled(self) -> bool:
-        """Whether compiled code is in use."""
+        """True if compiled code is in use."""
         return self._library is not None
 
     def columns(
@@ -89,7 +90,7 @@ class Tangents:
             given = {name: rows[min(i, len(rows) - 1)] for name, rows in states.items()}
             for k, direction in enumerate(directions[min(i, len(directions) - 1)]):
                 _, outputs = tape.run({**given, PREFIX + port: direction})
-                given = {}  # the inputs of the state stay
+                given = {}  # the kernel keeps the inputs of the state
                 found[i, k] = outputs[PREFIX + output][:length]
         return found
 
@@ -99,7 +100,7 @@ class Tangents:
         return kernel
 
     def _kernel(self, port: str, output: str) -> KernelIR:
-        """The derivative of `output` along a direction of `port`, and nothing else."""
+        """Kernel of the derivative of `output` along a direction of `port`, without values."""
         return tangent(self._accelerations, [port], [output], values=False, guards=False)
 
     def _get(self, build: bool) -> ColumnsLibrary | None:
@@ -117,6 +118,6 @@ class Tangents:
 
 
 def _vanishes(kernel: KernelIR) -> bool:
-    """Whether everything that the kernel stores is the constant zero."""
+    """True if all results of the kernel are the constant zero."""
     stores = [s for s in kernel.statements if isinstance(s, Store)]
     return all(s.value == Constant("0") for s in stores)

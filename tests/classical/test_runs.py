@@ -158,7 +158,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "hinge": (
         {"body": [_BODY], "hinge": [_PIN | {"type": "cylindrical"}]},
-        'hinge "h".*type cylindrical.*supported are fixed, pin, ball, elastic, and free on the ground',
+        'hinge "h".*type cylindrical.*supported are fixed, pin, ball, elastic, and free on the',
     ),
     "law": (
         {"body": [_BODY], "hinge": [_PIN | {"law": {"stiffness": 5.0}}]},

@@ -109,7 +109,7 @@ def test_a_state_of_a_batch_is_named_and_keeps_what_is_known_of_its_failure() ->
 def test_a_quaternion_of_zeros_is_named() -> None:
     ball = {"name": "ball", "type": "ball", "inboard": "ground", "outboard": "rod"}
     model = mstmm.compile(mstmm.Scene(gravity=(0, 0, 0), body=[rod("rod")], hinge=[ball]))
-    words = "the quaternion that begins with ball.w has no length at t = 0 s; no rotation is 1, 0"
+    words = "that begins with ball.w has zero length at t = 0 s; the identity rotation is 1, 0"
     with pytest.raises(mstmm.NumericalFailure, match=words):
         model.accelerations(np.zeros(4), np.zeros(3))
     for method in ("dop853", "scipy-RK45"):

@@ -146,7 +146,7 @@ def test_a_model_with_inputs_can_be_pickled() -> None:
         ),
         (
             {"gust": 1.0},
-            'inputs["gust"]: this is a signal of the scene; let an [[input]] follow it',
+            'inputs["gust"]: this is a signal of the scene and cannot be set; add an [[input]]',
         ),
         ({"motor": "gist"}, 'there is no signal "gist", and no constant; did you mean "gust"'),
         ({"motor": float("nan")}, 'inputs["motor"] = nan: expected a finite number'),

@@ -100,7 +100,7 @@ def test_nothing_gives_way() -> None:
     scene["hinge"][0] |= {"drive": "t"}
     del scene["hinge"][0]["initial"]
     result = model(scene).simulate(1.0)
-    assert 'stop "rail.upper"' in result.message and "nothing can give way" in result.message
+    assert 'stop "rail.upper"' in result.message and "no motion can respond" in result.message
 
 
 @pytest.mark.parametrize(

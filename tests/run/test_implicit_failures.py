@@ -93,7 +93,7 @@ def test_a_step_longer_than_the_fall_of_a_chain_is_refused(method: str, count: i
     run = model.simulate(too_long, method, too_long)
     assert run.status is Status.TANGENT_FAILED
     assert 'hinge "hinge' in run.message and "topples or buckles" in run.message
-    assert "take a shorter step" in run.message
+    assert "use a shorter step" in run.message
     assert run.last_state[0] == 0.0
 
 
