@@ -15,6 +15,7 @@ from mstmm.risk import RUN, Risk, advice
 from ..guard.answers import find_state_risks
 from .channels import GROUND, Channel
 from .modes import modes
+from .motions import INPUT_RISKS, OUTPUT_LEFT_OUT
 from .operating_point.changes import MATRICES, find_changes
 from .operating_point.departure import LARGEST, Departure, find_departure
 from .operating_point.later import LaterStates
@@ -25,8 +26,6 @@ from .rotors.blades import find_blades
 if TYPE_CHECKING:
     from .equations import Equations
 
-#: Risks of single inputs.
-_OF_INPUTS = ("changing-input", "input-without-effect")
 #: Efforts that are rounding, in parts of those that cancel.
 _CANCELLED = 1e-11
 #: Coordinates up to which all motions are looked for.
@@ -76,12 +75,16 @@ def find_omissions(linear: Equations) -> Iterator[Risk]:
         )  # fmt: skip
 
 
-def find_response_risks(linear: Equations, pushes: Sequence[Channel]) -> Iterator[Risk]:
-    """Risks of a linear model for its steady response to some pushes, which a growing motion
-    prevents; what other inputs do is left out."""
+def find_response_risks(
+    linear: Equations, pushes: Sequence[Channel], are_outputs_chosen: bool = False
+) -> Iterator[Risk]:
+    """Risks of a linear model for its steady response to some inputs, which a growing motion
+    prevents; inputs and outputs that were not requested are left out."""
     asked = {f'input "{one.name}"' for one in pushes}
     for risk in linear.risks:
-        if risk.name not in _OF_INPUTS or risk.element in asked:
+        if risk.name in INPUT_RISKS and risk.element not in asked:
+            continue
+        if not (are_outputs_chosen and risk.name == OUTPUT_LEFT_OUT):
             yield replace(risk, doubt=True) if risk.name == "unstable" else risk
 
 

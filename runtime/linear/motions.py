@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 #: Shapes in a picture unless others are asked for.
 _PANELS = 6
+#: Names of the risks of single inputs, and of single outputs; motions have neither.
+INPUT_RISKS, OUTPUT_LEFT_OUT = ("changing-input", "input-without-effect"), "output-left-out"
+CHANNEL_RISKS = (*INPUT_RISKS, OUTPUT_LEFT_OUT)
 
 Complex = NDArray[np.complex128]
 
@@ -60,9 +63,9 @@ class Modes(Assessed):
 
     @property
     def findings(self) -> Iterator[Risk]:  # type: ignore[override]
-        """Risks of the linear model but for those of its inputs, motions that grow or are free, and
-        such beyond the shapes."""
-        yield from (risk for risk in self.linear.risks if risk.name != "changing-input")
+        """Risks of the linear model but for those of its inputs and outputs, motions that grow or
+        are free, and such beyond the shapes."""
+        yield from (risk for risk in self.linear.risks if risk.name not in CHANNEL_RISKS)
         yield from self.motion_risks()
         yield from self._range_risks()
 

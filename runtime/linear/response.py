@@ -202,7 +202,7 @@ def frequency_response(
     exact_names = () if beams is None else beams.names
 
     def find_risks() -> Iterator[Risk]:
-        yield from find_response_risks(linear, pushes)
+        yield from find_response_risks(linear, pushes, outputs is not None)
         yield from find_time_risks(linear, pushes, shown)
         yield from response_range_risks(linear.model, frequencies, exact_names)
 

@@ -335,3 +335,33 @@ def test_metres_and_radians_are_compared_by_sizes() -> None:
     assert abs(modes.shapes[1, 0] / modes.shapes[0, 0]) == pytest.approx(11.35, rel=1e-2)
     assert modes.moving(0) == ["rail.displacement", "pin.angle"]
     assert modes.moving(1) == ["pin.angle"]
+
+
+def test_findings_about_inputs_and_outputs_are_none_of_the_motions() -> None:
+    """The power of the drive has no linear form, and "brake" acts on no motion at rest."""
+    scene = mstmm.Scene(
+        gravity=[0, -9.81, 0],
+        body=[
+            {"name": "cart", "mass": 1.0, "inertia": [0.1] * 3},
+            {"name": "bob", "mass": 2.0, "center_of_mass": [0, -1.0, 0], "inertia": [0.1] * 3},
+        ],
+        hinge=[
+            {"name": "rail", "type": "prismatic", "axis": [1, 0, 0], "inboard": "ground",
+             "outboard": "cart", "drive": "0"},
+            {"name": "swing", "type": "pin", "inboard": "cart", "outboard": "bob",
+             "law": {"effort": "-brake*u"}},
+        ],
+        input=[{"name": "brake"}],
+        output=[
+            {"name": "motor", "of": "rail.effort*rail.u"},
+            {"name": "sway", "of": "2*swing.angle"},
+        ],
+    )  # fmt: skip
+    linear = mstmm.compile(scene, engine="looped").linearize()
+    concerned = {"input-without-effect", "output-left-out"}
+    assert {risk.name for risk in linear.risks} >= concerned
+    assert not concerned & {risk.name for risk in linear.modes().risks}
+    assert np.isclose(linear.modes().omega[0], np.sqrt(2 * 9.81 / 2.1))
+    for outputs, is_left_out in ((None, True), (["sway"], False)):
+        response = linear.frequency_response([1.0], ["swing.effort"], outputs)
+        assert ("output-left-out" in {risk.name for risk in response.risks}) == is_left_out

@@ -22,6 +22,7 @@ from mstmm.errors import NumericalFailure, SceneError
 from mstmm.risk import Assessed, DeferredRisks, Risk
 
 from ...engine.response import Response
+from ..motions import CHANNEL_RISKS
 from .exact import Chosen, ExactBeams, exact_beams
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def exact_modes(linear: Equations, count: int, chosen: Chosen) -> ExactModes:
     beams = exact_beams(linear, chosen, 0.0).undamped()
     counter = _Counter(beams)
     omega = counter.bisected(count)
-    others = ("shapes", "changing-input")
+    others = ("shapes", *CHANNEL_RISKS)
     shapeless = DeferredRisks(lambda: (risk for risk in linear.risks if risk.name not in others))
     return ExactModes(omega, beams.linear.coordinates, counter.shapes(omega), findings=shapeless)
 

@@ -252,7 +252,7 @@ class NonholonomicLinear(Linear):
         return FrequencyResponse(
             frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
             tuple(one.unit for one in pushes), tuple(one.unit for one in shown), values,
-            DeferredRisks(lambda: find_response_risks(self, pushes)),
+            DeferredRisks(lambda: find_response_risks(self, pushes, outputs is not None)),
         )  # fmt: skip
 
     def _solve(self, omega: float, b: Array) -> Complex:
