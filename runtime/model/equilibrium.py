@@ -70,7 +70,12 @@ def equilibrium(
         found, stability = search.find(q, tolerance, max_steps, progress)
     except Undetermined as failure:
         raise _undetermined([name(failure.problem.places[k]) for k in failure.places]) from None
-    except Unsettled as failure:
+    except NumericalFailure as failure:
+        unbalanced = search.find_unbalanced(q)
+        if unbalanced is not None:
+            raise _unbalanced(model, q, *unbalanced) from None
+        if not isinstance(failure, Unsettled):
+            raise
         efforts = _largest(model, failure)
         raise NumericalFailure(
             f"no equilibrium found near the start ({failure}); efforts left: {efforts}; give "
@@ -112,6 +117,22 @@ def _undetermined(names: list[str]) -> NumericalFailure:
     return NumericalFailure(
         f"the equilibrium is undetermined along {abbreviate(names)}: nothing pushes these "
         "coordinates back; fix them, drive them or add a stiffness"
+    )
+
+
+def _unbalanced(
+    model: Compiled, q: Array, motion: Array, loads: Array, states: int
+) -> NumericalFailure:
+    """The error for loads (nu,) that do work along a motion (nu,) which nothing resists."""
+    work = np.abs(motion * loads)
+    order = np.argsort(-work, kind="stable")
+    concerned = [int(j) for j in order if work[j] > _MOVES * work.max()]
+    named = [f"{loads[j]:.3g} along {model.layout.u_name(j)}" for j in concerned]
+    moving = abbreviate(_moving(model, q, [motion]))
+    return NumericalFailure(
+        f"no equilibrium exists: unbalanced load of {abbreviate(named)} (N or N*m); it does the "
+        f"same work along {moving} at all {states} states examined; add a stiffness or a drive "
+        "there, remove the load, or linearise about a given state, q = ..."
     )
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ from ..engine.statics.rest import Rest, Unsettled, approached, leaving
 from ..engine.statics.rest_by_sweep import RestBySweep
 from ..engine.statics.shifted_stiffness import ShiftedStiffness
 from ..engine.statics.stability import Stability, find_stability
+from ..engine.statics.unbalanced import FARTHEST, find_unbalanced_motion
 from ..engine.tangent import Tangent
 from ..pack.loops.variants import with_rotors
 from ..pack.pack import packed_system
@@ -43,6 +45,9 @@ _LEFT, _ASIDE = 20, 0.05
 #: How far beside a singular state work is looked at, in sizes, how many times further loops may
 #: lead, and along how many motions drawn.
 _NEAR, _FAR, _BESIDE = 0.02, 10.0, 6
+
+#: How far states of closed loops are at which loads are compared, in sizes.
+_FARTHEST_OF_LOOPS = 5.0
 
 #: Called with the number of every step and how long it is, in sizes of the coordinates.
 Progress = Callable[[int, float], None]
@@ -103,7 +108,7 @@ class EquilibriumSearch:
         try:
             found, moved = self._swept(self._sweeps, q, *asked)
         except NumericalFailure as failure:
-            if not self._is_small:
+            if not self._is_small or self.find_unbalanced(q) is not None:
                 raise
             try:
                 return self._find_by_differences(q, tolerance)
@@ -190,6 +195,56 @@ class EquilibriumSearch:
         self._by_differences = problem = problem.at(found)
         units = np.eye(model.nu)
         return found, Stability([units[problem.places[k]] for k in leaving(problem, found)])
+
+    def find_unbalanced(self, q: Array) -> tuple[Array, Array, int] | None:
+        """A motion (nu,) along which loads do the same work at every state drawn, the loads (nu,)
+        at q, and the number of states; None where there is no such motion."""
+        model, freedom = self._model, self._model.freedom
+        if self._is_driven or not self._is_decided:
+            return None
+        still = np.zeros(model.nu)
+        try:
+            if freedom is None:
+                problem = _problem(model, self._t, list(model.free_speeds))
+            else:
+                problem = _of_mechanism(model, freedom, q, self._t)
+            problem = replace(problem, needed=self._with_axes(problem))
+            farthest = FARTHEST if freedom is None else _FARTHEST_OF_LOOPS
+            found = find_unbalanced_motion(problem, q, farthest)
+            if found is None:
+                return None
+            motion = still.copy()
+            motion[list(problem.places)] = found[0]
+            for places, axes in self._axes_of_free_hinges(q):
+                motion[places] = axes.T @ motion[places]
+            if freedom is not None:
+                motion = freedom.following(q, problem.places) @ found[0]
+        except (NumericalFailure, SceneError):
+            return None
+        engine = model.looped
+        efforts = engine.inverse_dynamics(self._t, q, still, still, engine.start_memory())
+        return motion, -np.asarray(efforts), found[1]
+
+    def _with_axes(self, problem: Rest) -> Callable[[Array], Array]:
+        """Efforts of a problem with forces on free hinges in the axes of their inboard sides."""
+
+        def needed(q: Array) -> Array:
+            efforts = np.zeros(self._model.nu)
+            efforts[list(problem.places)] = problem.needed(q)
+            for places, axes in self._axes_of_free_hinges(q):
+                efforts[places] = axes @ efforts[places]
+            return efforts[list(problem.places)]
+
+        return needed
+
+    def _axes_of_free_hinges(self, q: Array) -> Iterator[tuple[NDArray[np.int64], Array]]:
+        """Of each free hinge of a tree the places of its velocity and its axes (3, 3) at q."""
+        model, engine, units = self._model, self._model.looped, np.eye(self._model.nu)
+        for slots in model.layout.hinges.values() if model.freedom is None else ():
+            places = np.arange(slots.nu)[:3] + slots.u_slice.start
+            if slots.nu == 6 and not slots.straight and {*places} <= {*model.free_speeds}:
+                rates = [engine.rates(self._t, q, units[j], engine.start_memory()) for j in places]
+                yield places, np.array(rates)[:, slots.q : slots.q + 3].T
 
     def residuals(self, q: Array) -> dict[str, float]:
         """Efforts that are missing at a rest, by the names of speeds."""

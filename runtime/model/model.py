@@ -163,9 +163,9 @@ class Model(Linearised, Displayed):
         is found is the rest beside them, which has to last: as long as they go on, no effort may be
         missing.  Where loads or drives change later alone, `warnings` says so.
 
-        Raises NumericalFailure naming the coordinates that nothing determines, or, with the efforts
-        that are left, if there is no equilibrium near the start, and where drives that move on do
-        not leave it at rest.
+        Raises NumericalFailure naming the coordinates that nothing determines; with the efforts
+        that are left, if there is no equilibrium near the start, or none at all; and where drives
+        that move on do not leave it at rest.
         """
         from .equilibrium import equilibrium
         from .lasting import check_lasting
