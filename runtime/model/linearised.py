@@ -97,8 +97,8 @@ class Linearised(AtStates):
         q: ArrayLike | None = None,
         t: float = 0.0,
     ) -> ExactModes:
-        """The `count` slowest undamped natural motions at rest with exact beams, all of them or
-        those named.  See `Linear.exact_modes`."""
+        """The `count` slowest undamped natural motions at rest, which exact beams hold for alone,
+        all of these or those named.  See `Linear.exact_modes`."""
         return self.linearize(q, None, t).exact_modes(count, exact)
 
     def frequency_response(
@@ -113,11 +113,12 @@ class Linearised(AtStates):
         modal: Ratios = 0.0,
         exact: Chosen = False,
         friction: Amplitudes = None,
+        u: ArrayLike | None = None,
     ) -> FrequencyResponse:
-        """Amplitudes of outputs under harmonic inputs at omega (k,) in rad/s, near rest at `q`, or
-        at the equilibrium.  See `Linear.frequency_response`, and `linearize` for `friction`;
-        without `inputs` those of the scene push, else the ground moves."""
-        return self.linearize(q, None, t, friction=friction).frequency_response(
+        """Amplitudes of outputs under harmonic inputs at omega (k,) in rad/s, near a state `q`,
+        `u` as `linearize` takes it.  See `Linear.frequency_response`, and `linearize` for
+        `friction`; without `inputs` those of the scene push, else the ground moves."""
+        return self.linearize(q, u, t, friction=friction).frequency_response(
             omega, inputs, outputs, structural=structural, modal=modal, exact=exact
         )
 
@@ -178,7 +179,7 @@ class Linearised(AtStates):
         found = [at] if points is None else some_names("points", points)
         speeds = one_row("values", values)
         return unbalance_response(
-            self._linear_at(parameter), parameter, speeds, at, unbalance, found
+            self._linear_at(parameter, inputs=()), parameter, speeds, at, unbalance, found
         )
 
     def critical(
@@ -195,7 +196,9 @@ class Linearised(AtStates):
         ends = real("stable", stable), real("unstable", unstable)
         return critical(self._linear_at(parameter, friction), parameter, *ends)
 
-    def _linear_at(self, parameter: str, friction: Amplitudes = None) -> Callable[[float], Linear]:
+    def _linear_at(
+        self, parameter: str, friction: Amplitudes = None, inputs: Sequence[str] | None = None
+    ) -> Callable[[float], Linear]:
         return lambda value: self.with_parameters({parameter: value}).linearize(
-            disturbances=(), friction=friction
+            inputs=inputs, disturbances=(), friction=friction
         )

@@ -254,3 +254,14 @@ def test_closed_loops_that_turn() -> None:
         mounted.equilibrium()
     names = {risk.name for risk in mounted.linearize().risks}
     assert {"unsteady-state", "changing-coefficients"} <= names
+
+
+def test_a_response_beside_a_motion_that_is_given() -> None:
+    """m x'' + c x' + (k - m W^2) x = F of a table that turns freely, held at W by no drive: its
+    angle answers too, by the angular momentum, m x0 = 0 at the axis."""
+    omega, model = np.array([1.0, 9.0]), turntable("")
+    found = model.frequency_response(
+        omega, ["rail.effort"], ["rail.displacement"], [0.0, 0.0], u=[SPIN, 0.0]
+    )
+    expected = 1 / (STIFF - MASS * SPIN**2 - MASS * omega**2 + 1j * omega * DAMPING)
+    np.testing.assert_allclose(found.values[:, 0, 0], expected, rtol=1e-12)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ MASS, UNBALANCE = 8.0, 3e-4
 SPINS = np.array([0.0, 20.0, 60.0, 69.0, 120.0, 400.0])
 
 
-def jeffcott(stiffness: list[list[float]], damping: list[list[float]]) -> mstmm.Model:
+def jeffcott(stiffness: list[list[float]], damping: list[list[float]], **more: Any) -> mstmm.Model:
     """A disc on a pin in a carriage without mass, which a bearing holds across the axis x."""
     light = {"mass": 1e-9, "inertia": [1e-9] * 3}
     scene = mstmm.Scene(
@@ -31,6 +32,7 @@ def jeffcott(stiffness: list[list[float]], damping: list[list[float]]) -> mstmm.
                 "outboard": "disc", "drive": "spin*t"}],
         bushing=[{"name": "film", "from": "ground", "to": "housing", "conservative": False,
                   "stiffness": stiffness, "damping": damping}],
+        **more,
     )  # fmt: skip
     return mstmm.compile(scene, engine="looped")
 
@@ -106,3 +108,17 @@ def test_refused() -> None:
         model.unbalance_response("constants.spin", [50.0], "housing", UNBALANCE)
     with pytest.raises(SceneError, match="expected a body or an end"):
         model.unbalance_response("constants.spin", [50.0], "disk", UNBALANCE)
+
+
+def test_inputs_of_the_scene_do_not_speak_against_the_whirl() -> None:
+    """A force in axes that do not turn along with the disc changes its effect there, but the
+    imbalance is no such input."""
+    held, damped = [[38400.0, 0], [0, 38400.0]], [[60.0, 0], [0, 60.0]]
+    push = {"on": "disc", "axes": "disc", "force": [0, "kick", 0]}
+    model = jeffcott(held, damped, input=[{"name": "kick"}], load=[push])
+    spun = model.with_parameters({"constants.spin": 20.0}).linearize()
+    assert any(risk.name == "changing-input" for risk in spun.risks)
+    found = model.unbalance_response("constants.spin", [20.0], "disc", UNBALANCE)
+    alone = jeffcott(held, damped).unbalance_response("constants.spin", [20.0], "disc", UNBALANCE)
+    np.testing.assert_allclose(found.amplitude, alone.amplitude, rtol=1e-9)
+    assert found.trusted and found.warnings == alone.warnings
