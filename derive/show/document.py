@@ -29,7 +29,11 @@ STATES = {
 
 @dataclass(frozen=True)
 class ElementView:
-    """One element to show.  Kernels and C are made only when a stage asks for them."""
+    """One element to show.  Kernels and C are made only when a stage asks for them.
+
+    `sources` are those of the element; of an element (`is_element`, not a step of the sweep) all
+    other sources of derivations and kernels are those of the sweep.
+    """
 
     name: str
     title: str
@@ -38,6 +42,7 @@ class ElementView:
     c_text: Callable[[], str]
     sources: tuple[str, ...] = ()
     declared: Declared = field(default_factory=Declared)
+    is_element: bool = False
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,7 @@ class Heading:
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Plain text; `kind` is "text", "note" or "sources"."""
+    """Plain text; `kind` is "text", "note", "sources", or "sweep" for sources of the sweep."""
 
     text: str
     kind: str = "text"
@@ -105,7 +110,7 @@ def document(view: ElementView, at: str, measure: Columns) -> list[Item]:
     }
     if at not in builders:
         raise ElementError(f"no stage {at!r}; there are {', '.join(STAGES)}")
-    return [Heading(view.title, 1), *_sources(_all_sources(view)), *builders[at](view)]
+    return [Heading(view.title, 1), *_sources(view, _all_sources(view)), *builders[at](view)]
 
 
 def _all_sources(view: ElementView) -> tuple[str, ...]:
@@ -113,8 +118,12 @@ def _all_sources(view: ElementView) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def _sources(sources: tuple[str, ...]) -> list[Item]:
-    return [Paragraph(source, "sources") for source in sources]
+def _sources(view: ElementView, sources: tuple[str, ...]) -> list[Item]:
+    """Sources of the element, and apart from them those of the sweep."""
+    return [
+        Paragraph(one, "sweep" if view.is_element and one not in view.sources else "sources")
+        for one in sources
+    ]
 
 
 def _derived(
@@ -201,7 +210,7 @@ def _kernels(view: ElementView) -> list[Item]:
             Heading(f"kernel {kernel.name}", 2),
             Paragraph(kernel.purpose or kernel.name),
             Paragraph(f"{kernel.flops()} floating-point operations ({counts}){once}", "note"),
-            *_sources(tuple(s for s in kernel.sources if s not in _all_sources(view))),
+            *_sources(view, tuple(s for s in kernel.sources if s not in _all_sources(view))),
             Heading("reads", 3),
             _ports(kernel.inputs, view.declared),
             Heading("writes", 3),

@@ -34,6 +34,9 @@ from .measure import Columns, Paper
 from .names import shown_unit
 from .text import WIDTH, box, columns, pad, wrapped
 
+#: Labels of paragraphs that name sources, by their kind.
+_SOURCES = {"sources": "Source: ", "sweep": "Source of the sweep: "}
+
 __all__ = ["FORMATS", "STAGES", "ElementView", "show", "show_view"]
 
 
@@ -75,9 +78,10 @@ def _text_item(item: Item) -> list[str]:
         text = as_text(item.text)
         return ["", text, ("=" if item.level == 1 else "-") * min(columns(text), WIDTH)]
     if isinstance(item, Paragraph):
-        label = {"sources": "source: ", "note": "note: "}.get(item.kind, "")
+        label = {**_SOURCES, "note": "note: "}.get(item.kind, "")
+        label = label[:1].lower() + label[1:]
         before = [""] if item.kind == "note" else []
-        text = item.text if item.kind == "sources" else as_text(item.text)
+        text = item.text if item.kind in _SOURCES else as_text(item.text)
         return [*before, *_folded(label + text)]
     if isinstance(item, Quantities):
         return _text_table(item.rows)
@@ -140,8 +144,9 @@ def _latex_item(item: Item) -> str:
         command = ("section", "subsection", "subsubsection")[item.level - 1]
         return rf"\{command}*{{{_in_latex(item.text)}}}"
     if isinstance(item, Paragraph):
-        if item.kind == "sources":
-            return rf"{{\raggedright\emph{{{escaped(item.text)}}}\par}}"
+        if item.kind in _SOURCES:
+            label = "" if item.kind == "sources" else _SOURCES[item.kind]
+            return rf"{{\raggedright {label}\emph{{{escaped(item.text)}}}\par}}"
         return rf"{{\raggedright {_in_latex(item.text)}\par}}"
     if isinstance(item, Quantities):
         tables = range(0, len(item.rows), _ROWS)
@@ -235,9 +240,9 @@ def _html_item(item: Item) -> str:
     if isinstance(item, Heading):
         return f"<h{item.level}>{_in_html(item.text)}</h{item.level}>"
     if isinstance(item, Paragraph):
-        label = "Source: " if item.kind == "sources" else ""
-        text = escape(item.text) if item.kind == "sources" else _in_html(item.text)
-        return f'<p class="{item.kind}">{label}{text}</p>'
+        label = _SOURCES.get(item.kind, "")
+        text = escape(item.text) if label else _in_html(item.text)
+        return f'<p class="{"sources" if label else item.kind}">{label}{text}</p>'
     if isinstance(item, Quantities):
         head = "".join(f"<th>{t}</th>" for t in ("symbol", "name", "size", "unit", "meaning"))
         rows = "\n".join(_html_row(row) for row in item.rows)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import cache, partial
 
 from mstmm.errors import ElementError
@@ -70,11 +71,13 @@ def view(name: str) -> ElementView:
 def of_element(element: Element) -> ElementView:
     """View of a hinge, body or force element, built in or a user's."""
     name = f"{kind_of(element)}_{element.name}"
-    return _view(
-        name, element.title or element.name, kernels_of(element), element.sources,
-        lambda: element_source(spec_of(element)), _declared(element),
-        tuple(make() for kind, make in _BEFORE.items() if type(element) is kind),
+    before = tuple(make() for kind, make in _BEFORE.items() if type(element) is kind)
+    sources = (*element.sources, *(source for one in before for source in one.sources))
+    shown = _view(
+        name, element.title or element.name, kernels_of(element), sources,
+        lambda: element_source(spec_of(element)), _declared(element), before,
     )  # fmt: skip
+    return replace(shown, is_element=True)
 
 
 #: What the equations of an element come from, where that is a derivation of its own.

@@ -197,4 +197,5 @@ def _of_spec(spec: ElementSpec, source: str) -> ElementView:
         lambda: source,
         spec.sources,
         of_spec(spec),
+        spec.kind in ("hinge", "body", "force"),
     )

@@ -134,3 +134,20 @@ def test_an_element_of_the_store_shows_its_equations(mstmm: Command, knee: Path)
     )
     beside = mstmm("show", "knee", "--beside")
     assert beside.code == 2 and "hinge_knee has no classical matrix beside it" in beside.err
+
+
+@pytest.mark.parametrize("format", ["text", "latex", "html"])
+def test_sources_of_the_sweep_are_not_those_of_an_element(
+    mstmm: Command, knee: Path, format: str
+) -> None:
+    """The knee states no source: what is cited of Rui et al. is said to be the sweep's."""
+    mstmm("generate", "my_knee.py")
+    for element in ("my_knee.py", "knee"):
+        for at in ("equations", "matrix", "ir"):
+            lines = mstmm("show", element, "--at", at, "--format", format).out.splitlines()
+            cited = [line for line in lines if "Multibody Syst. Dyn." in line]
+            assert cited
+            assert all("ource of the sweep: " in line for line in cited)
+            assert not any(line.startswith("source: ") or "Source: " in line for line in lines)
+    own = [line for line in mstmm("show", "pin").out.splitlines() if line.startswith("source: ")]
+    assert own == ["source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)"]
