@@ -1,4 +1,4 @@
-"""The commands, joined.  Importing this loads typer and nothing heavier."""
+"""Application with all commands.  Importing this module loads typer and nothing heavier."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from .studies.stability import stability
 
 
 class Commands(TyperGroup):
-    """The commands; an interrupt of one says so, where typer would leave without a word."""
+    """Group of the commands, which reports an interrupt, where typer would exit silently."""
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -45,8 +45,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="Exit codes: 0 done, 1 a defect of mstmm, 2 bad input, 3 something this machine lacks, "
-    "4 numerical failure, 130 interrupted.",
+    epilog="Exit codes: 0 success, 1 internal error (please report), 2 invalid input, 3 missing "
+    "software or permission, 4 numerical failure, 130 interrupted.",
 )
 
 
@@ -68,7 +68,7 @@ def mstmm(
         typer.Option("--version", is_eager=True, callback=_version, help="Print the version."),
     ] = False,
 ) -> None:
-    """Multibody dynamics by transfer matrices: from a hinge's symbols to a simulation."""
+    """Multibody dynamics with transfer matrices: derive, generate, simulate."""
     if context.invoked_subcommand is None:
         from .output import put
 

@@ -1,4 +1,4 @@
-"""`mstmm cache`: what is compiled and kept, is it whole, and away with it."""
+"""`mstmm cache`: list, verify or delete compiled libraries."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def cache(
         str,
         typer.Argument(
             metavar="[list|verify|clean]",
-            help="list what is kept; verify its checksums; clean: remove it.",
+            help="list the libraries; verify their checksums; clean: delete them.",
         ),
     ] = "list",
     unused: Annotated[
@@ -33,16 +33,16 @@ def cache(
             "--unused",
             metavar="DAYS",
             parser=not_negative,
-            help="clean: only what was not used for so many days.",
+            help="clean: delete only entries unused for this many days.",
         ),
     ] = 0.0,
     json: Json = False,
 ) -> None:
-    """List, verify or remove the compiled libraries of fused scenes."""
+    """List, verify or delete compiled scene libraries."""
     if action not in ACTIONS:
         raise typer.BadParameter(f"{quoted(action)}: expected {', '.join(ACTIONS)}")
     if unused and action != "clean":
-        raise typer.BadParameter("--unused goes with clean")
+        raise typer.BadParameter("--unused requires clean")
     from mstmm.runtime.libraries.folder import private_folder
 
     folder = private_folder()
@@ -73,8 +73,8 @@ def _list(folder: Path, json: bool, verify: bool) -> None:
         _sum_up(folder, entries, size, limit(), cut_off)
         for entry in damaged:
             output.complain(
-                f"{entry.folder.name} is damaged: {entry.problem}; it is built again when it is "
-                "used, mstmm cache clean removes it"
+                f"{entry.folder.name} is corrupt: {entry.problem}; it is rebuilt when used; "
+                "mstmm cache clean deletes it"
             )
     if verify and damaged:
         raise typer.Exit(ENVIRONMENT)
@@ -86,11 +86,11 @@ def _sum_up(folder: Path, entries: list[Listed], size: int, limit: int, cut_off:
 
     whole = sum(1 for entry in entries if not entry.problem)
     output.say(
-        f"{folder}: {count(len(entries), 'library', 'libraries')}, {whole} whole; "
+        f"{folder}: {count(len(entries), 'library', 'libraries')}, {whole} intact; "
         f"{size / 1e6:.1f} of {limit / 1e6:.0f} MB"
     )
     if cut_off:
-        output.say(f"{count(cut_off, 'build', 'builds')} under way or cut off")
+        output.say(f"{count(cut_off, 'build', 'builds')} in progress or interrupted")
 
 
 def _clean(folder: Path, unused: float, json: bool) -> None:
@@ -104,7 +104,7 @@ def _clean(folder: Path, unused: float, json: bool) -> None:
         output.emit_json({"ok": True, "folder": str(folder), "removed": removed, "bytes": size})
     else:
         output.say(
-            f"{folder}: removed {count(removed, 'library', 'libraries')}, {size / 1e6:.1f} MB"
+            f"{folder}: deleted {count(removed, 'library', 'libraries')}, {size / 1e6:.1f} MB"
         )
 
 
@@ -112,7 +112,7 @@ def _row(entry: Listed) -> tuple[str, ...]:
     when = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.used))
     return (
         entry.folder.name, f"{entry.bytes / 1e3:.0f}", when, str(entry.about.get("seconds", "")),
-        str(entry.about.get("compiler_version", "")), entry.problem or "whole",
+        str(entry.about.get("compiler_version", "")), entry.problem or "intact",
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""`mstmm check`: is this scene, this element, this file right?  Nothing is simulated or written."""
+"""`mstmm check`: validation of scenes, elements and files, without a simulation or output file."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def check(
         list[str],
         typer.Argument(
             metavar="FILE_OR_ELEMENT...",
-            help="Scene files (.toml, .json), Python files with elements of your own, or names of "
-            "elements (mstmm list).",
+            help="Scenes (.toml, .json), Python files defining elements, or element names (mstmm "
+            "list).",
         ),
     ],
     echo: Annotated[
@@ -36,15 +36,18 @@ def check(
     ] = False,
     assembled: Annotated[
         bool,
-        typer.Option("--assembled", help="The same with the start at which closed loops close."),
+        typer.Option(
+            "--assembled",
+            help="Print the scene with assembled initial conditions (all loops closed).",
+        ),
     ] = False,
     hinge: Annotated[
         list[str] | None,
-        typer.Option("--hinge", metavar="FILE", help="Python file with an element of your own."),
+        typer.Option("--hinge", metavar="FILE", help="Python file that defines user elements."),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Check scenes, definitions of elements, and kernels against the equations they come from."""
+    """Validate scenes and element definitions, and verify kernels against their equations."""
     from .explain import explain
     from .output import complain, emit_json, say
 
@@ -131,19 +134,19 @@ def _scene(path: str) -> Report:
     return {**report, "toml": scene.to_toml(), "text": text, "model": model}
 
 
-#: Most speeds of scenes whose motions are looked at.
+#: Largest number of speeds for which the fastest motion is determined.
 _EXAMINED = 10_000
 
-#: Rate (1/s) of a motion from which explicit methods need many steps a second.
+#: Rate (1/s) of a motion above which explicit methods need many steps.
 _FAST = 1e4
 
 
 def _fastest_line(rate: float, element: str) -> str:
-    """The fastest motion of the start, and what it costs explicit methods."""
+    """Line with the fastest motion at the start, and its step limit for explicit methods."""
     line = f"  fastest motion at the start: {rate:.3g} 1/s, by {element}"
     if rate < _FAST:
         return line
-    return f"{line}; explicit methods need at least {rate / 6:.1g} steps a second: --method auto"
+    return f"{line}; explicit methods need at least {rate / 6:.1g} steps per second: --method auto"
 
 
 def _assembled(model: Model) -> str:
@@ -172,22 +175,22 @@ def _scene_text(
         for name, number in sizes.items()
         if number
     )
-    lines = [f"{path}: ok; {said or 'nothing in it'}", *(f"  note: {w}" for w in warnings)]
+    lines = [f"{path}: ok; {said or 'empty scene'}", *(f"  note: {w}" for w in warnings)]
     lines += [f"  {choice}" for choice in choices]
     return "\n".join(lines + _tree_lines(scene))
 
 
-#: Bodies shown of a large scene.
+#: Largest number of bodies, loops and coordinates that are listed.
 _SHOWN = 40
 
 
 def _tree_lines(scene: Scene) -> list[str]:
-    """The tree of bodies, each with the hinge it hangs on."""
+    """Lines of the tree of bodies, each with its inboard hinge."""
     from mstmm.scene.checks.topology import build
 
     skeleton = scene.skeleton
     tree = build(skeleton)
-    depth: dict[int, int] = {-1: 0}  # of the bodies on which others may hang
+    depth: dict[int, int] = {-1: 0}  # of bodies that may carry others
     lines = ["  ground"] if tree.runs else []
     shown = 0
     for run in tree.runs:
@@ -213,7 +216,7 @@ def _tree_lines(scene: Scene) -> list[str]:
 
 
 def _loops(loops: Loops) -> Report | None:
-    """What `model.loops` tells, for other programs; None where nothing closes."""
+    """Data of `model.loops`, for JSON; None without closed loops."""
     if not loops.rows:
         return None
     gap, name, direction = loops.misfit
@@ -232,41 +235,41 @@ def _loops(loops: Loops) -> Report | None:
 
 
 def _loop_lines(loops: Loops) -> list[str]:
-    """What closed loops leave free, and which loads they leave open."""
+    """Lines about closed loops: rank, mobility, redundant rows, indeterminate loads."""
     if not loops.rows:
         return []
     lines = [f"  loops: {loops.counted}"]
     if loops.redundant:
-        lines.append(f"  loops: rows that repeat others: {loops.repeated(_SHOWN)}")
+        lines.append(f"  loops: redundant rows: {loops.repeated(_SHOWN)}")
     if loops.singular:
         lines.append(
-            f"  loops: the start is a singular pose: {loops.rank} rows count there, "
-            f"{loops.nearby} nearby"
+            f"  loops: the start is a singular configuration: {loops.rank} independent rows "
+            f"there, {loops.nearby} nearby"
         )
     if loops.misfit[0]:
         gap, name, word = loops.misfit
         lines.append(
-            f"  loops: {word} of {name} repeats others but for a gap of {gap:.1e} (m, rad): "
+            f"  loops: {word} of {name} is redundant, violated by {gap:.1e} (m, rad): "
             "correct axes or lengths"
         )
     if loops.not_unique:
-        lines.append(f"  loops: loads that rigid bodies leave open: {loops.open_loads}")
+        lines.append(f"  loops: indeterminate loads of rigid bodies: {loops.open_loads}")
     return lines
 
 
 def _pose_lines(path: str, error: OpenLoop) -> list[str]:
-    """The nearest pose of a loop that stays open, and how to see it."""
+    """Lines with the nearest pose of a loop that cannot be closed, and how to display it."""
     lines = [
         f"  nearest pose: {name}: q = {', '.join(f'{x:.6g}' for x in q)}"
         for name, q in list(error.pose.items())[:_SHOWN]
     ]
     more = len(error.pose) - len(lines)
     lines += [f"  ... and {more} more"] if more > 0 else []
-    return [*lines, f"  mstmm view {quoted(path)} draws it"]
+    return [*lines, f"  to display it: mstmm view {quoted(path)}"]
 
 
 def _depth(tree: Topology, depth: dict[int, int], place: int) -> int:
-    """How deep a place lies in the tree; `depth` knows it of the first of every run."""
+    """Depth of a body in the tree; `depth` has that of the first body of every run."""
     first = max((p for p in depth if p <= place), default=-1)
     return depth[first] + place - first if first >= 0 else 0
 
@@ -275,7 +278,7 @@ def _depth(tree: Topology, depth: dict[int, int], place: int) -> int:
 
 
 def _element(name: str) -> Report:
-    """Kernels of a built-in or stored element: equations, intermediate form and C agree."""
+    """Cross-check a built-in or stored element: equations, intermediate representation and C."""
     from mstmm.bridge.crosscheck import crosscheck
 
     from .names import found
@@ -284,7 +287,7 @@ def _element(name: str) -> Report:
 
 
 def _file(path: str) -> Report:
-    """Every element that a Python file defines.  The file is executed."""
+    """Cross-check every element that a Python file defines; the file is executed."""
     from mstmm.bridge.crosscheck import crosscheck_definition
     from mstmm.derive.audit.definition import check as check_element
     from mstmm.derive.catalogue.registry import load_file

@@ -1,4 +1,4 @@
-"""`mstmm demo`: the first example, from its scene to a certified result, a table and a picture."""
+"""`mstmm demo`: an example from its scene to a certified result, a table and a plot."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .progress import bar
 if TYPE_CHECKING:
     from mstmm.runtime.result.result import Result
 
-#: The scene of examples/three_bodies_on_balls, as it travels with the package.
+#: Scene of examples/three_bodies_on_balls, included in the package.
 SCENE = "three_bodies_on_balls.toml"
 TITLE = "Three bodies on ball hinges"
 T_END, SAMPLES = 5.0, 501
@@ -30,24 +30,24 @@ Three bodies on ball hinges, a chain swinging in space under gravity:
     ground --(ball0)-- body1 --(ball2)-- body2 --(ball4)-- body3 -- tip
 
 the system of Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems,
-Wiley 2019, section 5.10.1, with data of our own.  Each body and hinge is one
+Wiley 2019, section 5.10.1, with different data.  Each body and hinge is one
 element; its equations were derived symbolically, printed as C and compiled when
 mstmm was installed.  One sweep along the chain gives all accelerations."""
 
 NEXT = """\
 Next:
-    mstmm simulate demo.toml --t-end 2     your own run; edit it first
-    mstmm show ball                        the equations of a hinge
-    mstmm list                             everything a scene can name"""
+    mstmm simulate demo.toml --t-end 2     simulate the scene, after editing it
+    mstmm show ball                        show the equations of a hinge
+    mstmm list                             list all elements and methods"""
 
 
 def scene_text() -> str:
-    """The scene as text."""
+    """Text of the scene file."""
     return files(__package__).joinpath(SCENE).read_text(encoding="utf-8")
 
 
 def demo(json: Json = False) -> None:
-    """Run an example; leave a result, pictures, one that moves, and a table in this folder."""
+    """Run an example and write its result, plots, animation and table to the current folder."""
     from mstmm.runtime.host.files import write_text
 
     from . import output, summary
@@ -71,8 +71,8 @@ def demo(json: Json = False) -> None:
         result_file: f"the result: {len(result.t)} samples of every quantity",
         table_file: "this text",
         scene: "the scene" if kept is None else kept,
-    } | ({} if picture is None else {picture: "a picture of it"})
-    made |= {} if moving is None else {moving: "the chain as it moves, for any browser"}
+    } | ({} if picture is None else {picture: "plots of the result"})
+    made |= {} if moving is None else {moving: "an animation of the chain, for any browser"}
     if json:
         data = summary.to_json(result, seconds, verdict)
         output.emit_json({**data, "files": [str(path) for path in made]})
@@ -88,7 +88,7 @@ def demo(json: Json = False) -> None:
 
 
 def _targets() -> tuple[Path, Path, Path, Path | None, Path | None]:
-    """Scene, result, table, picture and page; what no package can write is left out."""
+    """Output files: scene, result, table, plot, animation; None if a package is missing."""
     names = ["demo.toml", "demo" + result_ending(), "demo.txt"]
     scene, result, table = (output_file(name, (), "demo:") for name in names)
     picture = None if missing("plot") else output_file("demo.png", (), "demo:")
@@ -97,12 +97,12 @@ def _targets() -> tuple[Path, Path, Path, Path | None, Path | None]:
 
 
 def _write_scene(path: Path) -> str | None:
-    """Leave the scene to play with; a file that somebody changed stays."""
+    """Write the scene file; a file that differs is kept, which the returned text states."""
     from mstmm.runtime.host.files import write_text
 
     text = scene_text()
     if path.exists() and path.read_bytes() != text.encode():
-        return "a scene of yours, left as it is"
+        return "your modified scene, not overwritten"
     write_text(path, text)
     return None
 
@@ -128,11 +128,9 @@ def _simulate(text: str) -> tuple[Result, float]:
 def _without_extras() -> list[str]:
     lines = []
     if missing("plot"):
-        lines.append(f"no picture: it needs {', '.join(missing('plot'))}: {install('plot')}")
+        lines.append(f"no plot: it needs {', '.join(missing('plot'))}: {install('plot')}")
     if missing("view"):
-        lines.append(
-            f"no page that moves: it needs {', '.join(missing('view'))}: {install('view')}"
-        )
+        lines.append(f"no animation: it needs {', '.join(missing('view'))}: {install('view')}")
     if missing("io"):
-        lines.append(f"no NetCDF, so CSV: it needs {', '.join(missing('io'))}: {install('io')}")
+        lines.append(f"CSV, as NetCDF needs {', '.join(missing('io'))}: {install('io')}")
     return lines

@@ -1,4 +1,4 @@
-"""`mstmm doctor`: has this machine what mstmm needs, and does it compute the right numbers?"""
+"""`mstmm doctor`: diagnosis of the environment, with two test runs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .options import Json
 
 
 def doctor(json: Json = False) -> None:
-    """Examine compiler, processor, cache, packages and kernels, with two trial runs."""
+    """Diagnose compiler, CPU, cache, packages and kernels, with two test runs."""
     from mstmm.border.fused import FLAGS, TUNING
     from mstmm.bridge.compilation import compile_scene
     from mstmm.cli import machine as examination
@@ -35,5 +35,5 @@ def doctor(json: Json = False) -> None:
 
 def _verdict(problems: int) -> str:
     if not problems:
-        return "All is well."
-    return f"{problems} problem{'s' if problems > 1 else ''}; each line says what to do."
+        return "No problems found."
+    return f"{problems} problem{'s' if problems > 1 else ''}; each line gives the remedy."

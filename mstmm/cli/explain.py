@@ -1,10 +1,10 @@
-"""From an exception to the message that a user sees and the exit code of the program.
+"""Conversion of an exception to the user's message and the exit code of the program.
 
 The codes:
 
-    0    done                       3    something this machine lacks
-    1    a defect of mstmm          4    numerical failure
-    2    bad input                  130  interrupted
+    0    success                    3    missing software or permission
+    1    internal error             4    numerical failure
+    2    invalid input              130  interrupted
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from mstmm.errors import EnvironmentFailure, MstmmError
 DONE, DEFECT, BAD_INPUT = 0, 1, MstmmError.exit_code
 ENVIRONMENT, INTERRUPTED = EnvironmentFailure.exit_code, interrupts.CODE
 
-#: Bytes that a process can always get where it is not short of memory.
+#: Bytes that can be allocated unless the process is short of memory.
 _SPARE = 2**27
 
 
 def explain(error: BaseException) -> tuple[str, int]:
-    """The message a user sees for an exception, and the exit code."""
+    """Message and exit code for an exception."""
     import typer
 
     if isinstance(error, MstmmError):
         return str(error), error.exit_code
-    if isinstance(error, typer.BadParameter.__mro__[2]):  # ClickException, wherever typer keeps it
+    if isinstance(error, typer.BadParameter.__mro__[2]):  # ClickException, whatever its module
         return _usage(error), BAD_INPUT
     if isinstance(error, (KeyboardInterrupt, typer.Abort)):
         return "interrupted", INTERRUPTED
     if isinstance(error, MemoryError) or _is_short_of_memory():
-        return "there is not enough memory for this; ask for fewer samples", ENVIRONMENT
+        return "not enough memory; request fewer samples", ENVIRONMENT
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("mstmm"):
         return f"the package {error.name} is missing; install it: pip install {error.name}", 3
     if isinstance(error, OSError):
@@ -43,17 +43,17 @@ def explain(error: BaseException) -> tuple[str, int]:
     if place is not None:
         return f"{place}: {type(error).__name__}: {error}", BAD_INPUT
     if isinstance(error, SystemExit):
-        return f"a file that was run asked to stop ({error}); take the exit out of it", BAD_INPUT
+        return f"an executed Python file calls exit ({error}); remove that call", BAD_INPUT
     return (
         f"{type(error).__name__}: {error}\n"
         "This is a defect of mstmm, not of your input; please report it with your command.\n"
-        "The same command with MSTMM_DEBUG=1 in the environment shows where it happened.",
+        "The same command with MSTMM_DEBUG=1 in the environment shows where it occurred.",
         DEFECT,
     )
 
 
 def _is_short_of_memory() -> bool:
-    """Whether the process can hardly get memory, of which its libraries fail in many ways."""
+    """Whether the process is short of memory, where libraries fail with various exceptions."""
     try:
         mmap.mmap(-1, _SPARE).close()
     except (OSError, MemoryError, ValueError):
@@ -62,7 +62,7 @@ def _is_short_of_memory() -> bool:
 
 
 def _in_a_users_file(error: BaseException) -> str | None:
-    """File and line of a definition of the user's from which the exception came."""
+    """File and line of a user's definition that raised the exception, or None."""
     place = None
     for frame, line in traceback.walk_tb(error.__traceback__):
         if str(frame.f_globals.get("__name__")).startswith("mstmm_user_"):
@@ -71,7 +71,7 @@ def _in_a_users_file(error: BaseException) -> str | None:
 
 
 def _usage(error: BaseException) -> str:
-    """What typer found wrong with the arguments, on one line, and where to look."""
+    """Message of typer about invalid arguments, followed by the help command."""
     describe = getattr(error, "format_message", None)
     message = str(describe() if callable(describe) else error)
     context = getattr(error, "ctx", None)

@@ -1,4 +1,4 @@
-"""`mstmm export`: a scene as a robot's file."""
+"""`mstmm export`: conversion of a scene to URDF."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from .options import Json, new_file
 
 
 def export_robot(
-    scene: Annotated[str, typer.Argument(metavar="SCENE", help="A scene: .toml, .json.")],
+    scene: Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")],
     output: Annotated[
         str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="The robot, .urdf; by default with "
-                     "the scene's name, here."),
+        typer.Option("--output", "-o", metavar="FILE", help="Robot file, .urdf; default: scene "
+                     "name, current folder."),
     ] = None,
     json: Json = False,
 ) -> None:  # fmt: skip
-    """Write the robot of a scene, and tell what of the scene URDF does not say."""
+    """Convert a scene to URDF, and list what could not be converted."""
     import mstmm
     from mstmm.runtime.host.files import write_text
 

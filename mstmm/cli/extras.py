@@ -1,4 +1,4 @@
-"""Which optional packages are there, asked before anything is computed."""
+"""Checks for optional packages, before anything is computed."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ def missing(extra: str) -> list[str]:
 
 
 def install(extra: str) -> str:
-    """The command that brings an extra."""
+    """Command that installs an extra."""
     return f"pip install 'mstmm[{extra}]'"
 
 
 def need_for(path: Path, option: str) -> None:
-    """EnvironmentFailure if writing this file needs a package that is not installed."""
+    """Raise EnvironmentFailure if writing this file needs a package that is not installed."""
     extra = _EXTRA_OF.get(path.suffix.lower())
     if extra is not None and missing(extra):
-        other = "; or take a name ending in .csv" if extra == "io" else ""
+        other = "; or use a name ending in .csv" if extra == "io" else ""
         raise EnvironmentFailure(
             f"{option} {path}: this needs {', '.join(missing(extra))}, not installed: "
             f"{install(extra)}{other}"
@@ -35,5 +35,5 @@ def need_for(path: Path, option: str) -> None:
 
 
 def result_ending() -> str:
-    """Ending of a result file nobody named: .nc where NetCDF can be written, else .csv."""
+    """Default ending of a result file: .nc if NetCDF can be written, else .csv."""
     return ".csv" if missing("io") else ".nc"

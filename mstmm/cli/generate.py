@@ -1,4 +1,4 @@
-"""`mstmm generate`: the committed C of the package, or the kernels of an element of your own."""
+"""`mstmm generate`: committed C of the package, or kernels of user elements."""
 
 from __future__ import annotations
 
@@ -20,28 +20,29 @@ def generate(
         list[str] | None,
         typer.Argument(
             metavar="[FILE]...",
-            help="Python files with elements of your own; without one, the package's own C.",
+            help="Python files defining elements; without one, regenerate the package's C code.",
         ),
     ] = None,
     check: Annotated[
         bool,
         typer.Option(
-            "--check", help="Derive afresh and compare with the committed C; write nothing."
+            "--check", help="Derive again and compare with the committed C; write nothing."
         ),
     ] = False,
     installed: Annotated[
         bool,
         typer.Option(
-            "--installed", help="Generate what installed packages publish (mstmm list installed)."
+            "--installed",
+            help="Generate the elements provided by installed packages (mstmm list installed).",
         ),
     ] = False,
     json: Json = False,
 ) -> None:
-    """Derive, generate and compile: your own elements, or generated/ of a checkout."""
+    """Derive, generate and compile user elements, or the generated/ folder of a checkout."""
     if files and check:
-        raise MstmmError("--check compares the package's own C; to check a file: mstmm check FILE")
+        raise MstmmError("--check compares the package's C; to check a file: mstmm check FILE")
     if installed and (files or check):
-        raise MstmmError("--installed takes no file and no --check")
+        raise MstmmError("--installed cannot be combined with files or --check")
     if files or installed:
         _own([python_file(file) for file in files or []], json)
     elif check:
@@ -50,11 +51,11 @@ def generate(
         _regenerate(json)
 
 
-# --- elements of the user's -----------------------------------------------------------------------
+# --- user elements --------------------------------------------------------------------------------
 
 
 def _own(files: list[str], json: bool) -> None:
-    """Generate the elements of files; without any, those of installed packages."""
+    """Generate the elements of files, or without files those of installed packages."""
     import mstmm
     from mstmm.bridge.compilation import generate_published
 
@@ -70,16 +71,16 @@ def _own(files: list[str], json: bool) -> None:
             entry = {"file": file, "kind": spec.kind, "name": spec.name, "how": each.how}
             made.append({**entry, "folder": str(each.folder), "seconds": seconds})
             if not json:
-                say(f"{spec.kind} {spec.name}: {each.how}; kept in {each.folder} ({seconds:.1f} s)")
+                say(f"{spec.kind} {spec.name}: {each.how}; in {each.folder} ({seconds:.1f} s)")
     if json:
         emit_json({"generated": made})
     elif made:
-        say("Scenes name it by its type.")
+        say("Use its name as a type in scenes.")
     else:
-        say("No installed package publishes elements.")
+        say("No installed package provides elements.")
 
 
-# --- the package's own ----------------------------------------------------------------------------
+# --- elements of the package ----------------------------------------------------------------------
 
 
 def _folder() -> Path:
@@ -89,12 +90,12 @@ def _folder() -> Path:
 
 
 def _checkout() -> Path:
-    """generated/ of the checkout that this program runs from."""
+    """Folder generated/ of the checkout that contains this program."""
     folder = _folder()
     if not (folder.parent / "pyproject.toml").is_file():
         raise EnvironmentFailure(
             "mstmm is installed without its checkout, so there is no generated/ to write; run this "
-            "from a clone with pip install -e ., or name a file of your own: mstmm generate FILE"
+            "from a clone with pip install -e ., or give a Python file: mstmm generate FILE"
         )
     return folder
 
@@ -127,12 +128,12 @@ def _compare(json: bool) -> None:
         emit_json({"ok": not found, "folder": str(folder), "differences": found})
     if not found:
         if not json:
-            say(f"{folder} is what the derivations give, byte for byte")
+            say(f"{folder} is identical to the result of the derivations")
         return
     if not json:
         say("\n".join(found))
     complain(
-        f"{len(found)} files of {folder} are not what the derivations give; "
+        f"{len(found)} files of {folder} differ from the result of the derivations; "
         "update them: mstmm generate, and commit generated/"
     )
     raise typer.Exit(OUT_OF_DATE)

@@ -1,4 +1,4 @@
-"""Runs a command so that no user ever meets a traceback: a message and an exit code instead.
+"""Execution of a command with a message and an exit code instead of a traceback.
 
 With MSTMM_DEBUG=1 in the environment the traceback is printed as well.
 """
@@ -20,10 +20,10 @@ from .explain import DONE, INTERRUPTED, explain
 
 
 def leave(arguments: Sequence[str]) -> NoReturn:
-    """The program: run one command and end the process with its exit code."""
+    """Run one command and end the process with its exit code."""
     output.prepare_streams()
     if not sys.warnoptions and not debugging():
-        warnings.simplefilter("ignore")  # numpy's warnings go to developers, not to users
+        warnings.simplefilter("ignore")  # warnings of numpy are for developers, not for users
     from . import app  # noqa: F401 - loaded while an interrupt still ends the process at once
 
     interrupts.raise_in_the_command()
@@ -44,19 +44,19 @@ def run(arguments: Sequence[str]) -> int:
             raise KeyboardInterrupt
         output.flush()
         return code
-    except BrokenPipeError:  # the reader of our output has seen enough (`| head`)
+    except BrokenPipeError:  # the reader closed the pipe (`| head`)
         output.discard()
         return DONE
     except BaseException as error:
         if isinstance(error, SystemExit) and isinstance(error.__context__, BrokenPipeError):
-            output.discard()  # typer met the closed pipe first
+            output.discard()  # typer found the closed pipe first
             return DONE
         if interrupts.seen() and not isinstance(error, Interrupted):
-            error = KeyboardInterrupt()  # whatever became of it in the code that it met
+            error = KeyboardInterrupt()  # interrupted code may raise any other exception
         message, code = explain(error)
         try:
             _report(error, message, code, "--json" in arguments)
-        except OSError:  # not even the message could be written
+        except OSError:  # the message cannot be written either
             output.discard()
         return code
 
@@ -69,7 +69,7 @@ def _command(arguments: list[str]) -> int:
 
 
 def debugging() -> bool:
-    """True if MSTMM_DEBUG asks for tracebacks."""
+    """Whether MSTMM_DEBUG requests tracebacks."""
     return os.environ.get("MSTMM_DEBUG", "0") not in ("", "0")
 
 

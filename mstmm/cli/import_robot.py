@@ -1,4 +1,4 @@
-"""`mstmm import`: a robot's file as a scene."""
+"""`mstmm import`: conversion of a robot file to a scene."""
 
 from __future__ import annotations
 
@@ -19,48 +19,48 @@ if TYPE_CHECKING:
     from mstmm.scene.robots.convert import Imported
     from mstmm.scene.robots.robot import Note
 
-#: So many elements of one note are named.
+#: Largest number of elements named in one note.
 _NAMED = 4
 
 
 def import_robot(
     robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="A robot: .urdf, or MJCF (.xml, .mjcf).")
+        str, typer.Argument(metavar="ROBOT", help="Robot file: .urdf, or MJCF (.xml, .mjcf).")
     ],
     output: Annotated[
         str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="The scene, .toml; by default with "
-                     "the robot's name, here."),
+        typer.Option("--output", "-o", metavar="FILE", help="Scene file, .toml; default: robot "
+                     "name, current folder."),
     ] = None,
     base: Annotated[
         str,
-        typer.Option("--base", metavar="fixed|free", help="Whether the base stands on the ground "
-                     "or flies."),
+        typer.Option("--base", metavar="fixed|free", help="Attach the base to the ground (fixed) "
+                     "or leave it free."),
     ] = "fixed",
     keep_fixed: Annotated[
         bool,
-        typer.Option("--keep-fixed", help="Keep links on fixed joints as bodies of their own."),
+        typer.Option("--keep-fixed", help="Keep links on fixed joints as separate bodies."),
     ] = False,
     stops: Annotated[
         float | None,
-        typer.Option("--stops", metavar="STIFFNESS", parser=positive, help="Make the limits of "
-                     "joints stops of this stiffness (N m/rad or N/m)."),
+        typer.Option("--stops", metavar="STIFFNESS", parser=positive, help="Convert joint limits "
+                     "to stops of this stiffness (N m/rad or N/m)."),
     ] = None,
     hold_mimics: Annotated[
         bool,
-        typer.Option("--hold-mimics", help="Hold joints that go with others where they start, "
-                     "instead of coupling them."),
+        typer.Option("--hold-mimics", help="Lock mimic joints at their initial values instead of "
+                     "coupling them."),
     ] = False,
     length: Annotated[
         str,
-        typer.Option("--length", metavar="UNIT", help="The file's lengths: m, cm, mm or in."),
+        typer.Option("--length", metavar="UNIT", help="Length unit of the file: m, cm, mm or in."),
     ] = "m",
     mass: Annotated[
-        str, typer.Option("--mass", metavar="UNIT", help="The file's masses: kg, g, t or lb.")
+        str, typer.Option("--mass", metavar="UNIT", help="Mass unit of the file: kg, g, t or lb.")
     ] = "kg",
     json: Json = False,
 ) -> None:  # fmt: skip
-    """Write the scene of a robot, and tell what of the file a scene has not."""
+    """Convert a robot (URDF, MJCF) to a scene, and list what could not be converted."""
     import mstmm
     from mstmm.runtime.host.files import write_text
 
@@ -84,8 +84,10 @@ def import_robot(
 
 
 def _with_meshes_beside(found: Imported, target: Path) -> Imported:
-    """The scene with meshes that lie in its folder or below, where those from elsewhere are copied:
-    a scene file names no others."""
+    """Copy meshes from elsewhere to a folder next to the scene file, and refer to the copies.
+
+    A scene file may refer only to files in its folder or below.
+    """
     from mstmm.runtime.host.files import replacing
 
     home, shapes = target.parent.resolve(), []
@@ -108,7 +110,7 @@ def _with_meshes_beside(found: Imported, target: Path) -> Imported:
 
 
 def together(notes: Iterable[Note], file: str) -> list[str]:
-    """A line for each text, with what it is about, and where in `file` that is."""
+    """One line for each text of notes, with its elements and their positions in `file`."""
     about = defaultdict[str, list[str]](list)
     for note in notes:
         place = note.where.removeprefix(file).removeprefix(": ")

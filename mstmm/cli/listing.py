@@ -1,4 +1,4 @@
-"""`mstmm list`: what scenes can name and what `mstmm show` can show."""
+"""`mstmm list`: elements and methods available in scenes and in `mstmm show`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Section(NamedTuple):
-    """A part of the list: its title, column headings, rows, and the same as plain data."""
+    """Section of the list: title, column headings, rows, and the same as plain data."""
 
     title: str
     columns: tuple[str, ...]
@@ -41,7 +41,7 @@ def _hinges() -> Section:
         for kind in builtin_hinges().values()
     ]  # fmt: skip
     rows = [(e.name, e.title, _joined(e.coordinates), ", ".join(e.parameters)) for e in entries]
-    columns = ("hinge", "what it allows", "coordinates q", "keys of its own")
+    columns = ("hinge", "allowed motions", "coordinates q", "additional keys")
     return Section("hinges", columns, rows, [_plain_hinge(e) for e in entries])
 
 
@@ -51,7 +51,7 @@ def _plain_hinge(entry: Entry) -> dict[str, Any]:
     return data
 
 
-#: What a scene gives for the built-in body; its kernels take moments derived from these.
+#: Parameters of the built-in body in a scene; its kernels use moments derived from these.
 _RIGID = ("mass [kg]", "center_of_mass [m]", "inertia [kg*m2]")
 
 
@@ -63,7 +63,7 @@ def _elements(kind: str, title: str) -> Section:
         for e in builtin(kind)
     ]
     rows = [(e.name, e.title, _joined(e.parameters)) for e in entries]
-    return Section(title, (kind, "what it is", "parameters"), rows, [e.to_json() for e in entries])
+    return Section(title, (kind, "description", "parameters"), rows, [e.to_json() for e in entries])
 
 
 def _flexible() -> Section:
@@ -86,9 +86,9 @@ def _laws() -> Section:
 
 
 def _keys(title: str, owners: Sequence[tuple[str, type[BaseModel]]]) -> Section:
-    """The keys of tables of a scene, and what each expects."""
+    """Section of keys of tables of a scene, with their expected values."""
     rows = [
-        (owner, key, str(entry.get("description") or "a table, see scenes"))
+        (owner, key, str(entry.get("description") or "a table, see the scene format"))
         for owner, model in owners
         for key, entry in model.model_json_schema()["properties"].items()
     ]
@@ -104,7 +104,7 @@ def _matrices() -> Section:
         for entry in builtin("classical")
     ]
     data = [dict(zip(("name", "title", "sources"), row, strict=True)) for row in found]
-    return Section("classical transfer matrices", ("matrix", "what it is", "source"), found, data)
+    return Section("classical transfer matrices", ("matrix", "description", "source"), found, data)
 
 
 def _sweep() -> Section:
@@ -112,7 +112,7 @@ def _sweep() -> Section:
 
     rows = [(f"sweep_{e.name}", e.title) for e in builtin("sweep")]
     data = [{"name": name, "title": title} for name, title in rows]
-    return Section("steps of the sweep", ("name", "what it is"), rows, data)
+    return Section("steps of the sweep", ("name", "description"), rows, data)
 
 
 def _methods() -> Section:
@@ -126,7 +126,7 @@ def _methods() -> Section:
         steps = "adaptive or fixed" if method.adaptive else "fixed"
         rows.append((name, str(method.order), steps, method.source))
         data.append({"name": name, "order": method.order, "steps": steps, "source": method.source})
-    choice = f"{AUTO_EXPLICIT}, and rodas4p2 or rodas5p where stability sets its steps"
+    choice = f"{AUTO_EXPLICIT}, and rodas4p2 or rodas5p where stability limits its steps"
     rows.append((AUTO, "", "adaptive", choice))
     data.append({"name": AUTO, "order": None, "steps": "adaptive", "source": choice})
     scipy = "scipy-NAME"
@@ -144,7 +144,7 @@ def _methods() -> Section:
         rows.append((name, "2", "fixed", said))
         data.append({"name": name, "order": 2, "steps": "fixed", "source": said})
     columns = ("method", "order>", "steps", "source")
-    return Section("methods of integration", columns, rows, data)
+    return Section("integration methods", columns, rows, data)
 
 
 def _user() -> Section:
@@ -156,13 +156,13 @@ def _user() -> Section:
     rows = [
         (e.kind, e.name, e.title, _joined(e.coordinates), _joined(e.parameters)) for e in entries
     ]
-    columns = ("kind", "type", "what it is", "coordinates q", "parameters")
-    title = f"your own elements, in {store.folder()}"
+    columns = ("kind", "type", "description", "coordinates q", "parameters")
+    title = f"user elements, in {store.folder()}"
     return Section(title, columns, rows, [e.to_json() for e in entries])
 
 
 def _installed() -> Section:
-    """Entry points only: nothing is imported for a list."""
+    """Section of elements in installed packages, from entry points, without importing them."""
     from importlib.metadata import entry_points
 
     from mstmm.ir.spec import ENTRY_POINTS
@@ -170,7 +170,7 @@ def _installed() -> Section:
     found = sorted(entry_points(group=ENTRY_POINTS), key=lambda e: e.name)
     rows = [(e.name, e.dist.name if e.dist is not None else "", e.value) for e in found]
     data = [dict(zip(("name", "package", "where"), row, strict=True)) for row in rows]
-    title = "published by installed packages; to use them: mstmm generate --installed"
+    title = "elements of installed packages; to use them: mstmm generate --installed"
     return Section(title, ("name", "package", "where"), rows, data)
 
 
@@ -202,11 +202,11 @@ def _chosen(parts: Sequence[str]) -> list[str]:
 def list_elements(
     parts: Annotated[
         list[str] | None,
-        typer.Argument(help=f"What to list ({', '.join(SECTIONS)}); by default everything."),
+        typer.Argument(help=f"What to list ({', '.join(SECTIONS)}); default: everything."),
     ] = None,
     json: Json = False,
 ) -> None:
-    """List hinges, bodies rigid and flexible, forces, laws, matrices, methods, own elements."""
+    """List hinges, bodies, forces, laws, transfer matrices, methods and user elements."""
     from . import output
 
     sections = {part: SECTIONS[part]() for part in _chosen(parts or [])}
@@ -221,4 +221,6 @@ def list_elements(
             console.print(f"{printable(section.title)}: none")
         console.print()
     if not parts:
-        console.print("The equations of each: mstmm show NAME, such as mstmm show pin")
+        console.print(
+            "To show the equations of an element: mstmm show NAME, such as mstmm show pin"
+        )

@@ -1,6 +1,6 @@
-"""What `mstmm doctor` looks at: compiler, processor, cache, packages, kernels, and two trial runs.
+"""Checks of `mstmm doctor`: compiler, CPU, cache, packages, kernels, and two test runs.
 
-Each examination returns findings and raises nothing; a problem says what to do about it.
+Each check returns findings and raises nothing; a problem includes its remedy.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 #: (scene, engine) -> model.
 Compile = Callable[[Scene, str], "Model"]
 
-#: Packages that take part in a run, or in a derivation.
+#: Packages needed for runs or derivations.
 PACKAGES = ("mstmm", "numpy", "scipy", "cffi", "sympy", "jinja2", "pydantic")
 
-#: Least room, bytes, that is not worth a remark.
+#: Free disk space, bytes, below which a problem is reported.
 _LITTLE_ROOM = 50_000_000
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One line of the examination: `ok` is False where something must be done."""
+    """Finding of a check; `ok` is False if an action is necessary."""
 
     subject: str
     ok: bool
@@ -43,10 +43,10 @@ class Finding:
 
 
 def examine(compiled: Compile, flags: Sequence[str], optional: Sequence[str] = ()) -> list[Finding]:
-    """All findings, in the order in which a reader understands them.
+    """Run all checks and return their findings, in logical order.
 
-    `compiled(scene, engine)` gives the model of a scene (mstmm.compile); `flags` are those that
-    fused code is compiled with, `optional` those of them that a compiler need not know.
+    `compiled(scene, engine)` returns the model of a scene (mstmm.compile).  `flags` are the
+    compiler flags of fused code, `optional` those that a compiler need not support.
     """
     parts = (
         _versions(), _processor(), _compiler(flags), _cache(), _prebuilt(compiled),
@@ -55,7 +55,7 @@ def examine(compiled: Compile, flags: Sequence[str], optional: Sequence[str] = (
     return [finding for part in parts for finding in part]
 
 
-# --- what is there --------------------------------------------------------------------------------
+# --- environment ----------------------------------------------------------------------------------
 
 
 def _versions() -> Iterator[Finding]:
@@ -79,7 +79,7 @@ def _processor() -> Iterator[Finding]:
     flags = set((found.get("flags") or found.get("Features") or "").split())
     wide = [name for name in ("avx512f", "avx2", "fma", "asimd", "sve") if name in flags]
     name = found.get("model name") or found.get("CPU part") or found["machine"]
-    text = f"{name} ({found['machine']}; {', '.join(wide) or 'no wide registers known'})"
+    text = f"{name} ({found['machine']}; {', '.join(wide) or 'no vector extensions found'})"
     yield Finding("processor", True, text, dict(found))
 
 
@@ -89,7 +89,7 @@ def _compiler(flags: Sequence[str]) -> Iterator[Finding]:
     try:
         found = toolchain.compiler()
     except EnvironmentFailure as error:
-        text = f"{error}; until then scenes run on the looped engine, and hinges of your own slowly"
+        text = f"{error}; until then scenes use the looped engine, and user-defined hinges are slow"
         yield Finding("compiler", False, text)
         return
     with tempfile.TemporaryDirectory(prefix="mstmm-doctor-") as folder:
@@ -111,7 +111,7 @@ def _cache() -> Iterator[Finding]:
         yield Finding("cache", False, str(error))
         return
     except OSError as error:
-        text = f"nothing can be written to {place} ({error.strerror}); make room or permissions"
+        text = f"{place} is not writable ({error.strerror}); free disk space or change permissions"
         yield Finding("cache", False, f"{text}, or set {cache_folder.VARIABLE}")
         return
     entries = cache_upkeep.listed(place)
@@ -128,14 +128,15 @@ def _cache() -> Iterator[Finding]:
     )
     yield Finding("cache", True, text, data)
     if free < _LITTLE_ROOM:
-        yield Finding("cache", False, f"only {free / 1e6:.1f} MB are free in {place}; make room")
+        text = f"only {free / 1e6:.1f} MB are free in {place}; free disk space"
+        yield Finding("cache", False, text)
     damaged = [entry.folder.name for entry in entries if entry.problem]
     if damaged:
-        text = f"{len(damaged)} damaged ({', '.join(damaged[:3])}); they are built again when used"
+        text = f"{len(damaged)} corrupt ({', '.join(damaged[:3])}); they are rebuilt when used"
         yield Finding("cache", False, f"{text}, or remove them: mstmm cache clean")
 
 
-# --- trial runs -----------------------------------------------------------------------------------
+# --- test runs ------------------------------------------------------------------------------------
 
 
 def _prebuilt(compiled: Compile) -> Iterator[Finding]:
@@ -143,7 +144,7 @@ def _prebuilt(compiled: Compile) -> Iterator[Finding]:
 
     try:
         names = sorted(f"{kind} {name}" for kind, name in prebuilt.elements())
-    except Exception as error:  # whatever a broken library does
+    except Exception as error:  # a broken library may raise anything
         yield _broken("kernels", error)
         return
     yield Finding("kernels", True, f"{len(names)} prebuilt elements", {"elements": names})
@@ -153,13 +154,13 @@ def _prebuilt(compiled: Compile) -> Iterator[Finding]:
 def _built_here(
     compiled: Compile, flags: Sequence[str], optional: Sequence[str]
 ) -> Iterator[Finding]:
-    """A kernel compiled for the trial, then a scene by the way that every scene goes."""
+    """Test of a compiled kernel, then of a fused scene."""
     from ..runtime.libraries import toolchain
 
     try:
         toolchain.compiler()
     except EnvironmentFailure:
-        return  # said above
+        return  # reported by `_compiler`
     trial = _tried("compiling", lambda: _tiny_library(flags, optional))
     yield trial
     if trial.ok:
@@ -169,19 +170,19 @@ def _built_here(
 def _tried(subject: str, trial: Callable[[], str]) -> Finding:
     try:
         return Finding(subject, True, trial())
-    except Exception as error:  # whatever is broken, the other findings are still wanted
+    except Exception as error:  # any failure must leave the other findings available
         return _broken(subject, error)
 
 
 def _broken(subject: str, error: Exception) -> Finding:
     if isinstance(error, MstmmError):
         return Finding(subject, False, str(error))
-    text = f"{type(error).__name__}: {error}; install mstmm again"
+    text = f"{type(error).__name__}: {error}; reinstall mstmm"
     return Finding(subject, False, text)
 
 
 def _tiny_library(flags: Sequence[str], optional: Sequence[str]) -> str:
-    """Compile a kernel with the flags of fused code, open it, and compare with what it must say."""
+    """Compile a kernel with the flags of fused code, call it and compare with exact values."""
     from ..runtime.libraries.build import Order, fetched
     from ..runtime.libraries.toolchain import TIMEOUT
 
@@ -204,10 +205,10 @@ def _tiny_library(flags: Sequence[str], optional: Sequence[str]) -> str:
         worst = _trial_error(built.path)
     if not worst <= 1e-15:
         raise EnvironmentFailure(
-            f"a kernel compiled here gives wrong numbers (by {worst:.1e}, relative); "
-            "take another compiler: set CC"
+            f"a test kernel gives wrong numbers (relative error {worst:.1e}); "
+            "use another compiler: set CC"
         )
-    return f"a kernel compiled in {built.seconds:.2f} s and gave the right numbers"
+    return f"a test kernel compiled in {built.seconds:.2f} s and gives correct numbers"
 
 
 def _trial_error(path: Path) -> float:
@@ -225,7 +226,7 @@ def _trial_error(path: Path) -> float:
 
 
 def _pendulum(compiled: Compile, engine: str) -> str:
-    """A rod on a pin: one period by the complete elliptic integral brings it back."""
+    """Simulate a pendulum for one period, known from the complete elliptic integral."""
     import numpy as np
     from scipy.special import ellipk
 
@@ -249,12 +250,16 @@ def _pendulum(compiled: Compile, engine: str) -> str:
     drift = abs(float(back.q[-1, 0]) - start) if back.success else float("inf")
     if not (worst <= 1e-13 and drift <= 1e-7):
         raise EnvironmentFailure(
-            f"a pendulum is off its closed form by {worst:.1e} (accelerations) and {drift:.1e} rad "
-            "(after a period); install mstmm again: pip install --force-reinstall mstmm"
+            f"a pendulum differs from its closed form by {worst:.1e} (accelerations) and "
+            f"{drift:.1e} rad (after a period); reinstall mstmm: pip install --force-reinstall "
+            "mstmm"
         )
-    return f"a pendulum keeps its closed form (accelerations {worst:.0e}, a period {drift:.0e} rad)"
+    return (
+        f"a pendulum agrees with its closed form (accelerations {worst:.0e}, "
+        f"a period {drift:.0e} rad)"
+    )
 
 
 def summary() -> str:
-    """The interpreter that all of this is about."""
+    """Python interpreter and platform to which the findings apply."""
     return f"{sys.executable} on {platform.platform()}"

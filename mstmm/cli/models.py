@@ -1,4 +1,4 @@
-"""The model of a scene file, with the elements and the method that it needs."""
+"""Compilation of a scene file, with the user elements and the method that it needs."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from mstmm.runtime.model.model import Model
     from mstmm.scene import Scene
 
-#: How the names of methods begin that SciPy and SUNDIALS bring.
+#: Prefixes of the names of methods of SciPy and SUNDIALS.
 OF_OTHERS = ("scipy-", "sundials-")
 
 
 def use_files(paths: list[str]) -> None:
-    """Generate the elements of Python files, so that scenes can name them.  Executes the files."""
+    """Generate the elements of Python files, so that scenes can use them; executes the files."""
     if paths:
         import mstmm
 
@@ -35,10 +35,10 @@ def compiled(
     flexibility: str | None = None,
     simplify: bool | Mapping[str, bool | float] = True,
 ) -> Model:
-    """The model of a scene file.
+    """Compile a scene file.
 
-    SceneError, with the file named, also where the accelerations of the start cannot be computed:
-    then the scene is at fault.
+    SceneError, with the name of the file, also if the accelerations at the start cannot be
+    computed, because that is an error of the scene.
     """
     import numpy as np
 
@@ -63,10 +63,9 @@ def compiled(
 
 
 def load_method(name: str) -> None:
-    """Read a method's coefficients, so that the time of a run is the run's.
+    """Load the coefficients of a method, so that they do not count in the time of a run.
 
-    SceneError for a method that does not exist, EnvironmentFailure for one whose package is not
-    installed.
+    SceneError for an unknown method, EnvironmentFailure if its package is not installed.
     """
     from mstmm.runtime.run import classical
     from mstmm.runtime.run.second_opinion import sundials

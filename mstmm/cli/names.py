@@ -1,4 +1,4 @@
-"""From what a user calls an element to its kind and name."""
+"""Resolution of the name of an element to its kind and name."""
 
 from __future__ import annotations
 
@@ -8,20 +8,21 @@ KINDS = ("hinge", "body", "force", "classical", "sweep")
 
 
 def known() -> dict[str, tuple[str, str]]:
-    """Full name (hinge_pin) -> (kind, name), of built-in elements and of the kernel store."""
+    """Index of built-in and stored elements: full name (hinge_pin) -> (kind, name)."""
     from mstmm.runtime.kernels import store
 
     from . import stored
 
     built_in = [(e.kind, e.name) for kind in KINDS for e in stored.builtin(kind)]
     names = {f"{kind}_{name}": (kind, name) for kind, name in [*built_in, *sorted(store.specs())]}
-    return names | {"hinge_elastic": ("hinge", "free")}  # the same motion; its law is in sweep_laws
+    return names | {"hinge_elastic": ("hinge", "free")}  # same motion; its law is in sweep_laws
 
 
 def found(name: str) -> tuple[str, str]:
-    """(kind, name) of "hinge_pin", or of "pin", which means the first kind that has it.
+    """Find (kind, name) of an element by its full name "hinge_pin", or by "pin".
 
-    Raises ElementError, with the nearest name, if there is none.
+    The short name means the first kind that has it.  Raises ElementError, with the nearest name, if
+    there is no such element.
     """
     from mstmm.scene.rules.messages import near
 
@@ -31,5 +32,5 @@ def found(name: str) -> tuple[str, str]:
             return names[full]
     hint = near(name, [*names, *(own for _, own in names.values())])
     if "did you mean" not in hint:
-        hint = "; mstmm list shows what there is"
+        hint = "; mstmm list shows all elements"
     raise ElementError(f'element "{name:.60}": there is no such element{hint}')

@@ -1,4 +1,4 @@
-"""What the commands' arguments have in common: numbers with limits, output files, `--json`."""
+"""Parsers and options common to several commands: numbers, output files, `--json`."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
 if TYPE_CHECKING:
     from mstmm.scene import Scene
 
-#: Most samples of one run.
+#: Largest number of samples of a run.
 MAX_SAMPLES = 10_000_000
 
-json_text = typer.Option("--json", help="Print one JSON document instead of text.")
+json_text = typer.Option("--json", help="Print JSON instead of text.")
 Json = Annotated[bool, json_text]
 
 
 def quoted(text: Any) -> str:
-    """The user's own words in a message, cut where they are long."""
+    """Quote a text of the user in a message, shortened if it is long."""
     shown = repr(text)
     return shown if len(shown) <= 60 else shown[:57] + "..."
 
 
 def finite(text: Any) -> float:
-    """A finite number."""
+    """Parse a finite number."""
     try:
         value = number_in(text)
     except (TypeError, ValueError):
@@ -43,7 +43,7 @@ def finite(text: Any) -> float:
 
 
 def positive(text: Any) -> float:
-    """A finite number above 0."""
+    """Parse a finite number above 0."""
     value = finite(text)
     if value <= 0:
         raise typer.BadParameter(f"{quoted(text)}: expected a number above 0")
@@ -51,7 +51,7 @@ def positive(text: Any) -> float:
 
 
 def not_negative(text: Any) -> float:
-    """A finite number, 0 or more."""
+    """Parse a finite number, 0 or more."""
     value = finite(text)
     if value < 0:
         raise typer.BadParameter(f"{quoted(text)}: expected 0 or more")
@@ -59,7 +59,7 @@ def not_negative(text: Any) -> float:
 
 
 def at_least(least: int) -> Callable[[Any], int]:
-    """A parser of whole numbers from `least` up."""
+    """Parser of integers not below `least`."""
 
     def whole(text: Any) -> int:
         try:
@@ -75,20 +75,20 @@ def at_least(least: int) -> Callable[[Any], int]:
 
 @dataclass(frozen=True)
 class Times:
-    """Times of the samples: `count` of them evenly from start to end, or one every `spacing` s."""
+    """Output times of a run: `count` equidistant ones, or one every `spacing` s."""
 
     count: int | None = None
     spacing: float | None = None
 
     def until(self, t_end: float) -> list[float]:
-        """The times, s, the end included."""
+        """Output times up to and including `t_end`, s.  MstmmError for too many."""
         if self.count is not None:
             return [t_end * i / (self.count - 1) for i in range(self.count)]
         assert self.spacing is not None
         if t_end / self.spacing > MAX_SAMPLES:
             raise MstmmError(
-                f"--times {self.spacing:g} asks for {t_end / self.spacing:.3g} samples, at most "
-                f"{MAX_SAMPLES} can be had; take a wider spacing"
+                f"--times {self.spacing:g}: expected at most {MAX_SAMPLES} samples, found "
+                f"{t_end / self.spacing:.3g}; use a wider spacing"
             )
         whole = int(t_end / self.spacing * (1 + 1e-12))
         times = [self.spacing * i for i in range(whole + 1)]
@@ -100,13 +100,13 @@ class Times:
 
 
 def times(text: Any) -> Times:
-    """`201` is a number of samples; `0.05`, `2.0` or `2s` is a spacing in s."""
+    """Parse output times: `201` is a number of samples, `0.05`, `2.0` or `2s` a spacing in s."""
     if isinstance(text, Times):
         return text
     if str(text).isdecimal():
         digits = str(text).lstrip("0")
         if len(digits) > 8 or int(digits or 0) > MAX_SAMPLES:
-            raise typer.BadParameter(f"{quoted(text)}: at most {MAX_SAMPLES} samples can be had")
+            raise typer.BadParameter(f"{quoted(text)}: expected at most {MAX_SAMPLES} samples")
         if int(digits or 0) < 2:
             raise typer.BadParameter(
                 f"{quoted(text)}: expected 2 samples or more, or a spacing in s such as 0.01 or 1s"
@@ -121,8 +121,10 @@ def times(text: Any) -> Times:
 
 
 def with_inputs(scene: Scene, texts: Sequence[str]) -> Scene:
-    """The scene with inputs as in "motor=3".  MstmmError for what is none, SceneError for what the
-    scene does not have."""
+    """Set inputs of a scene from texts such as "motor=3".
+
+    MstmmError for an invalid text, SceneError for an input or signal that the scene does not have.
+    """
     from mstmm.runtime.engine import given as inputs
 
     values: dict[str, float | str] = {}
@@ -150,23 +152,26 @@ def _number_or_name(text: str) -> float | str:
 
 
 def new_file(given: str | None, beside: str, ending: str) -> Path:
-    """What `output_file` makes of a name; where none is given, that of the file `beside` with the
-    ending, here, which nothing is written over: it may be somebody's work."""
+    """Output file of the given name, or by default of the name of the file `beside`.
+
+    The default is in the current folder and must not exist yet, so that no work is overwritten.
+    Errors are those of `output_file`.
+    """
     if given is not None:
         return output_file(given, (ending,))
     path = output_file(Path(beside).stem + ending, (ending,))
     if os.path.lexists(path):
         raise MstmmError(
-            f"{path} is there already; name another with --output, or this one to write it anew"
+            f"{path} exists already; give another name with --output, or this one to overwrite it"
         )
     return path
 
 
 def output_file(text: str, endings: Sequence[str], option: str = "--output") -> Path:
-    """A file that can be written, checked before anything is computed.
+    """Check that a file can be written, before anything is computed, and return its path.
 
     Raises MstmmError for a wrong ending, a folder, or a folder that does not exist, and
-    EnvironmentFailure where writing is not allowed.
+    EnvironmentFailure if writing is not allowed.
     """
     if not text or "\0" in text:
         raise MstmmError(f"{option}: expected a file name, found {quoted(text)}")
@@ -184,23 +189,22 @@ def output_file(text: str, endings: Sequence[str], option: str = "--output") -> 
     except (OSError, ValueError) as error:
         raise MstmmError(f"{option} {text}: {getattr(error, 'strerror', None) or error}") from None
     if size > 200:
-        raise MstmmError(f"{option} {text[:40]}...: the name is too long; take a shorter one")
+        raise MstmmError(f"{option} {text[:40]}...: the name is too long; use a shorter one")
     if path.exists() and not os.access(path, os.W_OK):
-        raise EnvironmentFailure(f"{option} {text}: it is write-protected; take another name")
+        raise EnvironmentFailure(f"{option} {text}: it is write-protected; use another name")
     try:
         with tempfile.TemporaryFile(dir=path.parent):
             return path
     except OSError as error:
         raise EnvironmentFailure(
-            f"{option} {text}: nothing can be written there ({error.strerror}); take another place"
+            f"{option} {text}: the folder is not writable ({error.strerror}); use another folder"
         ) from None
 
 
 def output_folder(text: str, file: str, option: str = "--out") -> Path:
-    """A folder, made with its parents, in which `file` can be written: before anything is computed.
+    """Create a folder with its parents, and check that `file` can be written in it.
 
-    Raises MstmmError for something else of that name, EnvironmentFailure where nothing can be
-    written.
+    Raises MstmmError if the name is not a folder, EnvironmentFailure if it is not writable.
     """
     if not text or "\0" in text:
         raise MstmmError(f"{option}: expected the name of a folder, found {quoted(text)}")
@@ -208,17 +212,17 @@ def output_folder(text: str, file: str, option: str = "--out") -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
-        raise MstmmError(f"{option} {text}: this is not a folder; take another name") from None
+        raise MstmmError(f"{option} {text}: this is not a folder; use another name") from None
     except OSError as error:
         raise EnvironmentFailure(
-            f"{option} {text}: the folder cannot be made ({error.strerror}); take another place"
+            f"{option} {text}: the folder cannot be created ({error.strerror}); use another one"
         ) from None
     output_file(str(path / file), (), option)
     return path
 
 
 def python_file(path: str) -> str:
-    """A Python file that is there.  MstmmError for anything else."""
+    """Check that a path is an existing Python file; MstmmError for anything else."""
     if not path.endswith(".py"):
         raise MstmmError(f"{quoted(path)}: expected a Python file (.py) that defines elements")
     if "\0" in path or not os.path.isfile(path):
@@ -226,19 +230,17 @@ def python_file(path: str) -> str:
     return path
 
 
-#: Options that several commands have.
+#: Options of several commands.
 Elements = Annotated[
     list[str] | None,
-    typer.Option("--hinge", metavar="FILE", help="Python file with an element of your own; may "
-                 "be repeated. The file is executed."),
+    typer.Option("--hinge", metavar="FILE", help="Python file that defines user elements (it is "
+                 "executed); repeatable."),
 ]  # fmt: skip
 Budget = Annotated[
     float,
-    typer.Option("--budget", metavar="SECONDS", parser=positive, help="Time that the runs may "
-                 "take, s of the clock."),
+    typer.Option("--budget", metavar="SECONDS", parser=positive, help="Wall-clock time limit, s."),
 ]  # fmt: skip
 Rounds = Annotated[
     int,
-    typer.Option("--rounds", metavar="N", parser=at_least(0), help="How often times are taken "
-                 "again."),
+    typer.Option("--rounds", metavar="N", parser=at_least(0), help="Number of timing repetitions."),
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Writing to the terminal, to pipes that may close, and to files."""
+"""Output to the terminal and to pipes that may close: text, tables, JSON and messages."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-#: Columns of tables where the output is no terminal.
+#: Width of tables, in columns, if the output is no terminal.
 PLAIN_WIDTH = 100
 
 
 def prepare_streams() -> None:
-    """No character a terminal cannot show stops the program; closed streams become empty ones."""
+    """Make the standard streams robust against unsupported characters and closed streams."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 - lives as long as the process
@@ -32,12 +32,12 @@ def prepare_streams() -> None:
 
 
 def flush() -> None:
-    """Write out what is buffered; OSError if that fails (a full disk, a closed pipe)."""
+    """Flush standard output; OSError if that fails (a full disk, a closed pipe)."""
     sys.stdout.flush()
 
 
 def discard() -> None:
-    """Stop writing to standard output: what is buffered is dropped, without complaint at exit."""
+    """Stop writing to standard output: drop its buffer, so that no error occurs at exit."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         null = os.open(os.devnull, os.O_WRONLY)
         os.dup2(null, sys.stdout.fileno())
@@ -45,7 +45,7 @@ def discard() -> None:
 
 
 def settle_streams() -> None:
-    """Flush for the last time, so that the interpreter has nothing left to fail at."""
+    """Flush both streams a last time, so that the interpreter cannot fail at exit."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
@@ -54,22 +54,22 @@ def settle_streams() -> None:
 
 
 def say(text: str = "") -> None:
-    """One or more lines on standard output."""
+    """Print one or more lines on standard output, with control characters escaped."""
     sys.stdout.write(printable(text) + "\n")
 
 
 def put(text: str) -> None:
-    """Text of our own making on standard output, as it is: C, HTML, what others read."""
+    """Write generated text (C, HTML) to standard output unchanged."""
     sys.stdout.write(text + "\n")
 
 
 def complain(message: str) -> None:
-    """A problem, on standard error."""
+    """Print an error message on standard error."""
     _on_stderr("mstmm: ", printable(message), "31")
 
 
 def note(message: str) -> None:
-    """Something worth knowing that is no problem, on standard error."""
+    """Print a note, which is no error, on standard error."""
     _on_stderr("", printable(message), "2")
 
 
@@ -86,14 +86,14 @@ def _on_stderr(head: str, text: str, colour: str) -> None:
 
 
 def _folded(line: str, width: int, head: str) -> str:
-    """A line broken between words, as a terminal would break it anywhere."""
+    """Wrap a line between words to the width of the terminal."""
     return textwrap.fill(
         head + line, width, break_long_words=False, break_on_hyphens=False
     ).removeprefix(head)
 
 
 def console(file: Any = None) -> Console:
-    """Where tables go: as wide as the terminal, or COLUMNS, or PLAIN_WIDTH."""
+    """Console for tables, as wide as the terminal, or COLUMNS, or PLAIN_WIDTH."""
     from rich.console import Console
 
     target = sys.stdout if file is None else file
@@ -104,14 +104,14 @@ def console(file: Any = None) -> Console:
     )  # fmt: skip
 
 
-#: Longest names that a first column is widened for.
+#: Longest name, in characters, for which the first column is widened.
 _NAMES = 44
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], **more: Any) -> Table:
-    """A plain table; columns whose heading ends in ">" are aligned to the right.
+    """Build a plain table; columns whose heading ends in ">" are right-aligned.
 
-    The first column holds names and is kept whole as long as it leaves room for the others.
+    The first column holds names, and is not wrapped as long as it leaves space for the others.
     """
     from rich import box
     from rich.table import Table
@@ -135,12 +135,12 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], **m
 
 
 def emit_json(data: Any) -> None:
-    """One JSON document on standard output: numbers finite, everything else null or text."""
+    """Print one JSON document on standard output; see `plain` for the conversion."""
     sys.stdout.write(json.dumps(plain(data), indent=2, allow_nan=False, ensure_ascii=True) + "\n")
 
 
 def plain(value: Any) -> Any:
-    """Plain JSON values: arrays become lists, numbers that are not finite become null."""
+    """Convert to JSON values: arrays become lists, numbers that are not finite null."""
     if isinstance(value, dict):
         return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""A progress bar with the time left, on standard error and only on a terminal."""
+"""Progress bar with the remaining time, on standard error and only on a terminal."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-#: Seconds before a bar appears: short runs need none.
+#: Seconds before a bar appears, so that short runs show none.
 PATIENCE = 0.7
 
 
 class Bar:
-    """Appears once a run has lasted `PATIENCE`; call it with (t, t_end) in s of the simulation."""
+    """Progress bar of a run, shown after `PATIENCE`; call it with (t, t_end) of the run, s."""
 
     def __init__(self, shown: bool, label: str = "simulating", moves_alone: bool = True) -> None:
         self._shown, self._begin = shown, time.monotonic()
@@ -24,7 +24,7 @@ class Bar:
         self._label = label
 
     def label(self, text: str) -> None:
-        """Name what follows, such as a second run."""
+        """Set the label of the following work, such as a second run, and restart the bar."""
         self._label = text
         if self._bar is not None:
             self._bar.reset(self._task, description=text)
@@ -33,8 +33,10 @@ class Bar:
         self.share(t / t_end if t_end > 0 else 1.0, f"t = {t:.4g} of {t_end:.4g} s")
 
     def share(self, part: float, state: str) -> None:
-        """So much of all is done, 0 to 1, and what says so in words.  On a terminal that is gone
-        the bar ends, not the work."""
+        """Show the finished part, 0 to 1, with a text.
+
+        If the terminal is closed, the bar ends but the work continues.
+        """
         if not self._shown or (self._bar is None and time.monotonic() - self._begin < PATIENCE):
             return
         try:
@@ -58,7 +60,7 @@ class Bar:
         self._task = self._bar.add_task(self._label, total=1.0, state="")
 
     def stop(self) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         if self._bar is not None:
             with suppress(OSError):
                 self._bar.stop()
@@ -67,9 +69,9 @@ class Bar:
 
 @contextmanager
 def bar(label: str = "simulating", moves_alone: bool = True) -> Iterator[Bar]:
-    """A bar that is gone when the block ends, however it ends.
+    """Context with a progress bar, which is removed at the end of the block.
 
-    One that does not move alone costs no processor time but when it is called.
+    Without `moves_alone` the bar is refreshed only by calls and costs no CPU time otherwise.
     """
     made = Bar(sys.stderr.isatty(), label, moves_alone)
     try:
@@ -80,7 +82,7 @@ def bar(label: str = "simulating", moves_alone: bool = True) -> Iterator[Bar]:
 
 @contextmanager
 def waiting(text: str) -> Iterator[None]:
-    """On a terminal a sentence and the seconds that have passed, for work without a measure."""
+    """Context that shows a text and the elapsed time on a terminal, for work of unknown length."""
     ended = threading.Event()
 
     def show() -> None:

@@ -1,4 +1,4 @@
-"""`mstmm show`: stop the line from symbols to C at any stage, and read."""
+"""`mstmm show`: equations, transfer matrix, intermediate representation or C of an element."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FORMATS = ("text", "latex", "html")
 
 
 def one_of(words: tuple[str, ...]) -> str:
-    """Choices as the help shows them."""
+    """Choices in the notation of the help."""
     return "|".join(words)
 
 
@@ -36,39 +36,40 @@ def show(
         str,
         typer.Argument(
             metavar="ELEMENT",
-            help="Name of an element (mstmm list), the Python file that defines your own, a scene "
-            "(.toml, .json, or a robot), or sweep: the schedule of the sweep.",
+            help='Element name (mstmm list), Python file, scene or robot, or "sweep" for the '
+            "schedule.",
         ),
     ],
     at: Annotated[
         str,
         typer.Option(
-            "--at", metavar=one_of(STAGES), help="Where to stop.",
+            "--at", metavar=one_of(STAGES), help="Stage to show.",
             parser=lambda text: _choice(text, STAGES),
         ),
     ] = "equations",
     format: Annotated[
         str,
         typer.Option(
-            "--format", metavar=one_of(FORMATS), help="How to write it.",
+            "--format", metavar=one_of(FORMATS), help="Output format.",
             parser=lambda text: _choice(text, FORMATS),
         ),
     ] = "text",
     output: Annotated[
-        str | None, typer.Option("--output", "-o", metavar="FILE", help="Write to a file instead.")
+        str | None, typer.Option("--output", "-o", metavar="FILE", help="Output file.")
     ] = None,
     keep: Annotated[
         list[str] | None,
         typer.Option(
-            "--keep", metavar="NAME", help="A number of the scene that stays a symbol; repeat it."
+            "--keep", metavar="NAME", help="Scene parameter to keep symbolic; repeatable."
         ),
     ] = None,
     beside: Annotated[
-        bool, typer.Option("--beside", help="Its classical matrix beside its motion subspace.")
+        bool, typer.Option("--beside", help="Show the classical transfer matrix next to the motion "
+                           "subspace.")
     ] = False,
     json: Json = False,
 ) -> None:  # fmt: skip
-    """Show an element's equations, matrix, intermediate form or C, with units and sources."""
+    """Show the equations, transfer matrix, intermediate representation or C of an element."""
     from mstmm.runtime.host.files import write_text
     from mstmm.scene.load import is_scene_file
 
@@ -80,7 +81,7 @@ def show(
     elif is_scene_file(element):
         pages = {element: _scene(element, at, format, keep or [])}
     elif keep:
-        raise ElementError("--keep names numbers of a scene: mstmm show SCENE.toml --keep NAME")
+        raise ElementError("--keep applies to scenes: mstmm show SCENE.toml --keep NAME")
     elif element == "sweep":
         pages = {element: _schedule(at, format)}
     else:
@@ -119,7 +120,7 @@ def _scene(file: str, at: str, format: str, keep: list[str]) -> str:
 
     if at != "equations":
         raise ElementError(
-            f"a scene has no stage {at!r}, its elements have: mstmm show ELEMENT --at {at}"
+            f"a scene has no stage {at!r}, but its elements have it: mstmm show ELEMENT --at {at}"
         )
     shown = equations(file, keep)
     return {"text": shown.text, "latex": shown.latex, "html": shown.html}[format]
@@ -155,16 +156,16 @@ def _views(element: str, at: str) -> list[ElementView]:
         return [views.view(full)]
     if at == "c" and source is None:
         raise ElementError(
-            f"{full} has no C: runs replay its intermediate form; "
-            f"show that: mstmm show {full} --at ir"
+            f"{full} has no C: runs interpret its intermediate representation; "
+            f"to show that: mstmm show {full} --at ir"
         )
     from mstmm.ir.stored import element_from_json
 
-    return [_of_spec(element_from_json(kernels), source or "")]  # no need to derive them again
+    return [_of_spec(element_from_json(kernels), source or "")]  # without deriving them again
 
 
 def _defined(file: Path, kind: str, name: str) -> ElementView:
-    """An element as the file defines it from which it was generated."""
+    """View of an element from the file from which it was generated."""
     from mstmm.derive.catalogue.registry import kind_of, load_file
     from mstmm.derive.show import subjects as views
 
@@ -175,7 +176,7 @@ def _defined(file: Path, kind: str, name: str) -> ElementView:
 
 
 def _kept(kind: str, name: str, at: str) -> ElementView:
-    """An element of the user's kernel store: its kernels, as its equations are in its file."""
+    """View of an element of the user's kernel store; its equations come from its file."""
     from mstmm.runtime.kernels import store
 
     full = f"{kind}_{name}"

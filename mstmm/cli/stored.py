@@ -1,4 +1,4 @@
-"""Elements as they were generated: read from JSON, so that no derivation is repeated."""
+"""Generated elements, read from JSON, so that no derivation is repeated."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Entry:
-    """One element for a list: names with units in brackets."""
+    """Element in a listing: names of its quantities have units in brackets."""
 
     kind: str
     name: str
@@ -29,12 +29,12 @@ class Entry:
 
 
 def with_unit(name: str, unit: str) -> str:
-    """angle [rad]; a pure number has no bracket."""
+    """Name with its unit, such as "angle [rad]"; without brackets if dimensionless."""
     return f"{name} [{unit}]" if unit else name
 
 
 def builtin(kind: str) -> list[Entry]:
-    """The built-in elements of one kind, by name."""
+    """Built-in elements of one kind."""
     return [entry for entry in _catalogue() if entry.kind == kind]
 
 
@@ -44,7 +44,7 @@ def _catalogue() -> tuple[Entry, ...]:
 
 
 def of_spec(spec: ElementSpec) -> Entry:
-    """Entry of an element that is read already."""
+    """Entry of an element from its specification."""
     groups = (spec.coordinates, spec.speeds, spec.parameters)
     coordinates, speeds, parameters = (tuple(with_unit(p.name, p.unit) for p in g) for g in groups)
     return Entry(spec.kind, spec.name, spec.title, coordinates, speeds, parameters, spec.sources)
@@ -69,7 +69,7 @@ def text(full_name: str, ending: str) -> str | None:
 
 
 def specs() -> dict[tuple[str, str], ElementSpec]:
-    """Every element that is generated, its kernels with it, by (kind, name)."""
+    """All generated elements with their kernels, by (kind, name)."""
     from mstmm.ir.stored import element_from_json
 
     found = {(e.kind, e.name): text(f"{e.kind}_{e.name}", ".json") for e in _catalogue()}

@@ -1,4 +1,4 @@
-"""What a run says about itself: on the terminal as lines, for machines as a dictionary."""
+"""Summary of a run: lines for the terminal, and a dictionary for JSON."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ if TYPE_CHECKING:
     from mstmm.runtime.result.result import Result
     from mstmm.runtime.result.verdict import Verdict
 
-#: Stretches of a run that are told one by one.
+#: Largest number of time spans with one method that are listed individually.
 _STRETCHES = 6
 
 
 def sizes(result: Result) -> str:
-    """3 bodies on 3 hinges, 7 degrees of freedom, 2 driven."""
+    """Size of the scene: "3 bodies on 3 hinges, 7 degrees of freedom, 2 driven"."""
 
     model, bodies = result.model, len(result.model.scene.skeleton.bodies)
     free, driven = len(model.free_speeds), len(model.packed.system.driven)
     held = model.nu - free - driven
-    if model.closed is not None:  # loops leave fewer free, of all speeds together
+    if model.closed is not None:  # loops reduce the mobility of all speeds together
         free, held = model.closed.loops.mobility, 0
     parts = [
         f"{count(bodies, 'body', 'bodies')} on {count(len(model.scene.hinges), 'hinge')}",
         f"{count(free, 'degree')} of freedom",
         *([f"{driven} driven"] if driven else []),
-        *([f"{held} held until released"] if held else []),
+        *([f"{held} locked until released"] if held else []),
     ]
     return ", ".join(parts)
 
 
 def simplified(result: Result) -> str:
-    """What is packed otherwise than the scene says it, in numbers; empty where nothing is."""
+    """Numbers of simplifications of the scene; empty if there are none."""
     from mstmm.runtime.pack.merge.simplification import COUNTED
 
     kinds = [one.kind for one in result.model.simplifications]
@@ -45,18 +45,18 @@ def simplified(result: Result) -> str:
 
 
 def engine(result: Result) -> str:
-    """The engine, and the sweep where it is not the usual one."""
+    """Engine of a run, and its sweep unless that is "riccati"."""
     model = result.model
     return f"{model.engine} engine" + (f", sweep {model.sweep}" if model.sweep != "riccati" else "")
 
 
 def count(n: int, one: str, many: str = "") -> str:
-    """3 bodies, 1 body."""
+    """Number with its noun in singular or plural: "3 bodies", "1 body"."""
     return f"{n} {one if n == 1 else many or one + 's'}"
 
 
 def effort(result: Result, seconds: float) -> str:
-    """Method, tolerances, steps and time of a run."""
+    """Method, tolerances, steps and duration of a run."""
     s = result.settings
     how = f"step {s.step:g} s" if s.step is not None else f"rtol {s.rtol:g}, atol {s.atol:g}"
     parts = [f"{s.method}, {how}"]
@@ -71,7 +71,7 @@ def effort(result: Result, seconds: float) -> str:
 
 
 def method_lines(result: Result, width: int) -> list[str]:
-    """What the choice among methods did, folded; of many stretches how much each method made."""
+    """Lines with the methods of a run; for many time spans, the total time of each method."""
     stretches = result.methods
     if not stretches:
         return []
@@ -82,11 +82,11 @@ def method_lines(result: Result, width: int) -> list[str]:
     for stretch, end in zip(stretches, ends, strict=True):
         times[stretch.method] = times.get(stretch.method, 0.0) + end - stretch.t
     shares = ", ".join(f"{name} {time:.4g} s" for name, time in times.items())
-    return _folded(f"  in {len(stretches)} stretches: {shares}", width)
+    return _folded(f"  in {len(stretches)} time spans: {shares}", width)
 
 
 def fitting_table(result: Result, names: tuple[str, ...], rows: int, width: int) -> str:
-    """Some samples; columns that nobody asked for are left out where the terminal is narrow."""
+    """Table of some samples; on a narrow terminal default columns are left out."""
     from mstmm.runtime.result.output.table import default_names
 
     pictures = result.pictures()
@@ -102,7 +102,7 @@ def fitting_table(result: Result, names: tuple[str, ...], rows: int, width: int)
 
 
 def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
-    """The outcome of a run without its samples, which are in the file."""
+    """Result of a run as plain data, without its samples, which are in the file."""
     layout = result.model.layout
     last = len(result.t) - 1
     counted, reached = result.statistics, result.error_estimate
@@ -134,7 +134,7 @@ def to_json(result: Result, seconds: float, verdict: Verdict) -> dict[str, Any]:
 
 
 def _certificate(result: Result) -> dict[str, Any]:
-    """The certificate as plain numbers; the estimated error per unit."""
+    """Certificate as plain data; the estimated error by unit."""
     certificate = result.certificate
     told = ("error", "reached", "models", "known", "control")  # in other rows
     data = {f.name: getattr(certificate, f.name) for f in fields(certificate) if f.name not in told}
@@ -156,13 +156,13 @@ def _certificate(result: Result) -> dict[str, Any]:
 
 
 def verdict_lines(verdict: Verdict, width: int, told: bool = True) -> list[str]:
-    """The verdict, folded to the width of the terminal; `told`: its reasons follow."""
+    """Verdict, wrapped to the width of the terminal; `told`: its reasons are printed too."""
     text = str(verdict).replace("certify=True", "--certify")
     return textwrap.wrap(text if told else text.replace(", see below", ""), max(width, 40))
 
 
 def certificate_lines(result: Result, width: int) -> list[str]:
-    """What vouches for a result, and every warning, folded to the width of the terminal."""
+    """Certificate and all warnings of a result, wrapped to the width of the terminal."""
     certificate = result.certificate
     told = certificate.text(verdict=False, warnings=result.trajectory.told)
     lines = told.replace("certify=True", "--certify").splitlines()
@@ -172,7 +172,7 @@ def certificate_lines(result: Result, width: int) -> list[str]:
 
 
 def _folded(line: str, width: int) -> list[str]:
-    """The line; what does not fit goes below the text, behind the name of the row."""
+    """Wrap a line; continuation lines are indented to the text after the name of the row."""
     name = line.split("  ", 1)[0]
     indent = len(line) - len(line[len(name) :].lstrip())
     return textwrap.wrap(

@@ -61,7 +61,7 @@ def test_nothing_to_reduce(mstmm: Command, folder: Path) -> None:
         (("pendulum.toml", "--of", "rod.tip.positon"), "did you mean"),
         (("pendulum.toml", "--budget", "0"), "expected a number above 0"),
         (("pendulum.toml", "--t-end", "inf"), "not a finite number"),
-        (("pendulum.toml", "--write", "./pendulum.toml"), "this is the scene itself"),
+        (("pendulum.toml", "--write", "./pendulum.toml"), "this is the input scene"),
         (("pendulum.toml", "--write", "small.json"), "expected a name ending in .toml"),
         (("pendulum.toml", "--write", "none/small.toml"), "there is no folder none"),
         (("pendulum.toml", "--times", "1"), "--times"),

@@ -40,19 +40,19 @@ def test_empty_cache(mstmm: Command, place: Path) -> None:
 def test_list_verify_clean(mstmm: Command, place: Path) -> None:
     first, second = filled(2)
     listed = mstmm("cache")
-    assert listed.code == 0 and "2 libraries, 2 whole" in listed.out
+    assert listed.code == 0 and "2 libraries, 2 intact" in listed.out
     assert listed.out.count("part-") >= 2
     data = json.loads(mstmm("cache", "list", "--json").out)
     assert {entry["key"] for entry in data["entries"]} == {first.key, second.key}
     assert all(entry["flags"] == [] and entry["problem"] == "" for entry in data["entries"])
     first.path.write_bytes(first.path.read_bytes()[:50])
     verified = mstmm("cache", "verify")
-    assert verified.code == 3 and "2 libraries, 1 whole" in verified.out
+    assert verified.code == 3 and "2 libraries, 1 intact" in verified.out
     assert first.path.parent.name in verified.err and "50 bytes" in verified.err
     assert mstmm("cache", "list").code == 0
     assert not json.loads(mstmm("cache", "verify", "--json").out)["ok"]
     os.utime(second.path.parent / "entry.json", (1e9, 1e9))
-    assert "removed 1 library" in mstmm("cache", "clean", "--unused", "30").out
+    assert "deleted 1 library" in mstmm("cache", "clean", "--unused", "30").out
     cleaned = json.loads(mstmm("cache", "clean", "--json").out)
     assert cleaned["removed"] == 1 and cleaned["bytes"] > 50
     assert list(place.iterdir()) == []

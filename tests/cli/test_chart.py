@@ -84,5 +84,5 @@ def test_without_matplotlib(mstmm: Command, folder: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(charts, "installed", lambda: False)
     done = mstmm("chart", "pendulum.toml", "--out", "out", *QUICK)
     assert done.code == 0, done.err
-    assert "no picture: it needs matplotlib: pip install 'mstmm[plot]'" in done.out
+    assert "no plot: it needs matplotlib: pip install 'mstmm[plot]'" in done.out
     assert {path.name for path in (folder / "out").iterdir()} == {"chart.html", "chart.json"}

@@ -180,6 +180,6 @@ def test_a_lack_of_memory_is_no_defect(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_package_that_does_not_load_is_told_from_one_that_is_missing() -> None:
     broken = missing("io", "a file", ImportError("failed to map segment", name="xarray"))
-    assert "does not load (failed to map segment); give the process more memory" in str(broken)
+    assert "cannot be loaded (failed to map segment); give the process more memory" in str(broken)
     absent = missing("io", "a file", ModuleNotFoundError("no", name="not_there"))
     assert "not_there, which is not installed" in str(absent)

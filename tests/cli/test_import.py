@@ -61,7 +61,7 @@ def test_nothing_is_written_over_without_being_named(mstmm: Command) -> None:
         ("import", "arm.urdf", "arm.toml"), ("export", "arm.toml", "arm.urdf")
     ):  # fmt: skip
         done = mstmm(command, source)
-        assert done.code == 2 and f"{target} is there already; name another" in done.err
+        assert done.code == 2 and f"{target} exists already; give another name" in done.err
     assert Path("arm.toml").read_text() == scene and Path("arm.urdf").read_text() == ARM
     assert mstmm("import", "arm.urdf", "--output", "arm.toml").code == 0
     assert Path("arm.toml").read_text() != scene
@@ -96,7 +96,7 @@ def test_a_dangling_link_of_the_scene_name_is_not_written_through(
     )
     (folder / "arm.toml").symlink_to(folder / "elsewhere.toml")
     done = mstmm("import", "arm.urdf")
-    assert done.code == 2 and "there already" in done.err
+    assert done.code == 2 and "exists already" in done.err
     assert not (folder / "elsewhere.toml").exists()
 
 

@@ -79,7 +79,7 @@ def test_degrees_of_freedom_are_those_that_nobody_imposes(mstmm: Command, folder
         """
     )
     done = mstmm("simulate", "arm.toml", "--t-end", "0.01", "--no-certify")
-    expected = "3 bodies on 3 hinges, 1 degree of freedom, 1 driven, 6 held until released"
+    expected = "3 bodies on 3 hinges, 1 degree of freedom, 1 driven, 6 locked until released"
     assert done.code == 0 and expected in done.out
 
 
@@ -107,7 +107,7 @@ def test_an_interrupted_run_of_scipy_promises_no_checkpoint(
     monkeypatch.setattr(scipy.integrate, "RK45", Late)
     command = ("simulate", "pendulum.toml", "--method", "scipy-RK45", "-o", "run.csv")
     done = mstmm(*command)
-    assert done.code == 130 and "what was computed is in run.csv" in done.err
+    assert done.code == 130 and "the result so far is in run.csv" in done.err
     assert "--resume" not in done.err and not (folder / "run.csv.checkpoint").exists()
     assert columns(folder / "run.csv")["time [s]"][-1] > 0.5
     assert "checkpoint" not in json.loads(mstmm(*command, "--json").out)

@@ -71,7 +71,7 @@ def test_a_result(mstmm: Command, folder: Path) -> None:
         (("pendulum.toml", "--trail", "rod.top", "-o", "a.png"), "rod.tip"),
         (("missing.toml",), "there is no such file"),
         (("missing.nc",), "there is no such file"),
-        (("run.nc", "--t-end", "2"), "a result has run already"),
+        (("run.nc", "--t-end", "2"), "expected a scene, found a result"),
         (("pendulum.toml", "--speed", "0"), "above 0"),
     ],
 )
@@ -137,7 +137,7 @@ def test_curves_that_are_refused(
         ("pendulum.toml",): "expected a saved result, .nc, .csv, .mat",
         ("missing.csv",): "there is no such file",
         ("run.nc", "-o", "a.html"): ".png or .svg or .pdf",
-        ("run.nc", "--phase", "--spectrum"): "take one of them",
+        ("run.nc", "--phase", "--spectrum"): "use only one of them",
         ("run.nc", "-q", "energy", "--phase"): "its rate is not known",
     }
     for arguments, message in cases.items():

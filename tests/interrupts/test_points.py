@@ -62,7 +62,7 @@ def test_interrupted_at_any_line(laboratory: Laboratory, which: signal.Signals) 
             assert whole.startswith(part) and (CHECKPOINT in names or part == whole), at
         assert laboratory.finished() == whole, at
         at += STRIDE[which]
-    assert any("; the run is kept in a.csv.checkpoint" in text for text in said)
+    assert any("; the run is saved in a.csv.checkpoint" in text for text in said)
     assert any("interrupted at t = " in text and "--resume" in text for text in said)
 
 

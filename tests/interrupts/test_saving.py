@@ -27,7 +27,7 @@ from mstmm.runtime.result.output import tabled
 from mstmm.runtime.run import execution, simulate
 
 RUN = ("simulate", "pendulum.toml", "--t-end", "1", "-o", "a.csv", "--no-certify")
-KEPT = "the run is kept in a.csv.checkpoint; continue with the same command and --resume"
+KEPT = "the run is saved in a.csv.checkpoint; continue with the same command and --resume"
 
 
 @pytest.mark.parametrize(

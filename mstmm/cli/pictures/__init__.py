@@ -1,1 +1,1 @@
-"""Commands that show a run: pages, strips and films, curves, a report."""
+"""Commands that display a run: animations, plots and reports."""

@@ -1,4 +1,4 @@
-"""`mstmm plot`: curves of saved results, several of them over each other."""
+"""`mstmm plot`: plots of quantities of one or several saved results."""
 
 from __future__ import annotations
 
@@ -23,40 +23,42 @@ PICTURES = (".png", ".svg", ".pdf")
 def plot(
     results: Annotated[
         list[str],
-        typer.Argument(metavar="RESULT...", help="Saved results, .nc, .csv or .mat, drawn over "
-                       "each other.", show_default=False),
+        typer.Argument(metavar="RESULT...", help="Saved results, .nc, .csv or .mat, in one plot.",
+                       show_default=False),
     ],
     quantity: Annotated[
         list[str] | None,
-        typer.Option("--quantity", "-q", metavar="NAME", help="What to draw, such as "
-                     "shoulder.angle, rod1.tip.position, strut.force, energy; may be repeated.  By "
-                     "default what moves most."),
+        typer.Option("--quantity", "-q", metavar="NAME", help="Quantity to plot, such as "
+                     "shoulder.angle, rod1.tip.position, strut.force, energy; repeatable.  "
+                     "Default: those that vary most."),
     ] = None,
     against: Annotated[
         str | None,
-        typer.Option("--against", metavar="NAME", help="Draw over this quantity, not the time."),
+        typer.Option("--against", metavar="NAME", help="Quantity on the horizontal axis instead of "
+                     "time."),
     ] = None,
     phase: Annotated[
-        bool, typer.Option("--phase", help="Draw the rate of each quantity over itself.")
+        bool, typer.Option("--phase", help="Phase plot: each quantity against its rate.")
     ] = False,
     spectrum: Annotated[
-        bool, typer.Option("--spectrum", help="Draw amplitudes over the frequency, Hz.")
+        bool, typer.Option("--spectrum", help="Amplitude spectrum, Hz.")
     ] = False,
     output: Annotated[
         list[str] | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Picture, .png, .svg or .pdf; may be "
-                     "repeated.  By default a .png with the first result's name, here."),
+        typer.Option("--output", "-o", metavar="FILE", help="Plot file: .png, .svg or .pdf; "
+                     "repeatable.  Default: .png with the name of the first result, current "
+                     "folder."),
     ] = None,
     title: Annotated[
-        str | None, typer.Option("--title", metavar="TEXT", help="Words above the picture.")
+        str | None, typer.Option("--title", metavar="TEXT", help="Title of the figure.")
     ] = None,
     json: Json = False,
 ) -> None:  # fmt: skip
-    """Draw quantities of saved results: over time, over each other, as phase or spectrum."""
+    """Plot quantities of saved results: time series, phase plots, spectra."""
     from .. import output as terminal
 
     if (against is not None and (phase or spectrum)) or (phase and spectrum):
-        raise MstmmError("--against, --phase, --spectrum: take one of them")
+        raise MstmmError("--against, --phase, --spectrum: use only one of them")
     for name in results:
         if Path(name).suffix.lower() not in RESULTS:
             raise MstmmError(
@@ -90,7 +92,7 @@ def plot(
 
 
 def _runs(results: Sequence[str]) -> dict[str, Any]:
-    """What is drawn, by labels: names of files, with their folders where these are alike."""
+    """Results by label: names of files, with their folders if names are equal."""
     import mstmm
 
     paths = [Path(name) for name in dict.fromkeys(results)]

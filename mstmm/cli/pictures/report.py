@@ -1,4 +1,4 @@
-"""`mstmm report`: a result as one page to read."""
+"""`mstmm report`: HTML report of a result."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ def report(
     result: Annotated[str, typer.Argument(metavar="RESULT", help="A saved result, .nc.")],
     output: Annotated[
         str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="The page, .html; by default with the "
-                     "result's name, here."),
+        typer.Option("--output", "-o", metavar="FILE", help="Report file, .html; default: result "
+                     "name, current folder."),
     ] = None,
     quantity: Annotated[
         list[str] | None,
-        typer.Option("--quantity", "-q", metavar="NAME", help="What the curves show, such as "
-                     "rod1.tip.position; may be repeated.  By default what moves most."),
+        typer.Option("--quantity", "-q", metavar="NAME", help="Quantity to plot, such as "
+                     "rod1.tip.position; repeatable.  Default: those that vary most."),
     ] = None,
     trail: Annotated[
         list[str] | None,
-        typer.Option("--trail", metavar="END", help="An end whose way is drawn; may be repeated."),
+        typer.Option("--trail", metavar="END", help="End whose path is drawn; repeatable."),
     ] = None,
     json: Json = False,
 ) -> None:  # fmt: skip
-    """Write one page that tells a run: can it be trusted, how it moves, curves, equations."""
+    """Write an HTML report of a run: trustworthiness, animation, plots, equations."""
     from .. import output as terminal
 
     source = Path(result)
@@ -51,4 +51,4 @@ def report(
     if json:
         terminal.emit_json(made([target], run))
         return
-    terminal.say(f"{target}: a page for any browser, without a network")
+    terminal.say(f"{target}: a page for any browser, usable offline")

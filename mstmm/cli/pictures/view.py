@@ -1,4 +1,4 @@
-"""`mstmm view`: a scene or a result as a page that moves, a strip, a film or frames."""
+"""`mstmm view`: animation, strip of frames, film or single frames of a scene or result."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ _RESULT = ".nc"
 def view(
     what: Annotated[
         str,
-        typer.Argument(metavar="SCENE|RESULT", help="A scene file, .toml or .json, at its start; "
-                       "or a result, .nc, as it moves."),
+        typer.Argument(metavar="SCENE|RESULT", help="Scene (.toml, .json) or result (.nc)."),
     ],
     output: Annotated[
         list[str] | None,
-        typer.Option("--output", "-o", metavar="FILE", help="A page that moves, .html; a strip of "
-                     "moments, .png, .svg or .pdf; a film, .gif or .mp4; may be repeated.  By "
-                     "default a page with the scene's name, here."),
+        typer.Option("--output", "-o", metavar="FILE", help="Animation (.html), strip of frames "
+                     "(.png, .svg, .pdf) or film (.gif, .mp4); repeatable.  Default: animation "
+                     "with the name of the scene, current folder."),
     ] = None,
     frames: Annotated[
         str | None,
-        typer.Option("--frames", metavar="FOLDER", help="Every picture of the film, as .png."),
+        typer.Option("--frames", metavar="FOLDER", help="Folder for the single frames of the film, "
+                     ".png."),
     ] = None,
     t_end: Annotated[
         float | None,
@@ -45,21 +45,21 @@ def view(
     ] = None,
     trail: Annotated[
         list[str] | None,
-        typer.Option("--trail", metavar="END", help="An end whose way is drawn, such as rod2.tip; "
-                     "may be repeated."),
+        typer.Option("--trail", metavar="END", help="End whose path is drawn, such as rod2.tip; "
+                     "repeatable."),
     ] = None,
     speed: Annotated[
         float | None,
-        typer.Option("--speed", metavar="X", parser=positive, help="Seconds of the run that pass "
-                     "in one: 0.1 is ten times slower."),
+        typer.Option("--speed", metavar="X", parser=positive, help="Playback speed: 0.1 is ten "
+                     "times slower than real time."),
     ] = None,
     moments: Annotated[
-        int, typer.Option("--moments", metavar="N", min=1, help="Moments of a strip.")
+        int, typer.Option("--moments", metavar="N", min=1, help="Number of frames in a strip.")
     ] = 6,
     hinge: Elements = None,
     json: Json = False,
 ) -> None:  # fmt: skip
-    """Look at a scene, or at a run of it, in three dimensions."""
+    """Animate a result, or draw a scene, in three dimensions."""
     from .. import output as terminal
 
     named = output or ([] if frames else [f"{Path(what).stem or 'scene'}.html"])
@@ -88,13 +88,15 @@ def view(
 
 
 def _result(what: str, t_end: float | None) -> Result:
-    """What is looked at: a saved result, a scene at its start, or a run of a scene."""
+    """Result to display: a saved one, a scene at its start, or a new run of a scene."""
     import mstmm
     from mstmm.runtime.model.loading import load_netcdf
 
     if Path(what).suffix.lower() == _RESULT:
         if t_end is not None:
-            raise MstmmError("--t-end: a result has run already; give the scene to run it again")
+            raise MstmmError(
+                "--t-end: expected a scene, found a result; give the scene to run it again"
+            )
         return load_netcdf(Path(what))
     model = compiled(what, mstmm.load_scene(what))
     if t_end is None:
@@ -112,7 +114,7 @@ def _nearest(what: str, error: OpenLoop) -> Result:
 
 
 def made(targets: Sequence[Path], result: Result) -> dict[str, Any]:
-    """What was written of which part of a run, as JSON."""
+    """Files written and time span of the run, for JSON."""
     return {
         "files": [str(target) for target in targets],
         "t_start": float(result.t[0]), "t_end": float(result.t[-1]), "samples": len(result.t),
@@ -121,7 +123,7 @@ def made(targets: Sequence[Path], result: Result) -> dict[str, Any]:
 
 def _about(target: Path, result: Result) -> str:
     what = {
-        ".html": "a page for any browser, without a network",
+        ".html": "a page for any browser, usable offline",
         ".gif": "a film",
         ".mp4": "a film",
     }
@@ -133,5 +135,5 @@ def _about(target: Path, result: Result) -> str:
 
 
 def title_of(path: Path) -> str:
-    """The name of the file, or of its folder where every such file is called the same."""
+    """Name of the file, or of its folder if the file is named "scene"."""
     return path.absolute().parent.name if path.stem == "scene" else path.stem

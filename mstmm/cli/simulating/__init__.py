@@ -1,1 +1,1 @@
-"""`mstmm simulate`: what is asked, the run, what is kept and told of it."""
+"""Command `mstmm simulate`: options, resumable run, saving and output."""

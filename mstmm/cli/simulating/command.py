@@ -1,4 +1,4 @@
-"""`mstmm simulate`: run a scene, keep what was computed, say how far it can be trusted."""
+"""`mstmm simulate`: run a scene, save the result and report whether it can be trusted."""
 
 from __future__ import annotations
 
@@ -36,22 +36,19 @@ if TYPE_CHECKING:
 def simulate(
     scene: Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")],
     t_end: Annotated[
-        float, typer.Option("--t-end", metavar="S", parser=positive, help="End of the run, s.")
+        float, typer.Option("--t-end", metavar="S", parser=positive, help="End time, s.")
     ] = 10.0,
     method: Annotated[
         str | None,
         typer.Option(
             "--method", metavar="NAME", show_default=f"auto, {METHOD} with --step",
-            help="auto, which chooses; dop853, dopri5, pirk13, rk4; for stiff motion rodas4p2, "
-            "rodas5p, rodas4, ros34pw2, rodas4pw, esdirk436, kvaerno5, genalpha, dttmm, hht, "
-            "newmark, wilson, houbolt, genalpha-index3, hht-index3; exprb32 for undamped "
-            "vibration; dttmm-classical, dttmm-classical-product; scipy-DOP853, -RK45, "
-            "-RK23, -Radau, -BDF, -LSODA; sundials-BDF, -Adams.  mstmm list tells of each."
+            help="Integration method, see `mstmm list methods`; auto chooses one."
         ),
     ] = None,
     step: Annotated[
         float | None,
-        typer.Option("--step", metavar="S", parser=positive, help="Fixed step, s; some need it."),
+        typer.Option("--step", metavar="S", parser=positive, help="Fixed time step, s; required by "
+                     "fixed-step methods."),
     ] = None,
     rtol: Annotated[
         float | None,
@@ -65,116 +62,114 @@ def simulate(
     ] = None,
     error: Annotated[
         float | None,
-        typer.Option("--error", metavar="X", parser=positive, help="Error wanted of the whole run, "
-                     "instead of tolerances: rad, or part of the motion; several runs reach it."),
+        typer.Option("--error", metavar="X", parser=positive, help="Target error of the whole run, "
+                     "in place of tolerances: rad, or relative to the motion; several runs may be "
+                     "made."),
     ] = None,
     of: Annotated[
         list[str] | None,
-        typer.Option("--of", metavar="NAME", help="Quantity whose error --error is, in its unit, "
-                     "such as rod1.tip.position; may be repeated."),
+        typer.Option("--of", metavar="NAME", help="Quantity to which --error applies, in its unit, "
+                     "such as rod1.tip.position; repeatable."),
     ] = None,
     max_step: Annotated[
         float | None,
-        typer.Option("--max-step", metavar="S", parser=positive, help="Longest step of a method "
-                     "that chooses its steps, s: no narrow part of a force is passed over."),
+        typer.Option("--max-step", metavar="S", parser=positive, help="Maximum time step of "
+                     "adaptive methods, s; use it when a force is narrow."),
     ] = None,
     radius: Annotated[
         float | None,
-        typer.Option("--radius", metavar="X", parser=not_negative, help="Spectral radius, 0 to 1, "
-                     "that genalpha and dttmm leave to infinitely fast motion (0.8)."),
+        typer.Option("--radius", metavar="X", parser=not_negative, help="Spectral radius at "
+                     "infinity of genalpha and dttmm, 0 to 1 (0.8)."),
     ] = None,
     times: Annotated[
         Times | None,
         typer.Option(
             "--times", metavar="N|DT", parser=times,
-            help="Samples: how many (201), or how far apart in s (0.05, 1s); else every step.",
+            help="Output times: a count (201) or an interval in s (0.05, 1s); default: every step.",
         ),
     ] = None,
     output: Annotated[
         str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Result, .nc, .csv or .mat; by default "
-                     "the scene's name, here."),
+        typer.Option("--output", "-o", metavar="FILE", help="Result file: .nc, .csv or .mat; "
+                     "default: scene name, current folder."),
     ] = None,
     plot: Annotated[
         str | None,
-        typer.Option("--plot", metavar="FILE", help="Picture, .png, .svg or .pdf."),
+        typer.Option("--plot", metavar="FILE", help="Plot file: .png, .svg or .pdf."),
     ] = None,
     quantity: Annotated[
         list[str] | None,
-        typer.Option("--quantity", "-q", metavar="NAME", help="What to plot and to print, such as "
-                     "shoulder.angle, rod1.tip.position, energy; may be repeated."),
+        typer.Option("--quantity", "-q", metavar="NAME", help="Quantity to plot and print, such as "
+                     "shoulder.angle, rod1.tip.position, energy; repeatable."),
     ] = None,
     inputs: Annotated[
         list[str] | None,
-        typer.Option("--input", metavar="NAME=VALUE", help="What an input of the scene is: a "
-                     "number, or the name of a signal of it; may be repeated."),
+        typer.Option("--input", metavar="NAME=VALUE", help="Value of a scene input, or the name of "
+                     "a signal; repeatable."),
     ] = None,
     hinge: Elements = None,
     certify: Annotated[
         bool | None,
-        typer.Option("--certify/--no-certify", help="Estimate the error by a second, more accurate "
-                     "run; by default after short runs."),
+        typer.Option("--certify/--no-certify", help="Estimate the error with a second, more "
+                     "accurate run; default: after short runs."),
     ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue an interrupted run, with the same options.")
     ] = False,
     sweep: Annotated[
         str,
-        typer.Option("--sweep", metavar="NAME", help="riccati, refined: for heavy bodies behind "
-                     "light ones, qr: as least squares, for any ratio of masses, auto: the first "
-                     "of these that keeps the start's digits, or product: the plain product of "
-                     "transfer matrices, for chains, guarded."),
+        typer.Option("--sweep", metavar="NAME", help="Sweep: riccati; refined or qr for large mass "
+                     "ratios; product (plain product, chains only); auto: the first that is "
+                     "accurate enough at the start."),
     ] = "auto",
     engine: Annotated[
         str,
-        typer.Option("--engine", metavar="NAME", help="auto, looped, or fused: code compiled for "
-                     "this scene."),
+        typer.Option("--engine", metavar="NAME", help="auto, looped (generic C loop) or fused (C "
+                     "compiled for this scene)."),
     ] = "auto",
     flexibility: Annotated[
         str | None,
-        typer.Option("--flexibility", metavar="LEVEL", help="coupled, one-way, or rigid: level of "
-                     "model of all flexible bodies; by default as the scene says."),
+        typer.Option("--flexibility", metavar="LEVEL", help="Model level of all flexible bodies: "
+                     "coupled, one-way or rigid; default: as in the scene."),
     ] = None,
     scheme: Annotated[
         str,
-        typer.Option("--scheme", metavar="NAME", help="Of dttmm-classical: generalised-alpha, hht, "
-                     "newmark or wilson, with a number as in hht:0.3."),
+        typer.Option("--scheme", metavar="NAME", help="Time scheme of dttmm-classical: "
+                     "generalised-alpha, hht, newmark, wilson; parameter as in hht:0.3."),
     ] = "",
     iterations: Annotated[
         int,
-        typer.Option("--iterations", metavar="N", help="Of dttmm-classical: linear solutions that "
-                     "a step may take."),
+        typer.Option("--iterations", metavar="N", help="Maximum Newton iterations per step of "
+                     "dttmm-classical."),
     ] = 1,
     tangent: Annotated[
         str,
-        typer.Option("--tangent", metavar="NAME", help="Of implicit methods: auto, exact, or laws, "
-                     "the slopes of hinges' laws alone, for those that allow it."),
+        typer.Option("--tangent", metavar="NAME", help="Tangent matrix of implicit methods: exact, "
+                     "laws (hinge laws only) or auto."),
     ] = "auto",
     accuracy: Annotated[
         float | None,
-        typer.Option("--accuracy", metavar="X", parser=positive, help="Error up to which the "
-                     "result counts as trusted: rad, or part of the motion (0.01)."),
+        typer.Option("--accuracy", metavar="X", parser=positive, help="Largest estimated error of "
+                     "a trusted result: rad, or relative to the motion (0.01)."),
     ] = None,
     on_risk: Annotated[
         str,
-        typer.Option("--on-risk", metavar="WORD", help="Where something speaks against the "
-                     "numbers: warn; refuse, before the run where it is seen there, else with "
-                     "exit code 4 once the result is saved; ignore, which tells nothing."),
+        typer.Option("--on-risk", metavar="ACTION", help="Action if the result is in doubt: warn; "
+                     "refuse (before the run, else exit code 4 after saving); ignore."),
     ] = "warn",
     simplify: Annotated[
         bool,
-        typer.Option("--simplify/--no-simplify", help="Pack bodies on fixed hinges as one with "
-                     "what holds them, and take orientations written with 12 digits as the quarter "
-                     "turns that they are."),
+        typer.Option("--simplify/--no-simplify", help="Merge bodies on fixed hinges, and snap "
+                     "nearly right angles to exact ones."),
     ] = True,
     turns: Annotated[
         float | None,
-        typer.Option("--turns", metavar="X", parser=not_negative, help="Take orientations within "
-                     "so many rad of quarter turns as these (1e-11 if nothing is said; 0: none)."),
+        typer.Option("--turns", metavar="X", parser=not_negative, help="Tolerance for snapping to "
+                     "right angles, rad (1e-11; 0 switches it off)."),
     ] = None,
     json: Json = False,
 ) -> None:  # fmt: skip
-    """Simulate a scene and save the result; Ctrl-C keeps what was computed."""
+    """Simulate a scene and save the result; Ctrl-C saves what has been computed."""
     plan = Plan(
         scene, t_end, method, step, rtol, atol, times,
         output_file(_default_output(scene) if output is None else output, RESULTS),
@@ -215,7 +210,7 @@ def _default_output(scene: str) -> str:
 
 
 def _model(plan: Plan) -> Model:
-    """The compiled scene, with every quantity that was asked for in it."""
+    """Compile the scene, and check that it has all requested quantities."""
     import mstmm
     from mstmm.scene.rules.messages import near
 

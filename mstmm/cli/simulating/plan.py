@@ -1,4 +1,4 @@
-"""What a run was asked for, checked."""
+"""Checked options of `mstmm simulate`."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from mstmm.errors import MstmmError
 from ..models import OF_OTHERS
 from ..options import Times
 
-#: Most fixed steps of a run.
+#: Largest number of fixed steps of a run.
 MAX_STEPS = 1e11
 
-#: How the names of the classical discrete-time method begin.
+#: Prefix of the names of the classical discrete-time method.
 _CLASSICAL = "dttmm-classical"
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What was asked for, checked."""
+    """Options of a run, checked."""
 
     scene: str
     t_end: float
@@ -52,35 +52,40 @@ class Plan:
 
     @property
     def resumable(self) -> bool:
-        """Integrators of others, the classical method and runs for an error keep no checkpoints."""
+        """Whether the run writes checkpoints.
+
+        External integrators, the classical method and runs for a target error do not.
+        """
         others = (self.method or METHOD).startswith((*OF_OTHERS, _CLASSICAL))
         return self.error is None and not others
 
     @property
     def checkpoint(self) -> Path:
-        """Where an interrupted run keeps its state."""
+        """File in which an interrupted run saves its state."""
         return self.output.with_name(self.output.name + ".checkpoint")
 
 
 def refuse_endless(plan: Plan) -> None:
-    """A step so small that no machine would ever reach the end."""
+    """Reject a step so small that the run would never end."""
     if plan.step is not None and plan.t_end / plan.step > MAX_STEPS:
         raise MstmmError(
             f"--step {plan.step:g}: {plan.t_end / plan.step:.1e} steps would never end; "
-            f"take {plan.t_end / MAX_STEPS:.1e} s or more"
+            f"use {plan.t_end / MAX_STEPS:.1e} s or more"
         )
 
 
 def refuse_beside_error(plan: Plan) -> None:
-    """Several runs are made for an error, of which none is kept to go on from; and what is trusted
-    is what was asked for."""
+    """Reject options that contradict --error.
+
+    The several runs for a target error write no checkpoint, and the target error is the accuracy.
+    """
     if plan.error is not None and plan.resume:
         raise MstmmError(
-            "--resume: there is no checkpoint of runs with --error; run it again, or take the "
-            "method and the tolerances that such a run has found"
+            "--resume: runs with --error write no checkpoint; run it again, or use the method and "
+            "the tolerances found by such a run"
         )
     if plan.error is not None and plan.accuracy is not None:
         raise MstmmError(
-            "--accuracy beside --error: a result counts as trusted that reaches --error; leave "
-            "--accuracy out"
+            "--accuracy with --error: a result is trusted if it reaches --error; leave out "
+            "--accuracy"
         )

@@ -1,4 +1,4 @@
-"""A run that is interrupted, or whose result cannot be saved, costs nothing: it goes on later."""
+"""Run that can be resumed after an interrupt, or if its result cannot be saved."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 
     from .plan import Plan
 
-#: A run shorter than this (s) is followed by the second one that estimates its error.
+#: Duration (s) up to which a run is followed by a second one that estimates its error.
 SHORT = 2.0
 
 
 def run(plan: Plan, model: Model, progress: Bar) -> tuple[Result, RiskRefused | None]:
-    """The result; and what --on-risk refuse says of it, if it does."""
+    """Simulate; returns the result, and the exception of --on-risk refuse, if any."""
     if plan.resume and not plan.checkpoint.is_file():
         raise MstmmError(
-            f"--resume: there is no checkpoint {plan.checkpoint}; it is written when a run is "
-            "interrupted, beside its --output"
+            f"--resume: there is no checkpoint {plan.checkpoint}; it is written to the folder of "
+            "--output when a run is interrupted"
         )
     try:
         result = model.simulate(
@@ -45,10 +45,10 @@ def run(plan: Plan, model: Model, progress: Bar) -> tuple[Result, RiskRefused | 
 
 
 def saved(plan: Plan, result: Result, seconds: float, progress: Bar) -> Result:
-    """The result in its place, with its error estimated where that was asked for.
+    """Save the result, with an error estimate if requested, and return it.
 
-    The checkpoint goes with the last step, so that every part can be done again.  A run that was
-    resumed is no short one.
+    The checkpoint is removed in the last step, so that every part can be repeated.  A resumed run
+    does not count as short.
     """
     short = seconds < SHORT and not plan.resume and plan.error is None
     if result.trajectory.is_comparable and (short if plan.certify is None else plan.certify):
@@ -65,7 +65,7 @@ def saved(plan: Plan, result: Result, seconds: float, progress: Bar) -> Result:
 
 @contextmanager
 def kept_if_interrupted(checkpoint: Path) -> Iterator[None]:
-    """An interrupt beside the run itself says what there is to go on from."""
+    """Add the checkpoint to the message of an interrupt outside the run."""
     try:
         yield
     except KeyboardInterrupt:
@@ -76,7 +76,7 @@ def kept_if_interrupted(checkpoint: Path) -> Iterator[None]:
 
 @contextmanager
 def kept_if_it_fails(checkpoint: Path) -> Iterator[None]:
-    """What goes wrong while a result is saved costs no run: the message says where it is kept."""
+    """Add the checkpoint to the message of an error that occurs while a result is saved."""
     try:
         yield
     except (MstmmError, MemoryError) as error:
@@ -85,10 +85,10 @@ def kept_if_it_fails(checkpoint: Path) -> Iterator[None]:
         if isinstance(error, MstmmError):
             raise type(error)(f"{error}; {_kept(checkpoint)}") from None
         raise EnvironmentFailure(
-            "there is not enough memory to evaluate all samples and to save them; "
-            f"{_kept(checkpoint)} where there is more memory, or run it again with fewer --times"
+            "not enough memory to evaluate and save all samples; "
+            f"{_kept(checkpoint)} with more memory, or run it again with fewer --times"
         ) from None
 
 
 def _kept(checkpoint: Path) -> str:
-    return f"the run is kept in {checkpoint}; continue with the same command and --resume"
+    return f"the run is saved in {checkpoint}; continue with the same command and --resume"

@@ -1,4 +1,4 @@
-"""What `mstmm simulate` says of a run."""
+"""Output of `mstmm simulate` about a run."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ if TYPE_CHECKING:
 
     from .plan import Plan
 
-#: Rows of the table on the terminal.
+#: Number of rows of the table on the terminal.
 _ROWS = 9
 
 
 def interrupted(result: Result) -> bool:
-    """True if Ctrl-C or SIGTERM ended the run."""
+    """Whether Ctrl-C or SIGTERM ended the run."""
     return result.status is None
 
 
 def report(
     plan: Plan, result: Result, seconds: float, json: bool, refused: RiskRefused | None
 ) -> None:
-    """Tell how a run went, on the terminal or as JSON."""
+    """Report a run on the terminal or as JSON."""
     from .. import output, summary
 
     made = [str(path) for path in (plan.output, plan.plot) if path is not None]
@@ -44,9 +44,9 @@ def report(
     if interrupted(result) and plan.resumable:
         output.complain(f"{result.message}; continue with the same command and --resume")
     elif interrupted(result):
-        output.complain(f"{result.message}; what was computed is in {plan.output}")
+        output.complain(f"{result.message}; the result so far is in {plan.output}")
     elif not result.success:
-        output.complain(f"{plan.scene}: {result.message}; what was computed is in {plan.output}")
+        output.complain(f"{plan.scene}: {result.message}; the result so far is in {plan.output}")
 
 
 def _verdict(plan: Plan, result: Result) -> Verdict:
@@ -79,8 +79,8 @@ def _say(plan: Plan, result: Result, seconds: float, made: list[str]) -> None:
 
 
 def told_risks(plan: Plan, refused: RiskRefused) -> int:
-    """The exit code of a result whose risks are refused, once they are told."""
+    """Print the risks of a rejected result, and return the exit code."""
     from .. import output
 
-    output.complain(f"{plan.scene}: {refused}\nwhat was computed is in {plan.output}")
+    output.complain(f"{plan.scene}: {refused}\nthe result is in {plan.output}")
     return refused.exit_code

@@ -1,4 +1,4 @@
-"""`mstmm advise`: the smallest model of a scene that suffices for a wanted error."""
+"""`mstmm advise`: smallest model of a scene that meets a target error."""
 
 from __future__ import annotations
 
@@ -22,41 +22,41 @@ if TYPE_CHECKING:
 def advise(
     scene: Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")],
     error: Annotated[
-        float, typer.Option("--error", metavar="E", parser=finite, help="Largest error wanted, "
-                            "above 0; below 1 where it is no quantity's.")
+        float, typer.Option("--error", metavar="E", parser=finite, help="Target error, above 0; "
+                            "below 1 unless --of names one quantity.")
     ] = CHART_ERROR,
     of: Annotated[
         list[str] | None,
-        typer.Option("--of", metavar="NAME", help="Quantity whose error --error is, in its unit, "
-                     "such as rod1.tip.position; may be repeated. The places of all bodies and "
-                     "ends, in parts of the scene's length, unless given."),
+        typer.Option("--of", metavar="NAME", help="Quantity to which --error applies, in its unit, "
+                     "such as rod1.tip.position; repeatable. Default: positions of all bodies and "
+                     "ends, relative to the scene size."),
     ] = None,
     t_end: Annotated[
-        float, typer.Option("--t-end", metavar="S", parser=positive, help="End of the run, s.")
+        float, typer.Option("--t-end", metavar="S", parser=positive, help="End time, s.")
     ] = 10.0,
     write: Annotated[
         str | None,
-        typer.Option("--write", metavar="FILE", help="Write the reduced scene, .toml."),
+        typer.Option("--write", metavar="FILE", help="File for the reduced scene, .toml."),
     ] = None,
     budget: Budget = CHART_BUDGET,
     samples: Annotated[
-        int, typer.Option("--times", metavar="N", parser=at_least(2), help="Times from 0 to the "
-                          "end at which errors are looked at; the largest counts.")
+        int, typer.Option("--times", metavar="N", parser=at_least(2), help="Number of times at "
+                          "which the error is evaluated.")
     ] = ADVICE_SAMPLES,
     rounds: Rounds = CHART_ROUNDS,
     engine: Annotated[
-        str, typer.Option("--engine", metavar="NAME", help="looped, auto, or fused: code compiled "
-                          "for each model.")
+        str, typer.Option("--engine", metavar="NAME", help="looped (generic C loop), auto, or "
+                          "fused (C compiled for each model).")
     ] = "looped",
     hinge: Elements = None,
     json: Json = False,
 ) -> None:  # fmt: skip
-    """Advise the smallest model that suffices: what may be rigid, how many shapes, which method."""
+    """Find the smallest model that meets a target error: rigid bodies, mode count, method."""
     from .. import output
 
     file = None if write is None else output_file(write, (".toml",), "--write")
     if file is not None and file.exists() and Path(scene).exists() and file.samefile(scene):
-        raise SceneError(f"--write {write}: this is the scene itself; give another name")
+        raise SceneError(f"--write {write}: this is the input scene; give another name")
     use_files(hinge or [])
     import mstmm
 

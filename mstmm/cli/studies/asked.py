@@ -1,5 +1,4 @@
-"""What `mstmm linearize`, `mstmm modes` and `mstmm frf` have in common: where a scene is made
-linear, and what becomes of the answer."""
+"""Options common to `mstmm linearize`, `mstmm modes` and `mstmm frf`, and their output."""
 
 from __future__ import annotations
 
@@ -27,33 +26,35 @@ if TYPE_CHECKING:
 SceneFile = Annotated[str, typer.Argument(metavar="SCENE", help="Scene file, .toml or .json.")]
 AtStart = Annotated[
     bool,
-    typer.Option("--at-start", help="At the scene's start with its speeds, not at rest."),
+    typer.Option("--at-start", help="Linearise about the initial state, with its speeds, instead "
+                 "of the equilibrium."),
 ]  # fmt: skip
 Set = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Another number of the scene, such as "
-                 "rod1.mass=2; may be repeated."),
+    typer.Option("--set", metavar="NAME=VALUE", help="Change a scene parameter, such as "
+                 "rod1.mass=2; repeatable."),
 ]  # fmt: skip
 Output = Annotated[
     str | None,
-    typer.Option("--output", "-o", metavar="FILE", help="File for the numbers, .nc or .csv."),
+    typer.Option("--output", "-o", metavar="FILE", help="File for the numerical results, .nc or "
+                 ".csv."),
 ]  # fmt: skip
 Plot = Annotated[
     str | None,
-    typer.Option("--plot", metavar="FILE", help="A picture of it: .png, .svg or .pdf."),
+    typer.Option("--plot", metavar="FILE", help="Plot file: .png, .svg or .pdf."),
 ]  # fmt: skip
 Friction = Annotated[
     list[str] | None,
-    typer.Option("--friction", metavar="SPEED", help="Amplitude of speed, rad/s or m/s, at which "
-                 "dry friction counts as viscous damping, or of a hinge or chain: elbow=0.1; may "
-                 "be repeated.  Left out unless given."),
+    typer.Option("--friction", metavar="SPEED", help="Speed amplitude, rad/s or m/s, at which dry "
+                 "friction is replaced by viscous damping, of all hinges or of one: elbow=0.1; "
+                 "repeatable.  Default: no dry friction."),
 ]  # fmt: skip
 _FILES, _PICTURES = (".nc", ".csv"), (".png", ".svg", ".pdf")
 
 
 @dataclass(frozen=True)
 class Asked:
-    """The options that all three commands take."""
+    """Options of all three commands."""
 
     scene: str
     at_start: bool
@@ -63,10 +64,10 @@ class Asked:
     hinge: list[str] | None
     json: bool
     friction: list[str] | None = None
-    seen: str | None = None  #: of modes alone: where they are shown as they move
+    seen: str | None = None  #: only for modes: file of their animation
 
     def linear(self, inputs: list[str] | None) -> Linear:
-        """The scene made linear; before that every file that it will write is checked."""
+        """Linearise the scene, after a check of all output files."""
         self._file()
         self._picture()
         _checked(self.seen, ENDINGS, "--view")
@@ -83,12 +84,12 @@ class Asked:
         return _checked(self.plot, _PICTURES, "--plot")
 
     def show(self, modes: Modes) -> None:
-        """The motions as they move, into the file that is named."""
+        """Write the animation of the modes, if a file is given."""
         if self.seen is not None:
             modes.view(self.seen, title=title_of(Path(self.scene)))
 
     def answered(self, answer: Linear | Modes | FrequencyResponse) -> bool:
-        """The files written; with --json the answer told, and nothing is left to say."""
+        """Write the files, and with --json print the answer; True if it has been printed."""
         from .. import output as terminal
 
         file, picture = self._file(), self._picture()
@@ -104,15 +105,15 @@ class Asked:
         return self.json
 
     def say_where(self, other: str) -> None:
-        """Names of the files; without any, `other`."""
+        """Print the names of the files written; without result file and plot, print `other`."""
         from .. import output as terminal
 
         if self.output is not None:
-            terminal.say(f"written: {self.output}")
+            terminal.say(f"wrote {self.output}")
         if self.plot is not None:
-            terminal.say(f"drawn: {self.plot}")
+            terminal.say(f"wrote {self.plot}")
         if self.seen is not None:
-            terminal.say(f"shown: {self.seen}")
+            terminal.say(f"wrote {self.seen}")
         if other and self.output is None and self.plot is None:
             terminal.say(other)
 
@@ -126,7 +127,7 @@ def _checked(name: str | None, endings: tuple[str, ...], option: str) -> Path | 
 
 
 def _changed(scene: str, changes: list[str]) -> Model:
-    """The scene compiled, with other numbers."""
+    """Compile the scene with changed parameters."""
     import mstmm
 
     numbers = assigned("--set", changes, "rod1.mass=2")
@@ -137,7 +138,7 @@ def _changed(scene: str, changes: list[str]) -> Model:
 def number_or_named(
     option: str, texts: Sequence[str], example: str
 ) -> float | dict[str, float] | None:
-    """One number for all, or numbers by names; None where nothing is given."""
+    """Parse one number for all, or numbers by name; None if nothing is given."""
     if len(texts) == 1 and "=" not in texts[0]:
         try:
             return float(texts[0])
@@ -147,7 +148,7 @@ def number_or_named(
 
 
 def assigned(option: str, texts: Sequence[str], example: str) -> dict[str, float]:
-    """The numbers of each NAME=VALUE by their names, each of which may come once."""
+    """Parse texts NAME=VALUE to numbers by name; MstmmError for a repeated name."""
     found: dict[str, float] = {}
     for text in texts:
         name, _, value = (part.strip() for part in text.partition("="))

@@ -1,4 +1,4 @@
-"""`mstmm chart`: what accuracy costs in a scene, by every method and level of model."""
+"""`mstmm chart`: CPU time against error, for every method and model level of a scene."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from mstmm.runtime.chart.chart import Chart
 
 
-#: Longest title of a picture.
+#: Longest title of a plot, in characters.
 _LONGEST = 60
 
-#: Curves that are named beside the reason for which they were left out.
+#: Largest number of curves named with the reason of their omission.
 _NAMED = 4
 
 
@@ -32,41 +32,41 @@ def chart(
         str, typer.Option("--out", metavar="DIR", help="Folder for chart.png, .html and .json.")
     ],
     t_end: Annotated[
-        float, typer.Option("--t-end", metavar="S", parser=positive, help="End of the runs, s.")
+        float, typer.Option("--t-end", metavar="S", parser=positive, help="End time, s.")
     ] = 10.0,
     quantity: Annotated[
         list[str] | None,
-        typer.Option("--quantity", "-q", metavar="NAME", help="What errors are errors of, such as "
-                     "rod1.tip.position; may be repeated. All coordinates unless given."),
+        typer.Option("--quantity", "-q", metavar="NAME", help="Quantity whose error is measured, "
+                     "such as rod1.tip.position; repeatable. Default: all coordinates."),
     ] = None,
     method: Annotated[
         list[str] | None,
-        typer.Option("--method", "-m", metavar="NAME", help="Method to chart; may be repeated. All "
-                     "of them unless given."),
+        typer.Option("--method", "-m", metavar="NAME", help="Method to include; repeatable. "
+                     "Default: all."),
     ] = None,
     models: Annotated[
-        bool, typer.Option("--models", help="Also every level of model of the flexible bodies.")
+        bool, typer.Option("--models", help="Include the model levels of the flexible bodies.")
     ] = False,
     error: Annotated[
-        float, typer.Option("--error", metavar="E", parser=positive, help="Error for which to "
-                            "recommend the cheapest setting.")
+        float, typer.Option("--error", metavar="E", parser=positive, help="Target error for the "
+                            "recommended setting.")
     ] = CHART_ERROR,
     budget: Budget = CHART_BUDGET,
     samples: Annotated[
         int | None,
         typer.Option("--times", metavar="N", parser=at_least(2), show_default=str(CHART_SAMPLES),
-                     help="Even times from 0 to the end at which errors are looked at; the largest "
-                     "counts. Unless given also more where the motion is fast."),
+                     help="Number of evenly spaced times at which the error is evaluated. By "
+                     "default more where the motion is fast."),
     ] = None,
     rounds: Rounds = CHART_ROUNDS,
     engine: Annotated[
-        str, typer.Option("--engine", metavar="NAME", help="auto, looped, or fused: code compiled "
-                          "for this scene.")
+        str, typer.Option("--engine", metavar="NAME", help="auto, looped (generic C loop) or fused "
+                          "(C compiled for this scene).")
     ] = "auto",
     hinge: Elements = None,
     json: Json = False,
 ) -> None:  # fmt: skip
-    """Chart cost against accuracy: every method over its settings, and which one to take."""
+    """Compare all integration methods on a scene: CPU time against error."""
     from .. import output
 
     folder = output_folder(out, "chart.json")
@@ -89,12 +89,12 @@ def chart(
 
 
 def _title(scene: str) -> str:
-    """The file's path, cut at its beginning where it is long."""
+    """Path of the file, shortened at its beginning if it is long."""
     return scene if len(scene) <= _LONGEST else "..." + scene[3 - _LONGEST :]
 
 
 def follow(shown: Bar, budget: float) -> Callable[[str], None]:
-    """What goes on, beside the time that is gone."""
+    """Callback that shows the current work and the share of the time limit."""
     begin = time.monotonic()
 
     def tell(text: str) -> None:
@@ -112,7 +112,7 @@ def _say(made: Chart, files: list[str]) -> None:
 
     console = output.console()
     output.say(recommendation(made))
-    for title, (head, numbers, rows) in (("", advice(made)), ("levels of model", levels(made))):
+    for title, (head, numbers, rows) in (("", advice(made)), ("model levels", levels(made))):
         if rows:
             columns = [name + ">" * (i in numbers) for i, name in enumerate(head)]
             console.print(output.table(title, columns, rows))
@@ -121,5 +121,5 @@ def _say(made: Chart, files: list[str]) -> None:
         for text in told(made.left_out, refused, _NAMED):
             output.say(f"{word}: {text}")
     if missing("plot"):
-        output.say(f"no picture: it needs {', '.join(missing('plot'))}: {install('plot')}")
+        output.say(f"no plot: it needs {', '.join(missing('plot'))}: {install('plot')}")
     output.say(f"wrote {' and '.join(files)}")

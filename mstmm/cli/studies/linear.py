@@ -1,5 +1,4 @@
-"""`mstmm linearize`, `mstmm modes` and `mstmm frf`: a scene near rest, as matrices, natural motions
-and answers to harmonic pushes."""
+"""`mstmm linearize`, `mstmm modes` and `mstmm frf`: linear models about an operating point."""
 
 from __future__ import annotations
 
@@ -19,11 +18,11 @@ if TYPE_CHECKING:
     from mstmm.runtime.linear.linear import Linear
     from mstmm.runtime.linear.motions import Modes
 
-#: Rows of tables on the terminal; coordinates and bodies that a mode's row names.
+#: Rows of tables on the terminal; coordinates and bodies named in the row of a mode.
 _ROWS, _NAMED, _OWNERS = 20, 3, 2
-#: Entries of A in parts of the largest that are not shown.
+#: Largest entry of A that counts as rounding, relative to the largest entry.
 _ROUNDING = 1e-12
-#: Coordinates up to which peaks are looked for near all motions; a damping ratio that is some.
+#: Largest number of coordinates for a search of peaks near all modes; damping ratio assumed then.
 _ALL_MOTIONS, _SOME_DAMPING = 400, 1e-6
 
 
@@ -31,9 +30,9 @@ def linearize(
     scene: SceneFile,
     inputs: Annotated[
         list[str] | None,
-        typer.Option("--input", "-i", metavar="NAME", help="Where it is pushed: shoulder.effort, "
-                     "strut.effort, boom.tip.force.x, boom.tip.mz, an input of the scene; may be "
-                     "repeated.  The inputs of the scene unless given."),
+        typer.Option("--input", "-i", metavar="NAME", help="Input, such as shoulder.effort, "
+                     "strut.effort, boom.tip.force.x, boom.tip.mz, or a scene input; repeatable.  "
+                     "Default: the scene's inputs."),
     ] = None,
     friction: Friction = None,
     at_start: AtStart = False,
@@ -43,7 +42,7 @@ def linearize(
     hinge: Elements = None,
     json: Json = False,
 ) -> None:  # fmt: skip
-    """Make a scene linear near its rest: M x'' + C x' + K x = V v + W w."""
+    """Linearise a scene about its static equilibrium: M x'' + C x' + K x = V v + W w."""
     from .. import output as terminal
 
     asked = Asked(scene, at_start, change, output, plot, hinge, json, friction)
@@ -63,7 +62,7 @@ def linearize(
 
 
 def _rows_of(linear: Linear) -> tuple[list[str], list[list[str]]]:
-    """Diagonals of M, C and K; of a model of first order the largest entries of A."""
+    """Table of the diagonals of M, C and K; for a first-order model the largest entries of A."""
     if linear.has_stiffness:
         diagonals = (matrix.diagonal() for matrix in (linear.M, linear.C, linear.K))
         numbers = ([f"{x:.5g}" for x in row] for row in zip(*diagonals, strict=True))
@@ -81,11 +80,11 @@ def modes(
     scene: SceneFile,
     count: Annotated[
         int | None,
-        typer.Option("--count", "-n", metavar="N", parser=at_least(1), help="The N slowest; all "
-                     "of them unless given."),
+        typer.Option("--count", "-n", metavar="N", parser=at_least(1), help="Number of lowest "
+                     "modes; default: all."),
     ] = None,
     undamped: Annotated[
-        bool, typer.Option("--undamped", help="Without damping and gyroscopic loads.")
+        bool, typer.Option("--undamped", help="Ignore damping and gyroscopic terms.")
     ] = False,
     friction: Friction = None,
     at_start: AtStart = False,
@@ -94,14 +93,13 @@ def modes(
     plot: Plot = None,
     seen: Annotated[
         str | None,
-        typer.Option("--view", metavar="FILE", help="The motions as they move: a page on which "
-                     "each can be chosen, .html; a strip, .png, .svg or .pdf; a film, .gif or "
-                     ".mp4."),
+        typer.Option("--view", metavar="FILE", help="Animate the modes: .html, strip (.png, .svg, "
+                     ".pdf) or film (.gif, .mp4)."),
     ] = None,
     hinge: Elements = None,
     json: Json = False,
 ) -> None:  # fmt: skip
-    """Natural motions of a scene near its rest: frequency, damping, and what moves."""
+    """Compute normal modes about the static equilibrium: frequencies, damping ratios, shapes."""
     from .. import output as terminal
 
     asked = Asked(scene, at_start, change, output, plot, hinge, json, friction, seen)
@@ -127,7 +125,7 @@ def modes(
         terminal.say(
             "damped: frequency of the oscillation, |Im s|/(2 pi); undamped: |s| of eigenvalue s"
         )
-    terminal.say(_counted(found) if len(found) else "nothing moves in this scene")
+    terminal.say(_counted(found) if len(found) else "this scene has no degrees of freedom")
     if found.frame == "rotating":
         terminal.say("frequencies are those of the rotating frame")
     asked.say_where("")
@@ -137,17 +135,16 @@ def frf(
     scene: SceneFile,
     inputs: Annotated[
         list[str] | None,
-        typer.Option("--input", "-i", metavar="NAME", help="Where it is pushed: shoulder.effort, "
-                     "boom.tip.force.x, ground.acceleration.y, road.displacement of a drive, an "
-                     "input of the scene; may be repeated.  The inputs of the scene unless given, "
-                     "the ground's accelerations where it has none."),
+        typer.Option("--input", "-i", metavar="NAME", help="Input, such as shoulder.effort, "
+                     "boom.tip.force.x, ground.acceleration.y, road.displacement of a drive, or a "
+                     "scene input; repeatable.  Default: the scene's inputs, else ground "
+                     "accelerations."),
     ] = None,
     outputs: Annotated[
         list[str] | None,
-        typer.Option("--quantity", "-q", metavar="NAME", help="What answers: shoulder.angle, "
-                     "boom.tip.position.y, boom.tip.ay, strut.length, an output of the scene; may "
-                     "be repeated.  The outputs of the scene unless given, all coordinates where "
-                     "it has none."),
+        typer.Option("--quantity", "-q", metavar="NAME", help="Output, such as shoulder.angle, "
+                     "boom.tip.position.y, boom.tip.ay, strut.length, or a scene output; "
+                     "repeatable.  Default: the scene's outputs, else all coordinates."),
     ] = None,
     least: Annotated[
         float, typer.Option("--from", metavar="HZ", parser=positive, help="Lowest frequency, Hz.")
@@ -156,23 +153,23 @@ def frf(
         float, typer.Option("--to", metavar="HZ", parser=positive, help="Highest frequency, Hz.")
     ] = 100.0,
     points: Annotated[
-        int, typer.Option("--points", metavar="N", parser=at_least(2), help="How many, evenly on "
-                          "a logarithmic scale.")
+        int, typer.Option("--points", metavar="N", parser=at_least(2), help="Number of "
+                          "frequencies, logarithmically spaced.")
     ] = 201,
     structural: Annotated[
         list[str] | None,
-        typer.Option("--structural", metavar="ETA", help="Loss factor of all that is elastic, or "
-                     "of a hinge, chain, flexible body or spring: boom=0.02; may be repeated."),
+        typer.Option("--structural", metavar="ETA", help="Structural loss factor, of all elastic "
+                     "elements or of one: boom=0.02; repeatable."),
     ] = None,
     modal: Annotated[
         list[float] | None,
-        typer.Option("--modal", metavar="RATIO", help="Part of the critical damping of all natural "
-                     "motions; repeated, of as many of the slowest."),
+        typer.Option("--modal", metavar="RATIO", help="Modal damping ratio of all modes; repeated: "
+                     "of the first, second, ... mode."),
     ] = None,
     exact: Annotated[
         list[str] | None,
-        typer.Option("--exact", metavar="BEAM", help="A beam by its exact dynamic stiffness in "
-                     "place of shapes, all for every one; may be repeated."),
+        typer.Option("--exact", metavar="BEAM", help="Beam to be modelled by its exact dynamic "
+                     'stiffness; "all" for every beam; repeatable.'),
     ] = None,
     friction: Friction = None,
     at_start: AtStart = False,
@@ -182,7 +179,7 @@ def frf(
     hinge: Elements = None,
     json: Json = False,
 ) -> None:  # fmt: skip
-    """How a scene near its rest answers harmonic pushes, frequency by frequency."""
+    """Compute frequency response functions about the static equilibrium."""
     import numpy as np
 
     from mstmm.runtime.linear.harmonic.peaks import find_peaks
@@ -190,7 +187,7 @@ def frf(
     from .. import output as terminal
 
     if not most > least:
-        raise MstmmError(f"--from {least:g} --to {most:g}: expected a range that rises")
+        raise MstmmError(f"--from {least:g} --to {most:g}: expected --to above --from")
     asked = Asked(scene, at_start, change, output, plot, hinge, json, friction)
     linear = asked.linear(None)
     omega = 2 * np.pi * np.geomspace(least, most, points)
@@ -218,11 +215,11 @@ def frf(
     terminal.console().print(terminal.table("", ["output", "input", "peak>", "at Hz>"], rows))
     if len(pairs) > _ROWS:
         terminal.say(f"and {len(pairs) - _ROWS} more")
-    asked.say_where("all of it: --output FILE.csv or .nc, --plot FILE.png or --json")
+    asked.say_where("all values: --output FILE.csv or .nc, --plot FILE.png or --json")
 
 
 def _print_assessment(answer: Assessed) -> None:
-    """The verdict on an answer and its warnings."""
+    """Print the verdict on an answer and its warnings."""
     from .. import output as terminal
 
     terminal.say(answer.verdict)
@@ -231,14 +228,14 @@ def _print_assessment(answer: Assessed) -> None:
 
 
 def _most(shares: dict[str, Array], k: int) -> str:
-    """The owners of the largest shares of motion k."""
+    """Owners of the largest energy shares of mode k."""
     largest = sorted(shares, key=lambda name: -float(shares[name][k]))[:_OWNERS]
     return ", ".join(f"{name} {float(shares[name][k]):.0%}" for name in largest)
 
 
 def _counted(found: Modes) -> str:
     if found.complete is None:
-        return "not counted whether some below the last are missing: damped, or loads that follow"
+        return "completeness below the last mode not checked: damping or follower loads"
     if found.complete:
-        return "none is missing below the last: counted"
-    return "some below the last are missing; ask for more: --count N"
+        return "all modes below the last one are found (checked by count)"
+    return "modes below the last one are missing; request more: --count N"

@@ -1,4 +1,4 @@
-"""`mstmm stability`: where methods fail, found anew, and how far their remedies hold."""
+"""`mstmm stability`: measured limits of methods and of their remedies."""
 
 from __future__ import annotations
 
@@ -15,23 +15,24 @@ if TYPE_CHECKING:
 def stability(
     case: Annotated[
         list[str] | None,
-        typer.Option("--case", metavar="NAME", help="This case; may be given again. [all]"),
+        typer.Option("--case", metavar="NAME", help="Case to run; repeatable. [all]"),
     ] = None,
     out: Annotated[
         str | None,
-        typer.Option("--out", metavar="DIR", help="Where atlas.json, atlas.md and pictures go."),
+        typer.Option("--out", metavar="DIR", help="Output folder for atlas.json, atlas.md and "
+                     "plots."),
     ] = None,
     only_list: Annotated[
         bool, typer.Option("--list", help="List the cases; nothing is computed.")
     ] = False,
     json: Json = False,
-) -> None:
-    """Find where methods fail, name the remedies and show how far they hold."""
+) -> None:  # fmt: skip
+    """Locate the parameter values at which methods fail, and the range of each remedy."""
     if only_list:
         _list(case, json)
         return
     if out is None:
-        raise typer.BadParameter("give the folder of the pictures, --out DIR, or --list")
+        raise typer.BadParameter("give the output folder, --out DIR, or --list")
     from mstmm.atlas import cases
 
     from .. import output
@@ -50,7 +51,7 @@ def stability(
     for one in left_out:
         output.say(f"left out: {one.name} needs {', '.join(one.lacks)}: {install(one.extra)}")
     if lacking:
-        output.say(f"no pictures: they need {', '.join(lacking)}: {install('plot')}")
+        output.say(f"no plots: they need {', '.join(lacking)}: {install('plot')}")
 
 
 def _list(wanted: list[str] | None, json: bool) -> None:
