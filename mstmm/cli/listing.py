@@ -130,9 +130,8 @@ def _methods() -> Section:
     rows.append((AUTO, "", "adaptive", choice))
     data.append({"name": AUTO, "order": None, "steps": "adaptive", "source": choice})
     scipy = "scipy-NAME"
-    rows.append(
-        (scipy, "", "adaptive", "solve_ivp of SciPy on the same kernels, such as scipy-LSODA")
-    )
+    said = "solve_ivp of SciPy on the same kernels: RK23, RK45, DOP853, Radau, BDF or LSODA"
+    rows.append((scipy, "", "adaptive", said))
     data.append({"name": scipy, "order": None, "steps": "adaptive", "source": "scipy.integrate"})
     for name in sundials.METHODS:
         said = "CVODE of SUNDIALS on the same kernels (extra stiff)"

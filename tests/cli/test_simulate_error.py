@@ -48,7 +48,7 @@ def test_it_is_what_the_library_gives(mstmm: Command, folder: Path) -> None:
         (("--error", "1e-6", "--step", "0.01"), "step = 0.01 beside error"),
         (("--error", "1e-6", "--method", "rk4"), "takes fixed steps"),
         (("--error", "1e-6", "--resume"), "no checkpoint"),
-        (("--error", "1e-6", "--accuracy", "1e-3"), "leave --accuracy out"),
+        (("--error", "1e-6", "--accuracy", "1e-3"), "leave out --accuracy"),
         (("--error", "1e-6", "--of", "nothing"), "no such quantity"),
         (("--error", "2"), "less than 1"),
         (("--error", "0"), "--error"),
