@@ -113,8 +113,7 @@ def _reduced(work: Work, base: Tried, evidence: Mapping[str, Evidence]) -> Advic
     for name in (RICHEST, base.name):
         search.made[name] = work.bodies.richest
     choices, best = search.run() if work.bodies.richest else ({}, base)
-    if search.out_of_time:
-        work.notes.append("time ended before every smaller model was tried: give more --budget")
+    work.skipped += [f"less of body {name}" for name in search.skipped]
     work.told.setdefault(best.name, work.told[base.name])
     enough = max(_NEEDLESS * work.asked.error, _HARDLY * best.error)
     best = changed(work, best, "without", needless(best.scene), enough, cheap=False)

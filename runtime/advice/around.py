@@ -75,6 +75,7 @@ def changed(
             waiting += [more[half:], more[:half]]
         else:
             waiting.append(list(more[0].parts))
+    work.skipped += [f"{word} {one.name}" for more in waiting for one in more]
     if kept:
         alone = [_alone(work, base, word, one, names) for one in kept]
         if len(kept) > 1:

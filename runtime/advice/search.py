@@ -29,7 +29,8 @@ Choices = dict[str, Choice]
 class Search:
     """The search over one scene.
 
-    `enough` is the error that suffices, `in_measure` turns metres into the unit of errors.
+    `enough` is the error that suffices, `in_measure` turns metres into the unit of errors;
+    `skipped` are the bodies of which less was not tried, as the time had ended.
     """
 
     bodies: Bodies
@@ -41,6 +42,7 @@ class Search:
     failed: set[tuple[str, Choice]] = field(default_factory=set)
     made: dict[str, Choices] = field(default_factory=dict)
     out_of_time: bool = False
+    skipped: list[str] = field(default_factory=list)
 
     def run(self) -> tuple[Choices, Tried]:
         """The choices, and the model that was made of them."""
@@ -74,6 +76,7 @@ class Search:
             if tried.error <= self.enough or choices == self.bodies.richest:
                 return choices, tried
             if not self._more_time():
+                self.skipped = list(choices)
                 return dict(self.bodies.richest), self.tried(self.bodies.richest)
             choices = self.richer(choices)
 
@@ -155,7 +158,7 @@ class Search:
         """Less of each body, those with most shapes first, as long as it suffices and is no
         dearer."""
         order = sorted(choices, key=lambda name: -choices[name].total)
-        for name in order:
+        for k, name in enumerate(order):
             lowered = True
             while lowered:
                 lowered = False
@@ -163,6 +166,7 @@ class Search:
                     if (name, choice) in self.failed or not self._worth_trying(name, choice):
                         continue
                     if not self._more_time():
+                        self.skipped = self.skipped or order[k:]
                         return choices, best
                     other = {**choices, name: choice}
                     tried = self.tried(other)

@@ -31,6 +31,14 @@ def _saved(what: str, factor: float | None, other: str) -> str:
     return f"a factor of {factor:.2g} less time than {other} by {what}"
 
 
+def _factor(saving: float) -> str:
+    """A factor of the time saved, or of what a choice costs where it saves nothing."""
+    saved, cost = f"{saving:.2g}", f"{1 / saving:.2g}"
+    if saved == "1" or cost == "1":
+        return "the same"
+    return f"saves a factor of {saved}" if saving > 1 else f"costs a factor of {cost}"
+
+
 def _model(advice: Advice) -> str:
     if not advice.reduced:
         return "the scene as it is"
@@ -39,12 +47,12 @@ def _model(advice: Advice) -> str:
 
 def bodies(advice: Advice) -> Table:
     """The choice for each flexible body."""
-    head = ("body", "given", "advised", "error of this alone", "saves a factor of")
+    head = ("body", "given", "advised", "error of this alone", "time of this alone")
     rows = [
         (
             one.name, str(one.given), str(one.choice),
             "" if one.error is None else f"{one.error:.1e}",
-            "" if one.saving is None else f"{one.saving:.2g}",
+            "" if one.saving is None else _factor(one.saving),
         )
         for one in advice.bodies
     ]  # fmt: skip

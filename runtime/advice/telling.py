@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mstmm.defaults import METHOD, RTOL
+from mstmm.printable import abbreviate
 
 from ..chart.point import Point, Setting
 from ..chart.trial import error_of
@@ -49,6 +50,12 @@ def told(
     changes = work.told.get(chosen.tried.name, work.told[base])
     if not bodies:
         work.notes.append("there is nothing to reduce in the bodies: none of them deforms")
+    missing = [*work.skipped, *(f"model {name}" for name in bench.late)]
+    if missing:
+        work.notes.append(
+            f"the budget of {asked.budget:g} s limits this advice; not examined: "
+            f"{abbreviate(missing)}; with more --budget another model may be advised"
+        )
     growth = bench.span.growth
     error = chosen.point.error
     assert error is not None and chosen.point.cpu_s is not None

@@ -140,6 +140,7 @@ class Bench:
         self.names: Mapping[str, str] = {}
         self.reference: Trial
         self.floor = 0.0
+        self.late: list[str] = []  #: models that took more than their part of the budget
         self._found: dict[str, Tried] = {}
 
     def refer_to(self, scene: Scene, model: Model, name: str, asked: float, part: float) -> Tried:
@@ -217,6 +218,8 @@ class Bench:
             return Tried(name, scene, None, math.inf, math.inf, str(problem))
         limit = self.budget.left() * _ONE
         trial = self.runs.trial(model, Setting(AUTO, name, self.rtol), self.measure, limit)
+        if trial.late:
+            self.late.append(name)
         return self._kept(name, scene, model, trial)
 
     def _kept(self, name: str, scene: Scene, model: Model, trial: Trial) -> Tried:

@@ -61,6 +61,7 @@ class Work:
         parts: beam that is a part -> the beam of the scene.
         unseen: error of the reference's own parts.
         split_error: seen of one frame where beams stay whole; None where nothing was seen.
+        skipped: models and changes that the budget left no time for.
     """
 
     scene: Scene
@@ -79,6 +80,7 @@ class Work:
     parts: Mapping[str, str] = field(default_factory=dict)
     unseen: float = 0.0
     split_error: float | None = None
+    skipped: list[str] = field(default_factory=list)
 
     def least(self, scene: Scene) -> Result | None:
         """The run in which all bodies respond one way, or none deform; None where there is none."""

@@ -9,7 +9,9 @@ import pytest
 from advice.scenes import sprung, tip
 
 import mstmm
-from mstmm.runtime.advice import telling
+from mstmm.runtime.advice import advising, around, tables, telling
+from mstmm.runtime.advice.choice import RIGID, Choice
+from mstmm.runtime.advice.record import BodyAdvice
 
 OF = "d.tip.position"
 
@@ -90,3 +92,32 @@ def test_what_is_released_stays(by_event: bool) -> None:
     made = mstmm.advise(scene, 0.5, error=1e-2, of=OF, rounds=0, budget=600)
     assert '"slide"' not in " ".join(made.changes)
     assert made.scene.hinge[-1].type == "prismatic"
+
+
+def test_what_the_budget_leaves_no_time_for_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without time for a search the scene stays, and the advice says what was not examined; two
+    budgets with time enough give the same scene."""
+    scene = sprung(3e5)
+    small, large = (
+        mstmm.advise(scene, 1.0, error=1e-2, of=OF, rounds=0, budget=seconds)
+        for seconds in (600, 1200)
+    )
+    assert small.scene == large.scene
+    assert not any("limits this advice" in note for note in (*small.notes, *large.notes))
+    for module in (advising, around):
+        monkeypatch.setattr(module, "SEARCH", 0.0)
+    made = mstmm.advise(scene, 1.0, error=1e-2, of=OF, rounds=0, budget=600)
+    note = next(note for note in made.notes if "limits this advice" in note)
+    assert "600 s" in note and "spring" in note and "not examined" in note
+
+
+@pytest.mark.parametrize(
+    ("saving", "words"),
+    [(4.0, "saves a factor of 4"), (0.8, "costs a factor of 1.2"), (1.0, "the same")],
+)
+def test_what_takes_longer_saves_nothing(saving: float, words: str) -> None:
+    class One:
+        bodies = (BodyAdvice("arm", Choice(RIGID), Choice(RIGID), 0.0, saving, ""),)
+
+    head, _, rows = tables.bodies(One())  # type: ignore[arg-type]
+    assert rows[0][-1] == words and "saves" not in head[-1]
