@@ -56,6 +56,8 @@ class Equations(Assessed):
             damping; None where all of it is as the laws have it.
         carrying: the transformation of increments of a spinning rotor to the fixed frame; None
             where x are those of the coordinates themselves.
+        at_speeds: gives the equations at q with speeds (nu,), where the state was looked for at
+            rest because none was given; else None.
     """
 
     model: Compiled
@@ -67,6 +69,7 @@ class Equations(Assessed):
     mechanism: Mechanism | None = field(default=None, repr=False)
     dry: DryFriction | None = field(default=None, repr=False)
     carrying: Carrying | None = field(default=None, repr=False)
+    at_speeds: Callable[[Array], Equations] | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         return (

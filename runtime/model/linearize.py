@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +33,11 @@ if TYPE_CHECKING:
 _AT_REST = 1e-9
 #: How far coordinates of the equilibrium may be off, in sizes; see `Model.equilibrium`.
 _TOLERANCE = 1e-10
+#: The remedy where a scene that starts with speeds has no equilibrium.
+_AT_START = (
+    "the scene starts with speeds: for their motion give its state, "
+    "linearize(*model.initial_state()), or --at-start on the command line"
+)
 
 
 class Linearising:
@@ -61,15 +66,18 @@ class Linearising:
             pushes = pushes_of(self._model, "inputs", inputs)
         if disturbances is not None:
             others = pushes_of(self._model, "disturbances", disturbances)
+        given = q is not None or u is not None
         q, u = self._state(q, u, t)
+        at_speeds = None if given else partial(self._at_speeds, q, t)
         model, about, dry = self._model, None, dry_friction(self._model, u, friction)
         if model.freedom is None and not dry:
             about = model.slopes.at(t, q, u)
         if about is not None:
             turning = None if self._straight or not u.any() else about.G
-            return Linear(model, State(t, q, u, about.a), pushes, others, turning, about)
+            state = State(t, q, u, about.a)
+            return Linear(model, state, pushes, others, turning, about, at_speeds=at_speeds)
         state = State(t, q, u, self._accelerations(t, q, u))
-        bare = Linear(model, state, pushes, others, dry=dry)
+        bare = Linear(model, state, pushes, others, dry=dry, at_speeds=at_speeds)
         if model.freedom is not None:
             return self._of_mechanism(bare)
         return replace(bare, turning=self._turning(state))
@@ -85,6 +93,10 @@ class Linearising:
         loops = moving_at(model, state, self._slopes, dry=dry)
         turning = None if loops is None else loops.turning
         return replace(bare, turning=turning, mechanism=loops)
+
+    def _at_speeds(self, q: Array, t: float, u: Array) -> Linear:
+        """At the same place with speeds u (nu,), without inputs."""
+        return self(q, u, t, (), ())
 
     @cached_property
     def _inputs(self) -> tuple[Channel, ...]:
@@ -131,12 +143,14 @@ class Linearising:
 
 def _rest(model: Compiled, t: float) -> Array:
     """The equilibrium, or the start where it is at rest though nothing holds it there."""
-    start = initial_state(model)[0]
+    start, speeds = initial_state(model)
     try:
         return np.asarray(equilibrium(model, start, t, _TOLERANCE))
-    except NumericalFailure:
+    except NumericalFailure as failure:
         q = SceneSystem(model.looped).start(t, start, np.zeros(model.nu))
         if not _at_rest(model, q[: model.nq], t):
+            if speeds[list(model.free_speeds)].any():
+                raise NumericalFailure(f"{failure}; {_AT_START}") from None
             raise
         return q[: model.nq]
 

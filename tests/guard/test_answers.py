@@ -119,7 +119,7 @@ def test_answers_of_linear_models_are_assessed() -> None:
 OF_ANSWERS = {
     "changing-coefficients", "changing-input", "controller-left-out", "dry-friction",
     "input-without-effect", "no-equilibrium", "output-left-out", "run-failed",
-    "stability-unknown", "time-dependent", "unexamined",
+    "stability-unknown", "start-at-speed", "time-dependent", "unexamined",
     "unrestrained", "unstable", "unsteady-state",
 }  # fmt: skip
 

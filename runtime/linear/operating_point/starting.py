@@ -1,0 +1,84 @@
+"""Speeds that a scene starts with and keeps, which a linear model at rest does not have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.arrays import Array
+from mstmm.errors import NumericalFailure
+from mstmm.printable import abbreviate
+from mstmm.risk import Risk, advice
+
+from ...engine.sizes import speed_sizes
+from ...run.start import initial_state
+
+if TYPE_CHECKING:
+    from ..equations import Equations
+
+#: What pushes a motion back or slows it down is weak below these parts of (its speed)^2 and of its
+#: speed, in sizes a second.
+_WEAK, _SLOW = 0.01, 0.1
+#: Changes of the matrices that count, in parts of the speed; and those that are rounding.
+_CHANGED, _ROUNDING = 1e-3, 1e-9
+
+
+def find_start_risks(linear: Equations, most: int) -> Iterator[Risk]:
+    """One risk where the scene starts with speeds that last and change the model, which is at rest
+    because no state was given; of more than `most` coordinates any speed counts."""
+    if linear.at_speeds is None or not len(linear):
+        return
+    speeds = initial_state(linear.model)[1][list(linear.free)]
+    if not speeds.any():
+        return
+    plain = replace(linear, carrying=None)
+    if len(linear) <= most:
+        speeds = _lasting(plain, speeds)
+        if not speeds.any() or not _matter(plain, speeds):
+            return
+    moving = np.flatnonzero(np.abs(speeds) > _ROUNDING * np.abs(speeds).max())
+    names = abbreviate([linear.model.layout.u_name(linear.free[k]) for k in moving])
+    yield advice(
+        "start-at-speed", names,
+        f"the scene starts with speeds ({names}) that last, but this model is that at rest, "
+        "without what they do",
+        "for the motion of the start give its state, linearize(*model.initial_state()), or "
+        "--at-start on the command line",
+    )  # fmt: skip
+
+
+def _fastest(linear: Equations, speeds: Array) -> float:
+    """The largest of the speeds (n,), in sizes a second."""
+    return float(np.abs(speeds / speed_sizes(linear.model)[list(linear.free)]).max())
+
+
+def _lasting(linear: Equations, speeds: Array) -> Array:
+    """The part of the speeds (n,) that nothing pushes back or slows down within a turn."""
+    scale = np.sqrt(linear.M.diagonal())
+    fastest, stiffness = _fastest(linear, speeds), linear.K / np.outer(scale, scale)
+    _, squares, ways = np.linalg.svd(stiffness)
+    kept = ways[squares < _WEAK * fastest**2]
+    lasting = np.asarray(kept.T @ (kept @ (scale * speeds)) / scale)
+    slowed, energy = lasting @ linear.C @ lasting, lasting @ linear.M @ lasting
+    return lasting if slowed < _SLOW * fastest * energy else np.zeros_like(lasting)
+
+
+def _matter(linear: Equations, speeds: Array) -> bool:
+    """Whether the matrices beside these speeds (n,) are others than at rest."""
+    assert linear.at_speeds is not None
+    try:
+        beside = linear.at_speeds(linear.state.u + linear.spread(speeds))
+    except NumericalFailure:
+        return True
+    if not beside.has_stiffness or beside.free != linear.free:
+        return True
+    fastest, scale = _fastest(linear, speeds), np.sqrt(linear.M.diagonal())
+    pairs = ((linear.C, beside.C, fastest), (linear.K, beside.K, fastest**2))
+    return any(
+        float(np.abs((there - here) / np.outer(scale, scale)).max())
+        > _CHANGED * rate + _ROUNDING * float(np.abs(here / np.outer(scale, scale)).max())
+        for here, there, rate in pairs
+    )
