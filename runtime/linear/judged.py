@@ -20,7 +20,7 @@ from .operating_point.changes import MATRICES, find_changes
 from .operating_point.departure import LARGEST, Departure, find_departure
 from .operating_point.later import LaterStates
 from .operating_point.starting import find_start_risks
-from .operating_point.sticking import friction_risks, saturation_risks
+from .operating_point.sticking import friction_risks, saturation_risks, ways_of
 from .output.outputs import left_out
 from .rotors.blades import find_blades
 
@@ -41,8 +41,7 @@ def find_linear_risks(linear: Equations) -> Iterator[Risk]:
     yield from unsteady
     if len(linear) <= LARGEST:
         yield from friction_risks(linear)
-    if len(linear) <= _ALL_MOTIONS and linear.carrying is None:
-        yield from saturation_risks(linear)
+    yield from saturation_risks(linear, ways_of(linear))
     yield from find_start_risks(linear, _ALL_MOTIONS)
     changing = {risk.element for risk in unsteady}
     yield from (one for one in without_effect(linear, linear.V) if one.element not in changing)

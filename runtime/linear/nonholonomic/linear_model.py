@@ -36,7 +36,7 @@ from ..judged import find_omissions, find_response_risks, without_effect
 from ..linear import Linear
 from ..matrices import State, matrices
 from ..motions import Modes
-from ..operating_point.sticking import friction_risks
+from ..operating_point.sticking import Ways, friction_risks, saturation_risks
 from ..output.outputs import Rows, outputs_of, rows_of
 from ..response import FrequencyResponse, angular_frequencies, chosen_pushes
 from ..rotors.later import SAME, apart
@@ -290,9 +290,22 @@ class NonholonomicLinear(Linear):
                 "simulate the motion, or linearise about a state that keeps its matrices",
             )  # fmt: skip
         yield from friction_risks(self)
+        yield from saturation_risks(self, self._ways)
         yield from without_effect(self, self.B)
         yield from find_omissions(self)
         yield from self.modes().motion_risks()
+
+    @property
+    def _ways(self) -> Ways:
+        """The motions of the independent speeds."""
+        layout, rolling, places = self.model.layout, self._rolling, list(self._rolling.speed_places)
+        hinges = [layout.hinge_of_speed(k) for k in places]
+        units = [h.u_units[k - h.u].removesuffix("/s") for h, k in zip(hinges, places, strict=True)]
+        along = rolling.speed_ways
+        return Ways(
+            self.speeds, units, speed_sizes(self.model)[places], lambda x: along @ x,
+            lambda efforts: along.T @ efforts,
+        )  # fmt: skip
 
     def _accelerating(self) -> list[str]:
         """Independent speeds that change in the frames, here or a little further along."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,9 +23,13 @@ if TYPE_CHECKING:
 _SMALL = 0.01
 #: Radians or lengths of the scene beyond which nothing pushes a hinge back.
 _FAR = 10.0
-#: Speed in sizes a second, damping in 1/s that is none, and the part of the damping at
-#: small speeds below which that at this speed is another.
-_FAST, _FAINT, _SATURATED = 0.1, 1e-6, 0.1
+#: Speeds in sizes a second, damping in 1/s that is none, and the part of the damping at
+#: the small speed below which that at the other one is another.
+_SLOW, _FAST, _FAINT, _SATURATED = 1e-3, 0.1, 1e-6, 0.1
+#: A speed at which smooth efforts differ by rounding, and how far above that others are some.
+_NOISE, _ABOVE = 1e-13, 30.0
+#: Coordinates up to which each is moved by itself; beyond, how many neighbours move the same way.
+_SINGLE, _RUNS = 50, (1, 2, 1 << 30)
 #: Speeds, in sizes a second, at which an effort that jumps is the same; the part of a jump by which
 #: it may differ, and acceleration in sizes/s^2 that is none.
 _NEAR, _STEADY, _CREEP = (1e-6, 1e-8), 0.5, 1e-6
@@ -58,48 +63,95 @@ def friction_risks(linear: Equations) -> Iterator[Risk]:
     )  # fmt: skip
 
 
-def saturation_risks(linear: Equations) -> Iterator[Risk]:
-    """Coordinates with friction that an expression describes: their effort jumps with the speed at
-    the state, -10*sign(u), or their damping is that of small speeds alone, -10*tanh(u/0.001)."""
-    sizes, tree, state = speed_sizes(linear.model)[list(linear.free)], linear.tree, linear.state
-    memory, basis = tree.start_memory(), linear.spread(np.eye(len(linear)))
+@dataclass(frozen=True)
+class Ways:
+    """Independent motions beside a state: names, units of increments, characteristic scales (n,),
+    `along` from (n,) to all speeds (nu,), and `onto` from efforts (nu,) to those along them."""
 
-    def change(k: int, speed: float) -> float:
-        """Effort along coordinate k at this speed beyond that at the opposite one."""
-        ahead, behind = (
-            basis[:, k] @ tree.inverse_dynamics(
-                state.t, state.q, state.u + way * speed * basis[:, k], state.a, memory
-            )
-            for way in (1.0, -1.0)
-        )  # fmt: skip
-        return float(ahead - behind)
-
-    for k, (name, size) in enumerate(zip(linear.coordinates, sizes.tolist(), strict=True)):
-        slope, mass, speed = float(linear.C[k, k]), float(linear.M[k, k]), _FAST * size
-        first, jump = (change(k, part * size) for part in _NEAR)
-        least = _CREEP * mass * size
-        if abs(jump) > least and abs(first - jump) < _STEADY * abs(jump):
-            yield _jump_risk(linear, k, abs(jump), least)
-        elif slope > _FAINT * mass:
-            part = abs(change(k, speed)) / (2 * slope * speed)
-            if part < _SATURATED:
-                yield Risk(
-                    "dry-friction", name,
-                    f"damping of {name} is that of speeds near the state alone: at {speed:.3g} "
-                    f"{linear.units[k]}/s it is {part:.2g} times as large, as of dry friction",
-                    "give it as law.friction of the hinge, or as a linear damping", part,
-                    _SATURATED,
-                )  # fmt: skip
+    names: Sequence[str]
+    units: Sequence[str]
+    sizes: Array
+    along: Callable[[Array], Array]
+    onto: Callable[[Array], Array]
 
 
-def _jump_risk(linear: Equations, k: int, jump: float, least: float) -> Risk:
-    """An effort that jumps with the speed of coordinate k."""
-    name, unit = linear.coordinates[k], "N*m" if linear.units[k] == "rad" else "N"
+def ways_of(linear: Equations) -> Ways:
+    """Those of x, of a rotor in axes that turn along with it."""
+    plain, free, loops = replace(linear, carrying=None), list(linear.free), linear.mechanism
+    return Ways(
+        linear.coordinates, linear.units, speed_sizes(linear.model)[free], plain.spread,
+        lambda efforts: efforts[free] if loops is None else loops.ways.T @ efforts,
+    )  # fmt: skip
+
+
+def saturation_risks(linear: Equations, ways: Ways) -> Iterator[Risk]:
+    """Coordinates with friction that an expression describes: an effort that jumps with speeds at
+    the state, -10*sign(u), or damping that is that of small speeds alone, -10*tanh(u/0.001)."""
+    n = len(ways.sizes)
+    if not n:
+        return
+    signs = (
+        np.eye(n) if n <= _SINGLE else np.array([1 - 2 * (np.arange(n) // k % 2) for k in _RUNS])
+    )
+    work = _work(linear, ways, signs)
+    mass = np.maximum(np.abs(work(0.0)).max(axis=0), np.finfo(float).tiny)
+    first, jumps = (work(part) for part in _NEAR)
+    steady = np.abs(first - jumps) < _STEADY * np.abs(jumps)
+    jump = np.where(steady, np.abs(jumps), 0.0).max(axis=0)
+    slow, fast = work(_SLOW) / (2 * _SLOW), work(_FAST) / (2 * _FAST)
+    noise = _ABOVE * float((np.abs(work(_NOISE)) / mass).max()) / _SLOW
+    damped = slow > (_FAINT + noise) * mass
+    parts = np.divide(np.abs(fast), slow, out=np.zeros_like(slow), where=damped).max(axis=0)
+    for k, name in enumerate(ways.names):
+        least = _CREEP * float(mass[k])
+        if jump[k] > least:
+            yield _jump_risk(name, ways.units[k], float(jump[k]), least)
+        elif damped[:, k].any() and parts[k] < _SATURATED:
+            yield _saturated_risk(name, ways, k, float(parts[k]))
+
+
+def _work(linear: Equations, ways: Ways, signs: Array) -> Callable[[float], Array]:
+    """The function of a speed, in sizes a second, that gives (k, n) how much larger efforts along
+    the coordinates are at this speed with `signs` (k, n) than at the opposite one; at 0, at an
+    acceleration of one size/s^2.  Of single coordinates (n, n) each has its own alone, (1, n)."""
+    tree, state, memory = linear.tree, linear.state, linear.tree.start_memory()
+
+    def efforts(u: Array, a: Array) -> Array:
+        return tree.inverse_dynamics(state.t, state.q, u, a, memory)
+
+    def one(speed: float, row: Array) -> Array:
+        step = ways.along(row * ways.sizes)
+        if speed:
+            step = speed * step
+            return efforts(state.u + step, state.a) - efforts(state.u - step, state.a)
+        return efforts(state.u, state.a + step) - efforts(state.u, state.a)
+
+    def work(speed: float) -> Array:
+        found = np.array([ways.onto(one(speed, row)) for row in signs]) * signs
+        return found if len(ways.sizes) > _SINGLE else found.diagonal()[None]
+
+    return work
+
+
+def _jump_risk(name: str, unit: str, jump: float, least: float) -> Risk:
+    """An effort that jumps with speeds."""
+    unit = "N*m" if unit == "rad" else "N"
     return Risk(
         "dry-friction", name,
-        f"an effort along {name} jumps by {jump:.4g} {unit} with its speed at this state, as of "
+        f"an effort along {name} jumps by {jump:.4g} {unit} with speeds at this state, as of "
         "dry friction: the model leaves the jump out",
         "give it as law.friction of the hinge, or as a linear damping", jump, least, unit,
+    )  # fmt: skip
+
+
+def _saturated_risk(name: str, ways: Ways, k: int, part: float) -> Risk:
+    """Damping that is a part of that at small speeds."""
+    return Risk(
+        "dry-friction", name,
+        f"damping of {name} is that of speeds near the state alone: at "
+        f"{_FAST * ways.sizes[k]:.3g} {ways.units[k]}/s it is {part:.2g} times as large, as of dry "
+        "friction",
+        "give it as law.friction of the hinge, or as a linear damping", part, _SATURATED,
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.integrate import quad
 
 import mstmm
 from mstmm.errors import SceneError
+from mstmm.runtime.linear.rotors.carrying import Carrying
 
 #: m g l and the inertia of `pendulum` about its pivot.
 WEIGHT, INERTIA = 2 * 9.81 * 0.5, 0.53
@@ -217,3 +219,71 @@ def test_friction_that_jumps_is_told() -> None:
     assert "an effort along pivot.angle jumps by 0.02 N*m" in text
     sliding = of(pendulum(law={"effort": "-0.01*sign(u)"})).linearize([0.0], [0.5])
     assert not any(risk.name == "dry-friction" for risk in sliding.risks)
+
+
+def row_of_pendulums(n: int, laws: dict[int, str]) -> mstmm.Scene:
+    """Pendulums beside each other on the ground, some with laws."""
+    body = {"mass": 1.0, "center_of_mass": [0, -1, 0], "inertia": [0, 0, 0]}
+    hinge = {"type": "pin", "inboard": "ground"}
+    return mstmm.Scene(
+        gravity=(0, -9.81, 0), body=[body | {"name": f"b{k}"} for k in range(n)],
+        hinge=[hinge | {"name": f"h{k}", "outboard": f"b{k}"}
+               | ({"law": {"effort": laws[k]}} if k in laws else {}) for k in range(n)],
+    )  # fmt: skip
+
+
+def test_friction_by_expressions_in_large_scenes_is_told() -> None:
+    """Beyond 400 coordinates: a jump of 0.02, a damping that saturates, drag that does not."""
+    laws = {3: "-0.01*sign(u)", 200: "-0.3*u*abs(u)", 300: "-0.2*u"}
+    jumping = of(row_of_pendulums(410, laws))
+    linear = jumping.linearize(np.zeros(410))
+    told = [risk for risk in linear.risks if risk.name == "dry-friction"]
+    assert [risk.element for risk in told] == ["h3.angle"] and not linear.trusted
+    assert told[0].figure == pytest.approx(0.02)
+    saturating = of(row_of_pendulums(410, {7: "-0.01*tanh(u/0.001)", 200: "-0.3*u*abs(u)"}))
+    told = [r for r in saturating.linearize(np.zeros(410)).risks if r.name == "dry-friction"]
+    assert [risk.element for risk in told] == ["h7.angle"]
+
+
+def spun_disc(law: str) -> mstmm.Model:
+    """A disc that a drive spins, on a carriage whose slide along y has a law."""
+    spring = {"stiffness": 100.0}
+    light = {"mass": 0.1, "inertia": [1e-3] * 3}
+    return of(mstmm.Scene(
+        gravity=(0, 0, 0),
+        body=[{"name": "slide", **light}, {"name": "housing", **light},
+              {"name": "disc", "mass": 1.0, "inertia": [0.1, 0.05, 0.05]}],
+        hinge=[{"name": "y", "type": "prismatic", "axis": [0, 1, 0], "inboard": "ground",
+                "outboard": "slide", "law": spring | {"effort": law}},
+               {"name": "z", "type": "prismatic", "axis": [0, 0, 1], "inboard": "slide",
+                "outboard": "housing", "law": spring},
+               {"name": "x", "type": "pin", "axis": [1, 0, 0], "inboard": "housing",
+                "outboard": "disc", "drive": "30*t"}],
+    ))  # fmt: skip
+
+
+def test_friction_by_an_expression_is_told_in_the_fixed_frame() -> None:
+    for law, trusted in (("-0.5*sign(u)", False), ("-0.5*u", True)):
+        linear = spun_disc(law).linearize()
+        assert linear.trusted == linear.to_fixed_frame().trusted == trusted
+        fixed = replace(linear, carrying=Carrying(np.eye(2), np.zeros((2, 2))))
+        assert any(risk.name == "dry-friction" for risk in fixed.risks) != trusted
+
+
+def test_friction_by_an_expression_is_told_beside_rolling() -> None:
+    """A wheel that rolls on the ground at a constant speed, a bar on its hub at rest beside it."""
+    wheel = {"name": "wheel", "mass": 1.0, "inertia": [0.02, 0.04, 0.02]}
+    arm = {"name": "arm", "mass": 0.5, "inertia": [0.01] * 3}
+    for law, trusted in (("-0.01*sign(u)", False), ("-0.01*u", True)):
+        model = of(mstmm.Scene(
+            gravity=(0, 0, 0), body=[wheel, arm],
+            hinge=[{"name": "motion", "type": "free", "inboard": "ground", "outboard": "wheel",
+                    "initial": {"q": [0, 0, 0.3, 1, 0, 0, 0], "u": [0.6, 0, 0, 0, 2.0, 0]}},
+                   {"name": "hub", "type": "pin", "axis": [0, 1, 0], "inboard": "wheel",
+                    "outboard": "arm", "law": {"effort": law, "stiffness": 1.0}}],
+            constraint=[{"name": "road", "type": "rolling", "from": "ground", "to": "wheel",
+                         "normal": [0, 0, 1], "radius": 0.3, "axis": [0, 1, 0]}],
+        ))  # fmt: skip
+        linear = model.linearize(*model.initial_state())
+        assert not linear.has_stiffness
+        assert any(risk.name == "dry-friction" for risk in linear.risks) != trusted
