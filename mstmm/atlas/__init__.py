@@ -1,1 +1,1 @@
-"""Atlas of failures: where methods fail, measured in every run, and which remedies hold there."""
+"""Atlas of failures: where methods fail, measured in every run, and remedies that hold."""

@@ -1,4 +1,4 @@
-"""Codes of the reasons why an engine cannot evaluate a state; C reads them from `failures.h`."""
+"""Codes of reasons why an engine cannot evaluate a state; C reads them from `failures.h`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Advice on the smallest sufficient model of a scene; compiles the models for `runtime.advice`."""
+"""Advice on the smallest sufficient model; compiles the models for `runtime.advice`."""
 
 from __future__ import annotations
 

@@ -65,10 +65,10 @@ def compile_scene(
         flexibility: model level of all flexible bodies: "coupled", "one-way" (rigid in the run,
             then elastic response to its motion and loads) or "rigid"; None uses the `model` of each
             body.
-        simplify: simplifications before packing: True, False, or a list of "welds" (rigid bodies
-            joined by fixed hinges become one), "turns" (orientations within 1e-11 rad of quarter
-            turns are rounded to these) and "links" (special kernels of the looped engine for pins,
-            prismatics, rotors on them, and balls).  A table changes one and keeps the others
+        simplify: simplifications before packing: True, False, or a list of names.  "welds" merges
+            rigid bodies joined by fixed hinges.  "turns" rounds orientations within 1e-11 rad of
+            quarter turns to these.  "links" selects special kernels of the looped engine for pins,
+            prismatics, rotors on them, and balls.  A table changes one and keeps the others
             ({"turns": 1e-5}: another tolerance, rad; {"turns": 0}: none).
             `model.simplifications` lists those applied.
 

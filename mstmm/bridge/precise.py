@@ -1,4 +1,4 @@
-"""Accelerations of a small scene in extended precision, to measure rounding errors of doubles."""
+"""Accelerations of a small scene in extended precision, to measure rounding of doubles."""
 
 from __future__ import annotations
 

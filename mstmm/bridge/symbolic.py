@@ -1,4 +1,4 @@
-"""Linear model as SymPy expressions: its schedule is evaluated on formulas instead of numbers.
+"""Linear model as SymPy expressions: its schedule evaluated on formulas, not on numbers.
 
 Parameters that stay symbols pass through packing as formulas.  The residual of the scene is inlined
 and differentiated as for fused code, and its kernel evaluated on formulas.  There is no second

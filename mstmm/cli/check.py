@@ -1,4 +1,4 @@
-"""`mstmm check`: validation of scenes, elements and files, without a simulation or output file."""
+"""`mstmm check`: validation of scenes, elements and files, without simulating or writing."""
 
 from __future__ import annotations
 

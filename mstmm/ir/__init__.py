@@ -1,4 +1,4 @@
-"""KernelIR: intermediate representation between derived equations and the code that runs them.
+"""KernelIR: intermediate representation between derived equations and executable code.
 
 A kernel is a list of scalar statements in single-assignment order over typed inputs and outputs.
 It holds text and integers only (no SymPy), is frozen and hashable, and is stored as JSON.

@@ -1,4 +1,4 @@
-"""Validation of a kernel, which rejects what no backend could run; call it by `mstmm.ir.check`."""
+"""Validation of a kernel: rejects what no backend could run; called by `mstmm.ir.check`."""
 
 from __future__ import annotations
 

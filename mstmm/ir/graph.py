@@ -1,4 +1,4 @@
-"""Graph that builds KernelIR by value numbering: equal terms share a node, constants are folded.
+"""Graph that builds KernelIR by value numbering: equal terms share a node, constants fold.
 
 Derivations are lowered through this graph, and expressions of scene files are parsed into it, so
 that C, the tape and the interpreter receive both in the same form.  No SymPy.

@@ -1,4 +1,4 @@
-"""Inlining of kernels: the statements of a KernelIR interpreted on the nodes of another graph.
+"""Inlining of kernels: statements of a KernelIR interpreted on nodes of another graph.
 
 Known arguments (zeros, ones, terms already computed) are folded on the way, so that a general
 kernel becomes the special one that its caller needs.  Loops over a run-time size are unrolled, and

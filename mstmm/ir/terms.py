@@ -1,4 +1,4 @@
-"""Terms by value numbering: nodes of a graph, and the arithmetic that creates and folds them."""
+"""Terms by value numbering: nodes of a graph, and arithmetic that creates and folds them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Steps of the trapezoidal rule, always iterated with inertia and hinge-law derivatives only.
+"""Steps of the trapezoidal rule, iterated with inertia and hinge-law derivatives only.
 
 Runs observe the convergence of such an iteration, and use the exact tangent where it is slow.
 """

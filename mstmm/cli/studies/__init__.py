@@ -1,1 +1,1 @@
-"""Commands that ask more of a scene than one run."""
+"""Commands for studies of a scene beyond a single run."""
