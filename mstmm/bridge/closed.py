@@ -80,7 +80,7 @@ def closed(model: Model, keep: Sequence[str] = ()) -> ClosedEquations:
     _refuse(model)
     if isinstance(keep, str):
         raise SceneError(f'keep = {keep!r}: expected a list of names such as ["rod1.mass"]')
-    refuse_folded(model.scene, list(keep), "formula; take other numbers")
+    refuse_folded(model.scene, list(keep), "formula; keep other parameters")
     return _Closing(model, keep).equations()
 
 
