@@ -225,7 +225,7 @@ def test_a_loop_that_grows_beyond_numbers_is_named() -> None:
     wild = {"name": "wild", "sample_time": TS, "inputs": ["place"], "outputs": ["push"],
             "A": ((1e200,),), "B": ((1e200,),), "C": ((1.0,),)}  # fmt: skip
     run = mstmm.compile(scene(wild), engine="looped").simulate(1.0)
-    assert not run.success and 'controller "wild" at t = 0.05 s: what it measures' in run.message
+    assert not run.success and 'controller "wild" at t = 0.05 s: its measurement' in run.message
     with pytest.raises(NumericalFailure, match='controller "wild"'):
         mstmm.compile(scene(wild), engine="looped").session().advance(1.0)
 
