@@ -1,4 +1,4 @@
-/* Sections beside a hinge: how the modes turn them, their axes. */
+/* Sections on both sides of a hinge: their axes, and their rotation by modes. */
 #include <string.h>
 
 #include "hinges.h"

@@ -1,4 +1,4 @@
-/* Bodies at the predictor: sections where hinges hold them, matrices from their input end. */
+/* Bodies at the predictor: sections at their hinges, matrices from their input end. */
 #include <math.h>
 #include <string.h>
 
@@ -89,7 +89,7 @@ section classical_section(const step_record *step, int index)
     return ground;
 }
 
-/* The map of one coordinate: accelerations a y + b and speeds c y + d with what they are now. */
+/* Integration formula of one coordinate: accelerations a y + b and speeds c y + d. */
 static void mapped(const time_map *map, int count, const real *position, const real *speed,
                    const real *rate, real *b, real *d)
 {

@@ -1,12 +1,12 @@
-/* The discrete-time transfer matrix method in absolute coordinates: one linearised step after the
- * other.  Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 7 and 8.
+/* Discrete-time transfer matrix method in absolute coordinates: successive linearised
+ * steps.  Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 7 and 8.
  *
- * Element matrices are generated; these files multiply them along chains and by branches, or
- * eliminate with them after Riccati, and move the bodies.  Positions and loads are in inertial
+ * Element matrices are generated; these files multiply them along chains and branches, or eliminate
+ * them by the Riccati method, and move the bodies.  Positions and loads are in inertial
  * axes, angular velocities in those of the body's frame, whose origin is its input end.  In the
- * plane vectors have two numbers and turns one.
+ * plane vectors have two numbers and rotations one.
  *
- * Between the two marks below stand the declarations that cffi reads as they are. */
+ * cffi reads the declarations between the two marks below. */
 #ifndef MSTMM_CLASSICAL_H
 #define MSTMM_CLASSICAL_H
 
@@ -17,7 +17,7 @@
 #define MSTMM_CLASSICAL_COORDINATES 8 /* most coordinates of a body */
 
 enum {
-    MSTMM_CLASSICAL_FREE, /* at the ground alone: the body is not held */
+    MSTMM_CLASSICAL_FREE, /* at the ground only: the body is free */
     MSTMM_CLASSICAL_FIXED,
     MSTMM_CLASSICAL_PIN,
     MSTMM_CLASSICAL_BALL,
@@ -29,14 +29,14 @@ enum {
 enum {
     MSTMM_CLASSICAL_SINGULAR = 1, /* element: its motion is undetermined */
     MSTMM_CLASSICAL_LOST,         /* element: tip at which the product's state is not free */
-    MSTMM_CLASSICAL_OPEN,         /* element: its hinge has come open */
+    MSTMM_CLASSICAL_OPEN,         /* element: its hinge has a position gap */
     MSTMM_CLASSICAL_UNSETTLED,    /* the iterations do not converge */
-    MSTMM_CLASSICAL_FAR,          /* element: body moved farther than the scene is large */
-    MSTMM_CLASSICAL_NOT_FINITE,   /* element: body with a motion or load that is no number */
+    MSTMM_CLASSICAL_FAR,          /* element: body moved by more than the size of the scene */
+    MSTMM_CLASSICAL_NOT_FINITE,   /* element: body whose motion or load is not finite */
 };
 
 typedef struct {
-    int parent;      /* -1: the ground; a parent stands before its children */
+    int parent;      /* -1: the ground; a parent precedes its children */
     int child, next; /* first child, next child of the same parent; -1: none */
     int hinge;       /* inboard hinge */
     int modes;       /* 0: rigid */
@@ -56,7 +56,7 @@ typedef struct {
     double position[MSTMM_CLASSICAL_COORDINATES]; /* input end, angle, modes; no angle in space */
     double speed[MSTMM_CLASSICAL_COORDINATES];
     double rate[MSTMM_CLASSICAL_COORDINATES];      /* accelerations */
-    double auxiliary[MSTMM_CLASSICAL_COORDINATES]; /* those that the time map averages */
+    double auxiliary[MSTMM_CLASSICAL_COORDINATES]; /* auxiliary accelerations of the scheme */
     double axes[9];                                /* frame to inertial, in space */
     double inboard[6], outboard[6]; /* moment and force of the hinge on its two sides */
     double twist;                   /* of the law's memory */
@@ -73,12 +73,12 @@ typedef struct {
     const mstmm_classical_body *bodies;
     int planar, product; /* product of matrices; else Riccati on them */
     int iterations;      /* most linear solutions a step */
-    int turning;         /* 0 leaves out the tangent operator of turns, to show what it is for */
+    int turning;         /* 0 omits the tangent operator of rotations, to show its effect */
     double gravity[3];
     mstmm_classical_scheme scheme;
     double size;      /* length that corrections and gaps are compared with, m */
-    double tolerance; /* corrections are over where none is above this part of size, or rad */
-    double gap;       /* a hinge that opens by more than this part of size, or rad, is lost */
+    double tolerance; /* iterations end if no correction exceeds this fraction of size, or rad */
+    double gap;       /* largest permitted gap of a hinge, relative to size, or rad */
     double accuracy;  /* part of the largest load that the product may leave at a free tip */
     double step;      /* the last one, 0 before the first */
     mstmm_classical_motion *motions; /* now */

@@ -1,4 +1,4 @@
-/* Conditions of hinges that turn freely: the moments along their free turns vanish. */
+/* Conditions of free rotations: the moments along them vanish. */
 #include <string.h>
 
 #include "hinges.h"
@@ -14,7 +14,7 @@ int classical_free_turns(const step_record *step, int index)
     }
 }
 
-/* a . m + (a x m_p) . turn = 0 for the axis as it turns with its section. */
+/* a . m + (a x m_p) . turn = 0 for an axis that rotates with its section. */
 static void pin_condition(const real *axis, const real *moment, int modes, const real *per_mode,
                           const real *eta, int length, real *row)
 {

@@ -1,11 +1,11 @@
-/* Hinges at the predictor: their matrices, and the conditions of those that turn freely.
+/* Hinges at the predictor: their matrices, and the conditions of free rotations.
  *
  * A matrix with free turns is made for conditions on the state behind the hinge: of what follows
  * (product) or of its own (Riccati).  The generated kernels take them as rows of "the outboard
  * body's matrix", which here holds nothing but these rows. */
 #include "hinges.h"
 
-/* Springs first, then the free turn: two matrices with nothing between them. */
+/* Springs first, then the free rotation: two successive matrices. */
 static int both(const step_record *step, int index, const real *rows, const real *modal,
                 real *matrix)
 {

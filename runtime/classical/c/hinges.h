@@ -1,4 +1,4 @@
-/* What the files of the hinges share. */
+/* Declarations shared by the files of the hinges. */
 #ifndef MSTMM_CLASSICAL_HINGES_H
 #define MSTMM_CLASSICAL_HINGES_H
 

@@ -3,7 +3,7 @@
 
 #include "hinges.h"
 
-/* Small turn from one set of axes to another. */
+/* Small rotation from one set of axes to another. */
 static void small_turn(const real *from, const real *to, real *turn)
 {
     for (int i = 0; i < 3; i++) {
@@ -84,7 +84,7 @@ void classical_pin_axis(const step_record *step, int index, real *axis)
 static int pin(const step_record *step, int index, int inner, const real *rows, const real *modal,
                real *matrix)
 {
-    static const real first[3] = {1, 0, 0}; /* the condition stands in the row of m_x */
+    static const real first[3] = {1, 0, 0}; /* the condition is in the row of m_x */
     const real *none = classical_nothing;
     const body_record *body = &step->run->bodies[index];
     const slopes at = classical_slopes(step, index);
@@ -92,7 +92,7 @@ static int pin(const step_record *step, int index, int inner, const real *rows, 
     classical_outboard_axes(step, index, axes);
     classical_pin_axis(step, index, axis);
     classical_axis(axes, own);
-    for (int i = 0; i < 3; i++) { /* what brings the outboard axis to the inboard one */
+    for (int i = 0; i < 3; i++) { /* rotation of the outboard axis to the inboard one */
         const int j = (i + 1) % 3, k = (i + 2) % 3;
         beta[i] = own[j] * axis[k] - own[k] * axis[j];
     }

@@ -1,4 +1,4 @@
-/* From the root to the tips: states from the motion of the ground and the relations, or through
+/* Forward pass, root to tips: states from the motion of the ground and the relations, or through
  * the product's matrices. */
 #include <math.h>
 #include <string.h>
@@ -29,7 +29,7 @@ static void state_before(const step_record *step, int index, real *z)
     }
 }
 
-/* What the product leaves at free tips of the loads, against the largest load. */
+/* Loads that the product leaves at free tips, relative to the largest load. */
 static int lost(const step_record *step)
 {
     const run_record *run = step->run;
@@ -49,8 +49,8 @@ static int lost(const step_record *step)
     return 0;
 }
 
-/* States of all bodies, and the loads of their hinges.  The product is asked how well it meets its
- * own conditions. */
+/* States of all bodies, and the loads of their hinges.  The product's own boundary conditions are
+ * checked. */
 int classical_outward(const step_record *step)
 {
     const run_record *run = step->run;

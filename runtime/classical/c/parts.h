@@ -1,4 +1,4 @@
-/* What the files of the classical discrete-time method share. */
+/* Declarations shared by the files of the classical discrete-time method. */
 #ifndef MSTMM_CLASSICAL_PARTS_H
 #define MSTMM_CLASSICAL_PARTS_H
 
@@ -15,7 +15,7 @@ typedef mstmm_classical_body body_record;
 typedef mstmm_classical_motion motion;
 typedef mstmm_classical_run run_record;
 
-/* What a body and its inboard hinge are in one linear solution.  States are [r; angle; m; q; eta;
+/* Body with its inboard hinge in one linear solution.  States are [r; angle; m; q; eta;
  * 1]; those at the hinge's input have the modes of the parent, those behind it the body's own. */
 typedef struct {
     real hinge[WIDEST * WIDEST];    /* across the hinge */

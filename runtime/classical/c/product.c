@@ -1,9 +1,10 @@
 /* The overall transfer matrix of every chain as the plain product of its elements' matrices, from
- * the hinge it hangs on to its free tip; branches end in the chain that carries them as loads that
- * go by its motion.  Rui, Wang, Zhang, ch. 7 and 8.
+ * its inboard hinge to its free tip; branches act on the chain that carries them as loads that
+ * depend on its motion.  Rui, Wang, Zhang, ch. 7 and 8.
  *
- * A hinge that turns freely is eliminated by the condition of the next one outward, or of the free
- * tip, as in the book; the condition of the first one along a chain is left for its boundary. */
+ * A free rotation is eliminated by the condition of the next free rotation outboard, or of the
+ * free tip, as in the book; the condition of the first one along a chain is its boundary
+ * condition. */
 #include <math.h>
 #include <string.h>
 
@@ -176,7 +177,7 @@ static int boundary(const step_record *step, int index, int held, real *system)
     return rows;
 }
 
-/* Loads of a chain by the motion of what it hangs on; a body that nothing holds gets its motion. */
+/* Loads of a chain from the motion of its parent; a free body gets its motion. */
 static int close_chain(const step_record *step, int index)
 {
     element *one = &step->elements[index];

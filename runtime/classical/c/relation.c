@@ -1,7 +1,7 @@
 /* Loads at the input end of a body by its motion, f = S a + e, from those at its output ends.
  *
- * With one output end the body's matrix says it: f_O = U_fa a + U_ff f_I + U_f1 and a_O of a alone.
- * Where it carries several, each adds what it adds alone to the body without any. */
+ * With one output end it follows from the body's matrix: f_O = U_fa a + U_ff f_I + U_f1 and a_O of
+ * a alone. With several, each contributes as if it were the only one on the body. */
 #include <string.h>
 
 #include "parts.h"
@@ -43,7 +43,7 @@ static void at_outlet(const step_record *step, int body, int child, real *known)
         }
 }
 
-/* What the child alone makes of the loads at the body's input end. */
+/* Contribution of one child to the loads at the body's input end. */
 int classical_carried(const step_record *step, int body, int child, real *relation)
 {
     real known[LOADS * WIDEST];
@@ -86,7 +86,7 @@ int classical_absorbed(const step_record *step, int body, real *relation)
     return 0;
 }
 
-/* The hinge of a body that nothing holds: behind it stands the motion x, whatever comes in. */
+/* The hinge of a free body: outboard of it is the motion x, independent of the input. */
 void classical_let_go(const step_record *step, int body, const real *x)
 {
     element *one = &step->elements[body];

@@ -1,5 +1,5 @@
-/* From the tips to the root by relations f = S a + e (Riccati), on the matrices of the elements:
- * loads never travel outward as differences of large numbers.  Rui, Bestle et al., Multibody Syst.
+/* Backward pass, tips to root, by relations f = S a + e (Riccati) with the matrices of the
+ * elements: loads are never differences of large numbers.  Rui, Bestle et al., Multibody Syst.
  * Dyn. 49 (2020) 337-354. */
 #include "parts.h"
 
@@ -46,7 +46,7 @@ static int passed(const step_record *step, int index, const real *behind)
     return classical_solve(rigid, columns, system, one->relation);
 }
 
-/* A body that nothing holds: S a + e = 0 and its modal rows give the motion. */
+/* A free body: S a + e = 0 and its modal rows give the motion. */
 static int let_go(const step_record *step, int index, const real *behind, const real *modal)
 {
     const int rigid = step->rigid, modes = modes_of(step, index), size = rigid + modes;

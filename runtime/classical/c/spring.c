@@ -3,8 +3,9 @@
 
 #include "hinges.h"
 
-#define RIGID_STIFFNESS 1e30 /* of a spring that shall not turn; its compliance vanishes */
-/* The same beside springs that do turn, times theirs: rounding of more would be as large as they. */
+#define RIGID_STIFFNESS 1e30 /* of a spring that must not rotate; its compliance vanishes */
+/* The same relative to springs that rotate: rounding of a larger one would be as large as they
+ * are. */
 #define RIGID_BESIDE 1e8
 
 /* axes diag axes^T */

@@ -1,18 +1,18 @@
 /* Steps of the classical discrete-time method: predictor, linear solutions, correction.
  *
- * Time map: Newmark, HHT and generalised-alpha by auxiliary accelerations a (Chung, Hulbert, J.
- * Appl. Mech. 60 (1993); Arnold, Bruls, Multibody Syst. Dyn. 18 (2007)), and Wilson's method, which
- * makes Newmark's step of linear acceleration theta times as long and goes back.  In space the map
- * acts on the rotation vector of the step, the angular velocity and its rate in the frame's axes;
- * the tangent operator joins it with the small turns of the matrices.  The predictor keeps the
- * accelerations, which errs by the third power of the step. */
+ * Integration schemes: Newmark, HHT and generalised-alpha by auxiliary accelerations a (Chung,
+ * Hulbert, J. Appl. Mech. 60 (1993); Arnold, Bruls, Multibody Syst. Dyn. 18 (2007)), and Wilson's
+ * method, which makes Newmark's step of linear acceleration theta times as long and goes back.  In
+ * space the map acts on the rotation vector of the step, the angular velocity and its rate in the
+ * frame's axes; the tangent operator joins it with the small turns of the matrices.  The predictor
+ * keeps the accelerations, which errs by the third power of the step. */
 #include <math.h>
 #include <string.h>
 
 #include "parts.h"
 
 #define ANGLE 3
-#define FAR 1 /* size of the scene, or rad: a correction beyond it says nothing */
+#define FAR 1 /* size of the scene, or rad: a larger correction is invalid */
 
 static const real NONE[3] = {0};
 
@@ -52,7 +52,7 @@ static void predict(const step_record *step, int index, double h)
     turn_to(step, index);
 }
 
-/* Takes the solution's positions over; returns its largest change, as part of size, or in rad. */
+/* Adopts the solution's positions; returns its largest change, relative to size, or in rad. */
 static real correct(const step_record *step, int index)
 {
     const run_record *run = step->run;
@@ -102,7 +102,7 @@ static void go_back(const step_record *step, int index, double h)
     turn_to(step, index);
 }
 
-/* How far the hinge of a body is open: its points, as part of size. */
+/* Position gap of the hinge of a body, relative to size. */
 static real open_by(const step_record *step, int index)
 {
     const int hinge = step->run->bodies[index].hinge;

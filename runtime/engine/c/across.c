@@ -1,15 +1,15 @@
-/* Loads and efforts across the tree, and hinges that close loops, beside the tangent's elimination;
- * see across.h. */
+/* Loads and efforts that couple distant bodies, and closing hinges, in addition to the tangent's
+ * elimination along the tree; see across.h. */
 #include "across.h"
 
 #include "sweep_steps.h"
 
-/* What is not above it in parts of its column is no pivot. */
+/* Smallest pivot relative to its column. */
 #define NO_PIVOT 1e-13
 
-/* --- what there is --- */
+/* --- unknowns --- */
 
-/* So many unknowns are changes of loads and efforts; rows of hinges that close loops follow. */
+/* Number of unknown changes of loads and efforts; rows of closing hinges follow them. */
 static int n_changes(const mstmm_tangent *at)
 {
     return at->n_coupled - at->couplings->n_rows;
@@ -26,7 +26,7 @@ static int end_of(const int *firsts, int k)
     return firsts[k + 1]; /* none before the first */
 }
 
-/* Imposed speeds do not change; a row without a multiplier says nothing of its own. */
+/* Prescribed speeds do not change; a row without a multiplier is redundant. */
 static int is_unknown(const mstmm_tangent *at, int k)
 {
     if (k < n_changes(at)) return 1;
@@ -37,7 +37,7 @@ static int is_unknown(const mstmm_tangent *at, int k)
     return !(mstmm_imposed(body, at->memory) && body->imposed_mask[one->direction]);
 }
 
-/* Number k of what loads and efforts change by, in the derivatives' workspace. */
+/* Change number k of loads and efforts, in the derivatives' workspace. */
 static real *change_across(const mstmm_tangent *at, const mstmm_state *slope, int k)
 {
     const mstmm_couplings *all = at->couplings;
@@ -49,7 +49,7 @@ static real *change_across(const mstmm_tangent *at, const mstmm_state *slope, in
 
 /* --- along a direction --- */
 
-/* Number of the multiplier that an unknown is; -1: none. */
+/* Index of the multiplier of an unknown; -1: it is no multiplier. */
 static int multiplier(const mstmm_tangent *at, int k)
 {
     return k < n_changes(at) ? -1 : at->couplings->rows[k - n_changes(at)].row;
@@ -75,8 +75,8 @@ static int changes_of(mstmm_tangent *at, const mstmm_parts *parts, int pass, rea
     return code;
 }
 
-/* The same where rows are asked of positions: in a step those go by accelerations alone, of a small
- * motion x by what would be accelerations along it, however small or large s is. */
+/* The same for rows of positions: in a step these depend on accelerations only, for a small motion
+ * x on the accelerations along it, whatever s is. */
 static int changes_at_end(mstmm_tangent *at, const mstmm_parts *parts, const real *x, int pass,
                           real *changes)
 {
@@ -126,7 +126,7 @@ int mstmm_coupled_along(mstmm_tangent *at, const real *x, const real *d_u, const
     return changes_of(at, &parts, -1, changes);
 }
 
-/* --- answers of the tree alone --- */
+/* --- solutions of the tree only --- */
 
 int mstmm_hook_unit_load(mstmm_state *state)
 {
@@ -145,7 +145,7 @@ static void set_efforts(const mstmm_tangent *at, int pass, real value, real *col
             column[all->speeds[all->seed[s] - loads]] = value;
 }
 
-/* x to r beside increments that are known (NULL: none), and to one of each change of a pass (-1: of
+/* Solution x for r with known increments (NULL: none), and for a unit of each change of a pass (-1:
  * none). */
 static int solve_alone(mstmm_tangent *at, const real *r, const mstmm_known *known, int pass,
                        real *x)
@@ -179,7 +179,7 @@ static int solve_alone(mstmm_tangent *at, const real *r, const mstmm_known *know
     return code;
 }
 
-/* The tree's answer to one of each unknown of a pass, and all that comes with both. */
+/* Solution of the tree for a unit of each unknown of a pass, and the resulting changes. */
 static int answer_to(mstmm_tangent *at, int pass, real *x, real *changes)
 {
     const mstmm_couplings *all = at->couplings;
@@ -197,7 +197,7 @@ static int answer_to(mstmm_tangent *at, int pass, real *x, real *changes)
 
 /* --- all together --- */
 
-/* Is any of a pass unknown? */
+/* True if a pass contains an unknown. */
 static int asks(const mstmm_tangent *at, int pass)
 {
     const mstmm_couplings *all = at->couplings;
@@ -206,7 +206,7 @@ static int asks(const mstmm_tangent *at, int pass)
     return 0;
 }
 
-/* Column k of 1 - G Y, where rows have no 1, by the changes that come of its pass. */
+/* Column k of 1 - G Y (without 1 for rows), from the changes caused by its pass. */
 static void set_column(const mstmm_tangent *at, const mstmm_band *matrix, int k,
                        const real *changes)
 {
@@ -219,7 +219,7 @@ static void set_column(const mstmm_tangent *at, const mstmm_band *matrix, int k,
     if (k < n_changes(at) || !unknown) *mstmm_band_at(matrix, column, column) += 1;
 }
 
-/* With changes c = G x and rows 0 = G x, and answers Y to each: x = x_0 + Y c, (1 - G Y) c = G x_0. */
+/* Changes c = G x, rows 0 = G x, unit solutions Y: x = x_0 + Y c, (1 - G Y) c = G x_0. */
 int mstmm_across_factor(mstmm_tangent *at, int negative)
 {
     const mstmm_couplings *all = at->couplings;
@@ -240,7 +240,7 @@ int mstmm_across_factor(mstmm_tangent *at, int negative)
                       code == 1 ? 1 : MSTMM_NEGATIVE);
 }
 
-/* Adds the answers to what the unknowns are, in the order of the matrix. */
+/* Adds the unit solutions times the unknowns, in the order of the matrix. */
 static void add_answers(const mstmm_tangent *at, const real *amounts, real *x)
 {
     const mstmm_couplings *all = at->couplings;
@@ -262,7 +262,7 @@ int mstmm_across_solve(mstmm_tangent *at, const real *r, const mstmm_known *know
     const int m = at->n_coupled, first = n_changes(at);
     real *changes = mstmm_across_changes(at), *amounts = mstmm_across_ordered(at);
     int code = 0;
-    if (known && !at->kept) { /* the first to ask for what is known: it will not be the last */
+    if (known && !at->kept) { /* first call with known increments: more will follow */
         at->keeps = 1;
         code = mstmm_tangent_factor(at, at->rate, at->s, at->sq, at->kappa);
     }

@@ -1,4 +1,4 @@
-/* Rows of hinges that close loops, and their own accelerations, along a direction; see across.h. */
+/* Rows and own accelerations of closing hinges along a direction; see across.h. */
 #include "across.h"
 
 static int64_t place_of_row(const mstmm_model *model, const mstmm_coupled_row *one)
@@ -15,7 +15,7 @@ void mstmm_set_own_apart(const mstmm_tangent *at, real *a, real *own)
         if (at->couplings->rows[k].speed >= 0) a[at->couplings->rows[k].speed] = 0;
 }
 
-/* What has to vanish: of a rotor its inertia times its acceleration less the multiplier. */
+/* Residual; for a rotor its inertia times its acceleration minus the multiplier. */
 void mstmm_rows_along(const mstmm_tangent *at, real *workspace, const real *own, real *rows)
 {
     const mstmm_model *model = at->model;

@@ -1,5 +1,5 @@
-/* Where the derivatives of one body point: coordinates, speeds and accelerations of the direction
- * at hand, in the arrays of `state->slope`, which are zero but for it. */
+/* Direction of the derivatives of one body: coordinates, speeds and accelerations in the arrays of
+ * `state->slope`, which are zero elsewhere. */
 #ifndef MSTMM_AIM_H
 #define MSTMM_AIM_H
 
@@ -48,7 +48,7 @@ static inline void mstmm_aim_unknown(mstmm_state *state, const mstmm_body *body,
     }
 }
 
-/* Does a law feel nothing of an unknown, being one on the coordinate of another? */
+/* True if a law does not depend on an unknown because it acts on another coordinate. */
 static inline int mstmm_unfelt(const mstmm_body *body, const mstmm_law *law, int j)
 {
     return law->kind == 0 && body->straight && j != law->speed;
@@ -77,7 +77,7 @@ static inline void mstmm_aim_motion(real *motion, int k)
     for (int i = 0; i < 9; i++) motion[i] = i == k;
 }
 
-/* The code of an elimination: a negative determinant is no failure where it is counted. */
+/* Code of an elimination: a negative determinant is no failure if it is counted. */
 static inline int mstmm_judged(mstmm_state *state, int code)
 {
     if (code != MSTMM_NEGATIVE || !state->tangents->negative) return code;
@@ -91,14 +91,14 @@ static inline int mstmm_held(const mstmm_force *force)
     return force->body_f < 0 && force->body_t >= 0 ? force->body_t : force->body_f;
 }
 
-/* Where the numbers by place are of a body that is placed, or (-1) of the ground: behind its S. */
+/* Numbers by place of a body, or (-1) of the ground: they follow its S. */
 static inline int64_t mstmm_place_at(const mstmm_model *model, int body)
 {
     return body < 0 ? MSTMM_TANGENT_B(0, 0) : model->bodies[body].place;
 }
 
-/* Where S of the tangent is: with a body's own numbers if somebody asks for it once the body is
- * eliminated, else where memory is at hand. */
+/* Location of S of the tangent: with the body's numbers if it is needed after the elimination of
+ * the body, else in reused memory. */
 #define mstmm_carried_at(tangents, body) ((tangents)->kept ? (body)->tangent : (body)->carried)
 
 /* The same of a body or (-1) of the ground. */

@@ -1,4 +1,4 @@
-/* One state at a time; see alone.h. */
+/* Calls on single states; see alone.h. */
 #include "alone.h"
 
 #include <string.h>
@@ -101,7 +101,7 @@ static real length_of(const real *four)
     return sqrt(four[0] * four[0] + four[1] * four[1] + four[2] * four[2] + four[3] * four[3]);
 }
 
-/* A quaternion of length 1 after dt at its rate, which is across it. */
+/* Unit quaternion after dt at its rate, which is perpendicular to it. */
 static void turn(real dt, const real *rate, real *four)
 {
     const real speed = length_of(rate);

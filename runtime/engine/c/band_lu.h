@@ -1,5 +1,4 @@
-/* Factors of a matrix that is filled in a band about its diagonal, which may be all of it: zeros on
- * the way are passed over. */
+/* Factorisation of a band matrix, or of a full one; zeros are skipped. */
 #ifndef MSTMM_BAND_LU_H
 #define MSTMM_BAND_LU_H
 
@@ -21,7 +20,7 @@ static inline mstmm_band mstmm_band_of(int64_t n, int64_t below, int64_t above, 
     return (mstmm_band){n, below, above, width < n ? width : n, a};
 }
 
-/* Where column 0 of row i would stand: rows are counted from there. */
+/* Address that column 0 of row i would have: columns are counted from there. */
 static inline real *mstmm_band_row(const mstmm_band *of, int64_t i)
 {
     return of->a + i * of->width - (of->width < of->n ? i - of->below : 0);
@@ -69,8 +68,8 @@ static inline int64_t mstmm_band_exchange(const mstmm_band *of, int64_t i)
 }
 
 /* L and U in place with row exchanges, 1 / pivot on the diagonal; `exchanges` and `sizes` are n
- * numbers each.  Returns 1 if a pivot is not above `relative` times the magnitude of its column in a
- * (NaN included), 2 if the determinant is negative, else 0. */
+ * numbers each.  Returns 1 if a pivot is not above `relative` times the magnitude of its column in
+ * a (NaN included), 2 if the determinant is negative, else 0. */
 static inline int mstmm_band_factor(const mstmm_band *of, real *exchanges, real *sizes,
                                     real relative)
 {
@@ -95,7 +94,7 @@ static inline int mstmm_band_factor(const mstmm_band *of, real *exchanges, real 
     return negative ? 2 : 0;
 }
 
-/* x (n), the right-hand side at first, by factors that are known. */
+/* Solves for x (n), initially the right-hand side, with known factors. */
 static inline void mstmm_band_solve(const mstmm_band *of, const real *exchanges, real *x)
 {
     for (int64_t i = 0; i < of->n; i++) {

@@ -1,5 +1,5 @@
-/* Bounds of conditions between two looks at the motion: of what they read, by its values and rates
- * at both, then of themselves, by the tape over intervals. */
+/* Bounds of conditions between two evaluation times: first of the quantities that they read, from
+ * values and rates at both, then of the conditions, by the tape over intervals. */
 #include "between.h"
 
 #include <math.h>
@@ -13,10 +13,10 @@
  * orders. */
 static const double MARGIN = 1.5;
 
-/* Part of their size that coordinates and speeds move on for a difference */
+/* Relative change of coordinates and speeds for a difference quotient */
 static const double INCREMENT = 1e-7;
 
-/* Numbers of a look: t, value and rate of each component read, probes, inputs.  Of a probe:
+/* Numbers of an evaluation: t, value and rate of each component read, probes, inputs.  Of a probe:
  * position, velocity, and, where velocities are read, acceleration */
 enum { PROBE = 9 };
 static int first_probe(const mstmm_scene_run *run) { return 1 + 2 * run->n_read; }

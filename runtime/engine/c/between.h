@@ -1,10 +1,10 @@
-/* Bounds of conditions between two looks at the motion. */
+/* Bounds of conditions between two evaluation times. */
 #ifndef MSTMM_BETWEEN_H
 #define MSTMM_BETWEEN_H
 
 #include "scene.h"
 
-/* Lets the integrator enclose what is watched, where `run` has room for it. */
+/* Makes the integrator enclose the conditions if `run` has memory for it. */
 void mstmm_enclose_events(mstmm_scene_run *run, mstmm_system *system);
 
 #endif

@@ -1,4 +1,4 @@
-/* Bounces: what an event strikes is thrown back by one impulse, and closed loops stay closed.
+/* Bounces: one impulse reverses the approach velocity of an event; closed loops stay closed.
  *
  * An event holds where g(t, q, x) >= 0.  Its rate v = g_t + A u is that with which it is met; the
  * impulse acts along A^T: u' = u - (1 + e) v / (A w) w, w = M^-1 A^T among closed loops, so that
@@ -10,16 +10,16 @@
 #include "kernel_calls.h"
 #include "sweep_steps.h"
 
-/* Rebound in parts of the fastest one of this event so far, at which it has come to rest. */
+/* Rebound speed, relative to the largest one of this event so far, that counts as rest. */
 #define AT_REST 1e-6
-/* Least answer of the event, in parts of what its terms could give. */
+/* Smallest response of the event, relative to the sum of its terms' magnitudes. */
 #define MOVED 1e-12
 
-/* Places and speeds in parts of those that the event reads, or of 1 rad or m and a second, that are
+/* Relative positions and speeds, of those that the event reads or of 1 rad or m and 1 s, that are
  * still on it, and do not move against it; as runtime/run/behind.py has it. */
 #define CLOSE 1e-9
 
-/* Numbers of a bounce: slopes of its event, efforts, and three columns of speeds. */
+/* Numbers of a bounce: derivatives of its event, efforts, and three columns of speeds. */
 typedef struct {
     real *slopes, *efforts, *speeds, *before, *answer;
 } parts;
@@ -59,8 +59,8 @@ int mstmm_hook_struck(mstmm_state *state)
     return 0;
 }
 
-/* Change of the speeds, by efforts and forces along the slopes of the event (NULL: by none): what
- * stops the slip of closed loops is in it. */
+/* Change of the speeds by efforts and forces along the derivatives of the event (NULL: none); it
+ * includes the correction of velocity errors of closed loops. */
 static int answered(mstmm_scene_run *run, const mstmm_strike *strike, real t, const real *y,
                     real *change)
 {
@@ -110,7 +110,7 @@ static int slopes_at(mstmm_scene_run *run, const mstmm_event_action *action, rea
                : 0;
 }
 
-/* w = M^-1 A^T among closed loops, and what stops their slip without a strike. */
+/* w = M^-1 A^T with closed loops, and the correction of their velocity errors without impact. */
 static int thrown(mstmm_scene_run *run, const mstmm_event_action *action, parts at, real t,
                   const real *y)
 {
@@ -137,7 +137,7 @@ int mstmm_meeting_of(mstmm_scene_run *run, int event, real t, const real *y, con
     return code ? code : met(run, action, action->numbers, t, y, u, found);
 }
 
-/* The blow itself: new speeds in y. */
+/* Impact: new speeds in y. */
 static int strike(mstmm_scene_run *run, int event, parts at, real t, real *y, real before)
 {
     const mstmm_event_action *action = &run->events[event];
@@ -155,8 +155,8 @@ static int strike(mstmm_scene_run *run, int event, parts at, real t, real *y, re
     return 0;
 }
 
-/* The same with its work: places stay where they are, so that all of it is kinetic energy.  What
- * drives and moving walls do is in it, of which the impulse along the slopes alone knows nothing. */
+/* Impact with its work: positions do not change, so that all of it is kinetic energy.  It contains
+ * the work of drives and moving walls, which the impulse along the derivatives does not. */
 static int strike_with_work(mstmm_scene_run *run, int event, parts at, real t, real *y, real before)
 {
     real *u = y + run->model->nq, had, has;

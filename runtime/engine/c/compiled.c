@@ -1,12 +1,12 @@
 /* A scene whose accelerations come from code compiled for it: the integrator's right-hand side, for
- * one state and for several side by side.  Events and settling stay with the looped engine. */
+ * one state and for several in SIMD lanes.  The looped engine does events and projections. */
 #include <math.h>
 #include <string.h>
 
 #include "compiled.h"
 #include "loops.h"
 
-/* Numbers that what closes loops gives: a change of the coordinates or speeds, and gaps. */
+/* Results for closed loops: a change of the coordinates or speeds, and gaps. */
 static int64_t closing_size(const mstmm_fused *one)
 {
     return one->n_closures ? one->nq + one->nu + 12 * (int64_t)one->n_closures : 0;
@@ -78,7 +78,7 @@ static int accelerations_and_power(void *context, double t, const double *y, dou
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused;
     real power = 0, potential;
-    if (!fused->accelerations_power) { /* nothing but blows does work */
+    if (!fused->accelerations_power) { /* only impacts do work */
         dy[fused->nq + fused->nu] = 0;
         return accelerations(context, t, y, dy);
     }
@@ -119,7 +119,7 @@ void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system)
 
 /* --- closed loops ----------------------------------------------------------------------------- */
 
-/* So often at most rows are chosen anew where a step ends. */
+/* Maximum number of choices of rows at the end of a step. */
 #define CHOICES 3
 
 typedef struct {
@@ -127,7 +127,7 @@ typedef struct {
     double t, *y;
 } compiled_state;
 
-/* Where an open loop is named: the frame of closure number k; behind all bodies the coupling. */
+/* Element index of an open loop: frame of closure k; couplings follow all bodies. */
 static int frame_of(const mstmm_model *model, int k)
 {
     for (int i = 0; i < model->n_bodies; i++)
@@ -211,7 +211,7 @@ int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y)
     return code;
 }
 
-/* The coordinates of a stage with gaps closed, where they can be. */
+/* Coordinates of a stage with closed gaps, if possible. */
 static const double *stage_coordinates(mstmm_scene_run *run, double t, const double *y)
 {
     const mstmm_model *model = run->model;
@@ -249,7 +249,7 @@ int mstmm_stage_speeds(mstmm_scene_run *run, double t, const double *y, const do
     return 0;
 }
 
-/* --- trajectories side by side ---------------------------------------------------------------- */
+/* --- trajectories in SIMD lanes ----------------------------------------------------------- */
 
 static int settle_one(void *context, double t, double *y)
 {
@@ -272,8 +272,8 @@ static void renew_lanes(const mstmm_scene_lanes *lanes, const double *t)
         }
 }
 
-/* mstmm_stage_speeds of one lane, in place among those of all.  Where there are none they stay: what is
- * evaluated with them says why. */
+/* mstmm_stage_speeds of one lane, in place among those of all.  Where there are none they stay:
+ * what is evaluated with them says why. */
 static void stage_speeds_of(const mstmm_scene_lanes *lanes, int lane, real t, const real *y, real *speeds,
                             real *one)
 {

@@ -1,4 +1,4 @@
-/* Sweeps in complex numbers behind the passes of complex_steps.c, whose end this is. */
+/* Sweeps in complex numbers; this text follows the passes in complex_steps.c. */
 #ifdef MSTMM_LANES
 #include "tiles.h"
 
@@ -23,7 +23,7 @@ static inline void inertia(const mstmm_complex *S, mstmm_lanes *sizes)
         }
 }
 
-/* What bodies bring at s, of numbers `first` to before `end`, from `to` on. */
+/* Contributions of bodies at s, numbers `first` to before `end`, written from `to`. */
 static void bring(const mstmm_response *of, const mstmm_lanes_at *with, int64_t first, int64_t end,
                   mstmm_complex *to)
 {
@@ -37,7 +37,7 @@ static void bring(const mstmm_response *of, const mstmm_lanes_at *with, int64_t 
     }
 }
 
-/* What a body brings, but for numbers that the elimination makes; S where memory is at hand. */
+/* Contributions of a body, without numbers that the elimination computes; S in reused memory. */
 static void bring_body(const mstmm_response *of, mstmm_lanes_at *with, int index)
 {
     const mstmm_model *model = of->at->model;
@@ -66,7 +66,7 @@ static mstmm_complex *of_both(mstmm_complex *S, mstmm_complex *bend, int n, int 
                  : bend + MSTMM_BEND_Z_X(n) + n * (j - 6) + k - 6;
 }
 
-/* Frames are told by their accelerations: s^2 times as much as they are displaced. */
+/* Frames are described by accelerations: s^2 times their displacements. */
 static void lay_exact(const mstmm_response *of, mstmm_lanes_at *with, int body, int64_t first)
 {
     const mstmm_body *one = &of->at->model->bodies[body];
@@ -89,7 +89,7 @@ static void lay_exact(const mstmm_response *of, mstmm_lanes_at *with, int body, 
         }
 }
 
-/* Real parts of what bodies were divided by. */
+/* Real parts of the pivots of bodies. */
 static void keep_pivots(const mstmm_response *of, const mstmm_lanes_at *with, int count)
 {
     const mstmm_model *model = of->at->model;
@@ -112,11 +112,11 @@ static void keep_pivots(const mstmm_response *of, const mstmm_lanes_at *with, in
     }
 }
 
-/* Bodies that far ahead are asked for: numbers of lanes are many. */
+/* Prefetch distance in bodies: lanes have many numbers. */
 #define MSTMM_COMPLEX_AHEAD 2
 
-/* Asks for what a sweep needs of a body: what all frequencies bring, where `brought`, what is kept
- * of the elimination, and loads and motions. */
+/* Prefetches the numbers of a body for a sweep: contributions common to all frequencies, if
+ * `brought`, results of the elimination, loads and motions. */
 static inline void ask_for(const mstmm_response *of, const mstmm_lanes_at *with, int index,
                            int brought)
 {
@@ -140,7 +140,7 @@ static inline void ask_for(const mstmm_response *of, const mstmm_lanes_at *with,
     }
 }
 
-/* Numbers are brought no sooner than a body adds to them or is met, so that the cache has them. */
+/* Contributions are computed just before a body uses them, while they are in the cache. */
 static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
 {
     const mstmm_model *model = of->at->model;
@@ -205,7 +205,7 @@ static int solve_alone(const mstmm_response *of, mstmm_lanes_at *with,
     return code;
 }
 
-/* --- across the tree --- */
+/* --- couplings of distant bodies --- */
 
 /* Change of every coupling along x, lane by lane, real and imaginary parts one after the other. */
 static int coupled_along(mstmm_response *of, const mstmm_lanes_at *with, const mstmm_complex *x,
@@ -240,7 +240,7 @@ static int coupled_along(mstmm_response *of, const mstmm_lanes_at *with, const m
     return 0;
 }
 
-/* Answers Y to one of each coupling, and the inverse of 1 - G Y where they are c = G x. */
+/* Unit solutions Y of all couplings, and the inverse of 1 - G Y for c = G x. */
 static int close_couplings(mstmm_response *of, mstmm_lanes_at *with)
 {
     const mstmm_couplings *all = of->at->couplings;

@@ -1,4 +1,4 @@
-/* What a state shows, by expressions, and the controllers that go by it. */
+/* Measured quantities of a state, by expressions, and the controllers that use them. */
 #include <math.h>
 #include <string.h>
 

@@ -1,11 +1,11 @@
-/* Numbers that a state shows, as an expression gives them, and controllers that sample them. */
+/* Measured quantities of a state, by expressions, and controllers that sample them. */
 #ifndef MSTMM_CONTROL_H
 #define MSTMM_CONTROL_H
 
 #include "scene.h"
 
 /* cdef begin */
-/* Expressions of t, q, u, inputs and what is `shown`; arrays that none reads are NULL there and
+/* Expressions of t, q, u, inputs and the observation `shown`; unread arrays are NULL there and
  * empty on the tape. */
 typedef struct mstmm_measure {
     const mstmm_tape *tape; /* t, q, u, points, loads, efforts, udot, sums, inputs -> numbers */
@@ -31,8 +31,8 @@ typedef struct mstmm_controller {
     int memory;
 } mstmm_controller;
 
-/* All controllers whose sample is at t measure, then act.  0 if there is none, -1 if they have
- * acted, > 0 a reason. */
+/* All controllers with a sample at t measure, then set outputs.  0: there is none, -1: outputs
+ * are set, > 0: a reason. */
 int mstmm_controllers_act(mstmm_scene_run *run, real t, const real *y);
 /* cdef end */
 

@@ -8,7 +8,7 @@
 #include "mstmm.h"
 
 /* Sums of several are quicker than one after the other, and what is not finite makes its sum so; a
- * sum that alone is not finite is looked at again. */
+ * sum that overflows although its terms are finite is examined again. */
 static inline int mstmm_finite(int64_t count, const real *numbers)
 {
     real sums[8] = {0};

@@ -1,5 +1,5 @@
-/* A small scene as implicit methods see it, by code compiled for it.  Where its guards fail the looped
- * engine is asked instead, which names what is wrong or does without the shortcut. */
+/* Interface of a small scene to implicit methods, by code compiled for it.  If its guards fail, the
+ * looped engine is used, which names the cause or needs no such guard. */
 #include <string.h>
 
 #include "compiled.h"
@@ -55,7 +55,7 @@ static int residual_rate(void *context, double t, const double *y, const double 
     return failed ? run->implicit_code.looped.residual_rate(run, t, y, a, r_t) : 0;
 }
 
-/* Rates are asked for at no time in particular, and depend on none. */
+/* Rates do not depend on time. */
 static int rates(void *context, const double *q, const double *u, double *dq)
 {
     mstmm_scene_run *run = context;
@@ -71,7 +71,7 @@ static int tangent(void *context, double t, const double *y, const double *a, do
     const mstmm_fused *code = CODE(run);
     const mstmm_implicit_parts at = run->implicit_code.parts;
     *at.t = t;
-    memcpy(at.q, y, (size_t)(code->nq + code->nu) * sizeof(real)); /* u stands behind q */
+    memcpy(at.q, y, (size_t)(code->nq + code->nu) * sizeof(real)); /* u follows q */
     memcpy(at.a, a, (size_t)code->nu * sizeof(real));
     at.steps[0] = s;
     at.steps[1] = sq;
@@ -87,7 +87,7 @@ static int tangent(void *context, double t, const double *y, const double *a, do
     return failed ? run->implicit_code.looped.tangent(run, t, y, a, s, sq, kappa) : 0;
 }
 
-/* Laws alone gain nothing where the tangent is a few lines: the looped engine has them, for who asks. */
+/* The approximate tangent saves nothing in a small scene: the looped engine provides it. */
 static int laws(void *context, double t, const double *y, const double *a, double s, double sq,
                 int kappa)
 {
@@ -103,7 +103,7 @@ static int coordinates(const mstmm_scene_run *run, const mstmm_implicit_parts *a
                                   at->steps, x, rho, dq);
 }
 
-/* What is known of the increments moves to the right: dq_0 of rho_q, -rho_u of the accelerations. */
+/* Known increments move to the right-hand side: dq_0 of rho_q, -rho_u of the accelerations. */
 static int without_known(const mstmm_scene_run *run, const mstmm_implicit_parts *at, const double *rho_q,
                          const double *rho_u, const double *r)
 {

@@ -1,4 +1,4 @@
-/* A scene as implicit methods see it: its residual, and the tangent of it factored. */
+/* Interface of a scene to implicit methods: residual and factored tangent. */
 #include <string.h>
 
 #include "loops.h"
@@ -118,8 +118,8 @@ static int laws(void *context, double t, const double *y, const double *a, doubl
     return code ? code : failed(run, run->base, mstmm_laws_factor(run->base, 1, s, sq, kappa));
 }
 
-/* With laws alone what is known of the increments is pushed through the laws alone, too: methods that
- * take any matrix for the tangent take the same one everywhere. */
+/* With the approximate tangent known increments use it too: methods that accept any tangent need
+ * the same one everywhere. */
 static int solve_by_laws(mstmm_scene_run *run, const double *r, const double *rho_q,
                          const double *rho_u, double *dq, double *du, double *da)
 {
@@ -155,7 +155,7 @@ static int solve(void *context, const double *r, const double *rho_q, const doub
         mstmm_tangent_free(base, known_a);
         code = mstmm_tangent_coordinates(base, still, rho_q, known_q);
     }
-    /* What a residual of accelerations asks for is known of them; efforts are in balance. */
+    /* The requested residual of accelerations is a known increment; efforts are balanced. */
     if (!code) code = mstmm_tangent_solve(base, evaluated ? still : r, some ? &known : NULL, du);
     if (!code) code = mstmm_tangent_coordinates(base, du, rho_q, dq);
     for (int j = 0; !code && j < nu; j++) da[j] = base->s * du[j] - (rho_u ? rho_u[j] : 0);
@@ -163,7 +163,7 @@ static int solve(void *context, const double *r, const double *rho_q, const doub
     return failed(run, base, code);
 }
 
-/* What drives prescribe at t, and no acceleration where a hinge is held. */
+/* Values prescribed by drives at t, and zero accelerations of held hinges. */
 static int impose(void *context, double t, double *y, double *a)
 {
     mstmm_scene_run *run = context;
@@ -192,7 +192,7 @@ static int somebody_imposes(const mstmm_model *model)
     return 0;
 }
 
-/* Are the rates of all coordinates the speeds, in the same order?  Driven ones have none. */
+/* True if the rates of all coordinates are the speeds in the same order.  Driven ones have none. */
 static int is_straight(const mstmm_model *model)
 {
     if (somebody_imposes(model)) return 0;
@@ -206,7 +206,7 @@ void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system)
     const mstmm_model *model = run->model;
     for (int i = 0; i < model->n_bodies; i++) {
         const mstmm_body *body = &model->bodies[i];
-        for (int j = 0; j < body->nu; j++) /* the vector part of a quaternion stands last */
+        for (int j = 0; j < body->nu; j++) /* the vector part of a quaternion is last */
             run->coordinates[body->u + j] = body->q + j
                                             + (j + 3 >= body->nu ? body->nq - body->nu : 0);
         for (int j = 0; body->modal && j < body->modal->n; j++)
@@ -230,7 +230,7 @@ static void ask_positions(void *context, int asked)
 
 void mstmm_scene_on_positions(mstmm_scene_run *run)
 {
-    if (!run->model->looped) return; /* without rows there is nothing to ask */
+    if (!run->model->looped) return; /* no rows, no constraints */
     run->implicit.placing = beyond_placing;
     run->implicit.ask_positions = ask_positions;
     ask_positions(run, 1);

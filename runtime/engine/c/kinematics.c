@@ -35,7 +35,7 @@ int mstmm_moving_points(const mstmm_kinematics *known, int64_t n, const real *q,
     return 0;
 }
 
-/* What the speeds on the way to the root feel of a unit force, or moment, against an inertial axis. */
+/* Efforts of a unit force or moment against an inertial axis on the speeds towards the root. */
 static int felt_on_the_way(mstmm_state *state, const mstmm_probe *probe, int direction, real *row)
 {
     const mstmm_body *bodies = state->model->bodies;
@@ -57,7 +57,7 @@ static int felt_on_the_way(mstmm_state *state, const mstmm_probe *probe, int dir
     return 0;
 }
 
-/* Behind a sweep: what each speed adds to the motion of a point (6 x nu). */
+/* After a sweep: Jacobian of the motion of a point (6 x nu). */
 static int added_by_speeds(mstmm_state *state, const mstmm_probe *probe, real *rows)
 {
     const int64_t nu = state->model->nu;
@@ -156,8 +156,8 @@ int mstmm_points_jacobian(const void *record, real none, const real *const *rows
                            &failure);
 }
 
-/* Accelerations (6) of a point under speeds that from body `way[first]` on are not those of the last
- * sweep; `way` leads from the point's body to the root. */
+/* Accelerations (6) of a point under speeds that from body `way[first]` on are not those of the
+ * last sweep; `way` leads from the point's body to the root. */
 static int gains_of(mstmm_state *state, const mstmm_probe *probe, const int *way, int first,
                     real *gains)
 {
@@ -174,8 +174,8 @@ static int gains_of(mstmm_state *state, const mstmm_probe *probe, const int *way
     return 0;
 }
 
-/* A column of half the change along u of what speeds bring by themselves, which is a square of
- * them: their part of the Jacobian's rate that does not tell u from the column's own speed. */
+/* A column of half the change along u of the acceleration at udot = 0, which is quadratic in the
+ * speeds: the part of the Jacobian's rate that is symmetric in u and the column's speed. */
 static int even_part(mstmm_state *state, const mstmm_points *points, const mstmm_probe *probe,
                      int first, int speed, real size, real *to)
 {
@@ -191,7 +191,7 @@ static int even_part(mstmm_state *state, const mstmm_points *points, const mstmm
     return code;
 }
 
-/* What does tell them apart is the bracket of both: w x of the turns, and J times that of speeds. */
+/* The antisymmetric part is their bracket: w x of the rotations, and J times that of speeds. */
 static void add_brackets(const mstmm_points *points, const real *u, real *to)
 {
     const int64_t nu = points->at.model->nu;

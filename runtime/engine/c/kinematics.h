@@ -1,4 +1,4 @@
-/* Where points are and how they move at states whose accelerations are given: kinematics alone. */
+/* Positions and motions of points at states with given accelerations: kinematics only. */
 #ifndef MSTMM_KINEMATICS_H
 #define MSTMM_KINEMATICS_H
 
@@ -19,18 +19,18 @@ typedef struct {
 int mstmm_moving_points(const mstmm_kinematics *known, int64_t n, const real *q, const real *u,
                         const real *udot, int n_probes, const mstmm_probe *probes, real *points,
                         mstmm_failure *failure);
-/* n_probes x 6 x nu: velocity and angular velocity of each by the speeds, of rigid bodies. */
+/* n_probes x 6 x nu: Jacobians of velocity and angular velocity, rigid bodies only. */
 int mstmm_jacobians(const mstmm_kinematics *known, const real *q, int n_probes,
                     const mstmm_probe *probes, real *rows, mstmm_failure *failure);
 
-/* Increments turn by themselves: the rate of increment `row` by increment `column` is `value` times
+/* Rotation of increments: the rate of increment `row` due to increment `column` is `value` times
  * speed `by`. */
 typedef struct {
     int by, row, column;
     real value;
 } mstmm_bracket;
 
-/* Points that are asked for again and again, of rigid bodies but for places and velocities. */
+/* Prepared calls for fixed points, rigid bodies only except for positions and velocities. */
 typedef struct {
     mstmm_kinematics at;
     int n_probes;
@@ -42,19 +42,19 @@ typedef struct {
     int *way;     /* n_bodies, written over */
 } mstmm_points;
 
-/* Called as alone.h tells; the number is not looked at.  Of q: places (n_probes x 3). */
+/* Called as in alone.h; the number is ignored.  Positions (n_probes x 3) at q. */
 int mstmm_points_places(const void *points, real none, const real *const *rows,
                         real *const *answers);
-/* Of q: the matrices (n_probes x 4 x 4) that take places in axes of the points to inertial ones. */
+/* Transformations (n_probes x 4 x 4) from axes of the points to inertial axes at q. */
 int mstmm_points_poses(const void *points, real none, const real *const *rows,
                        real *const *answers);
-/* Of q and u: velocities and angular velocities (n_probes x 6). */
+/* Velocities and angular velocities (n_probes x 6) at q and u. */
 int mstmm_points_velocities(const void *points, real none, const real *const *rows,
                             real *const *answers);
-/* Of q: what each speed adds to them (n_probes x 6 x nu). */
+/* Jacobians of these (n_probes x 6 x nu) at q. */
 int mstmm_points_jacobian(const void *points, real none, const real *const *rows,
                           real *const *answers);
-/* Of q and u: the rate of that along u. */
+/* Rate of these Jacobians along u at q. */
 int mstmm_points_jacobian_rate(const void *points, real none, const real *const *rows,
                                real *const *answers);
 /* cdef end */

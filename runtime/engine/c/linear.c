@@ -67,7 +67,7 @@ static int factored(int n, const real *restrict mass, real *restrict factors)
     return 0;
 }
 
-/* Columns that are solved at a time, which stay in registers; and those of a call, taken together:
+/* Columns solved at a time, which stay in registers; columns of one call, taken together:
  * `to` (rows `stride` apart) becomes -M^-1 from (n x width), M^-1 where there is none. */
 enum { TILE = MSTMM_TILE_COLUMNS };
 typedef struct {
@@ -91,7 +91,7 @@ static void taken_back(int n, const columns *of, int first, int width, const rea
         memcpy(of->to + of->stride * i + first, tile + TILE * i, (size_t)width * sizeof(real));
 }
 
-/* Four numbers: of longer vectors compilers for shorter registers make detours over memory. */
+/* Four numbers: with longer vectors compilers for shorter registers use memory. */
 typedef real quad __attribute__((vector_size(4 * sizeof(real)), aligned(sizeof(real)), may_alias));
 
 /* A row of a tile, by name so that it stays in registers. */

@@ -12,7 +12,7 @@
 /* Columns that are solved at a time. */
 #define MSTMM_TILE_COLUMNS 32
 
-/* Code of a scene, of which n speeds are imposed by nobody; everything is the caller's. */
+/* Code of a scene with n free speeds; the caller owns all memory. */
 typedef struct {
     const mstmm_fused *fused;
     mstmm_live_inputs live;
@@ -22,7 +22,7 @@ typedef struct {
     int n;
 } mstmm_linear_code;
 
-/* One of them, with room for what comes before the answers. */
+/* One of them, with memory for intermediate results. */
 typedef struct {
     mstmm_linear_code code;
     const real *efforts; /* nu zeros */
@@ -31,8 +31,8 @@ typedef struct {
 
 /* Numbers that it finds: udot (nu), M, C, K, G (n x n each), r_t (n), qdot (nq). */
 int64_t mstmm_linear_numbers(const mstmm_linear_code *code);
-/* Fills them at a state under efforts (nu).  Returns 0; else a guard failed or a number, of the
- * state too, is not finite, nothing is meant, and the looped engine tells what is wrong. */
+/* Fills them at a state with efforts (nu).  Returns 0; otherwise a guard failed or a number is not
+ * finite, the results are invalid, and the looped engine names the cause. */
 int mstmm_linear_at(const mstmm_linear_code *code, real t, const real *q, const real *u,
                     const real *efforts, real *found);
 /* M, C, K (n x n each) of the speeds `free` by the looped engine, behind one another.  `work` has
@@ -40,11 +40,11 @@ int mstmm_linear_at(const mstmm_linear_code *code, real t, const real *q, const 
 int mstmm_linear_swept(mstmm_tangent *at, real t, const real *q, const real *u, const real *a,
                        int n, const int *free, real *found, real *work);
 /* The same, and slopes of accelerations row by row (n x (3n + 1)): -M^-1 K, -M^-1 C, M^-1 and
- * -M^-1 r_t.  Neither is meant either where M is not positive definite. */
+ * -M^-1 r_t.  Both are invalid if M is not positive definite. */
 int mstmm_accelerations_about(const mstmm_linear_code *code, real t, const real *q, const real *u,
                               const real *efforts, real *found, real *slopes);
-/* The same of scenes without drives, called as alone.h tells: of q and u, udot, the four slopes each
- * by itself, G and, of du by u, 1.  The record is mstmm_linear_alone. */
+/* The same for scenes without drives, called as in alone.h: at q and u, udot, the four derivatives
+ * separately, G and the identity.  The record is mstmm_linear_alone. */
 int mstmm_linear_derivatives(const void *record, real t, const real *const *rows,
                              real *const *answers);
 /* d/dt (x, x') = matrix (2n x 2n) (x, x') of what mstmm_linear_at found, x' = G x + du where

@@ -50,7 +50,7 @@ static void begin_run(const mstmm_model *model, mstmm_branch *run, const real **
     run->recover = body->kernels->link_recover;
 }
 
-/* A run that hangs on the one before with nothing beside it hands S and e on to it, if both are of
+/* A run that is the only child of the previous run passes S and e on to it if both consist of
  * links. */
 static void join(mstmm_branch *before, mstmm_branch *run)
 {
@@ -65,7 +65,7 @@ static int64_t link_size(const mstmm_branch *run)
            (run->angles ? MSTMM_LINK_ANGLE : MSTMM_LINK_ROTATION);
 }
 
-/* Run that holds a body; the runs are in the order of the bodies. */
+/* Run that contains a body; the runs are in the order of the bodies. */
 static const mstmm_branch *run_of(const mstmm_branch *runs, int n, int body)
 {
     int low = 0, high = n;
@@ -122,7 +122,7 @@ int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **n
 
 /* --- passes ----------------------------------------------------------------------------------- */
 
-/* Bias motion or deviation of what a run hangs on: a link, or a body's or the ground's block. */
+/* Bias motion or deviation of the parent of a run: a link, or a body's or the ground's block. */
 static const real *of_parent(const mstmm_state *state, const mstmm_branch *run, int in_block)
 {
     return run->parent_place >= 0

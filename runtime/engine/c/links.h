@@ -1,6 +1,5 @@
-/* Runs of bodies that are swept as links: a rigid body behind a hinge that moves about and along z,
- * or turns about a point, one kernel a pass, and between the passes no more in memory than the next
- * pass reads. */
+/* Runs of bodies that are swept as links: a rigid body on a hinge that moves about and along z or
+ * rotates about a point.  One kernel per pass; only numbers for the next pass are stored. */
 #ifndef MSTMM_LINKS_H
 #define MSTMM_LINKS_H
 
@@ -22,7 +21,7 @@
 #define MSTMM_LINK_OWN 12
 
 /* Splits the bodies into runs; returns their number.  `runs` holds n_bodies entries and `numbers`
- * one per body; links lie in the workspace from `place`; `size` receives how much they take.
+ * one per body; links are in the workspace from `place`; `size` receives their total size.
  * `gathered` receives the links' numbers side by side; NULL: they are few and shared, and stay
  * where they are. */
 int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **numbers,
@@ -31,7 +30,7 @@ int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **n
 
 #define MSTMM_LINK_TURN(nu) (MSTMM_LINK_FIXED + MSTMM_LINK_PER_SPEED * (nu))
 
-/* Where one link finds its kernels and its numbers, and those of its neighbours. */
+/* Kernels and numbers of one link and of its neighbours. */
 typedef struct {
     mstmm_state *state;
     int index, nu;

@@ -1,4 +1,4 @@
-/* Closed loops: sums begun, and states brought back to where the loops are closed. */
+/* Closed loops: initialisation of sums, and projection of states on the constraints. */
 #include <math.h>
 #include <string.h>
 
@@ -20,7 +20,7 @@ static real *row_numbers(const mstmm_state *state, int row)
     return state->workspace + state->model->loops + MSTMM_ROW * (int64_t)row;
 }
 
-/* Is nothing asked of a row now? */
+/* True if a row is inactive now. */
 static int let_go(const mstmm_state *state, const mstmm_loop_row *row)
 {
     if (row->of_speeds && state->level == MSTMM_GAP) return 1;
@@ -38,7 +38,7 @@ int mstmm_hook_rows_begun(mstmm_state *state)
         memset(numbers, 0, MSTMM_ROW * sizeof(real));
         numbers[MSTMM_ROW_TOLD] = told;
     }
-    if (keeps) first = sums; /* else all in one go: each costs its start */
+    if (keeps) first = sums; /* else in one call: each call has a fixed cost */
     memset(first, 0, (size_t)(end - first) * sizeof(real));
     for (int r = 0; r < model->n_rows; r++) {
         const mstmm_loop_row *row = &model->rows[r];
@@ -111,7 +111,7 @@ int mstmm_correction(const mstmm_model *model, real *workspace, int level, real 
                          .memory = memory, .udot = change, .observed = 0, .level = level,
                          .give = give, .failure = failure};
     memset(change, 0, (size_t)model->nu * sizeof(real));
-    state.given = change; /* nothing is imposed but what does not change */
+    state.given = change; /* only constant values are prescribed */
     state.qdot = mstmm_spare_qdot(&state);
     mstmm_ground(&state);
     const int code = mstmm_run_correction(&state);

@@ -4,34 +4,34 @@
 
 #include "sweep.h"
 
-/* Answers once more what the accelerations just found leave over, and adds that to them. */
+/* Solves for the residual of the accelerations just found and adds the correction. */
 int mstmm_refine(mstmm_state *state, const real *q, const real *u);
-/* Accelerations `found`, from those given with their rows: the motion under all that acts whose gaps
- * would be gone if each coordinate changed by 1 / closing of what its acceleration differs. */
+/* Accelerations `found`, from those given with their rows: the motion under all that acts whose
+ * gaps would be gone if each coordinate changed by 1 / closing of what its acceleration differs. */
 int mstmm_placing_accelerations(const mstmm_model *model, real *workspace, real closing, real t,
                                 const real *q, const real *u, const real *a, const real *memory,
                                 real *qdot, real *found, mstmm_failure *failure);
-/* How near to a singular pose the sweep that was made last met the loops: the largest of what is
- * rounding for a row in parts of its pivot. */
+/* Nearness to a singular pose in the last sweep: the largest ratio of a row's rounding level to its
+ * pivot. */
 real mstmm_strain(const mstmm_model *model, const real *workspace);
-/* How much the rows lack in the sweep that was made last, by row. */
+/* Errors of the rows in the last sweep, by row. */
 void mstmm_missing(const mstmm_state *state, real *missing);
-/* What a coupling lacked in the sweep that was made last; 0 where nothing is asked of it. */
+/* Error of a coupling in the last sweep; 0 if it is inactive. */
 real mstmm_coupling_lack(const mstmm_state *state, const mstmm_coupling *one);
 /* Efforts of the hinge of a body without those of couplings. */
 void mstmm_uncoupled(const mstmm_state *state, int index, real *efforts);
 /* Quaternions in q, by the first entry of each, brought back to length 1. */
 void mstmm_unit_quaternions(int count, const int *first, real *q);
 
-/* How far loops are open before a step that closes them (m, rad): what is met, and what repeats
- * others; where each is most, as the frame of its hinge. */
+/* Gaps of loops before a step that closes them (m, rad): of independent rows, and of redundant
+ * ones; where each is largest, as the frame of its hinge. */
 typedef struct {
     real met, repeated;
     int where_met, where_repeated;
 } mstmm_gaps;
 
-/* What brings a state back to where its loops are closed: one step of its coordinates, and its
- * speeds (NULL: those stay); both in place.  Nonzero = failure code. */
+/* Projects a state on its constraints: one step of its coordinates, and its speeds (NULL: these
+ * stay); both in place.  Nonzero = failure code. */
 typedef struct {
     void *context;
     int (*gaps)(void *context, mstmm_gaps *found);
@@ -39,7 +39,7 @@ typedef struct {
     int near; /* a singular pose is near, where steps leave more than rounding of small gaps */
 } mstmm_closing;
 
-/* Gaps closed and slips stopped as well as the model asks for. */
+/* Gaps and velocity errors removed to the accuracy of the model. */
 int mstmm_closed(const mstmm_closing *by, const mstmm_model *model, mstmm_failure *failure);
 
 #endif

@@ -1,4 +1,4 @@
-/* The mass matrix, a speed at a time: what its change asks of the hinges on the way to the root. */
+/* Mass matrix, one speed at a time: efforts of its change on the hinges towards the root. */
 #include <string.h>
 
 #include "hinge.h"

@@ -7,7 +7,7 @@
 
 enum { END_NUMBERS = 12 };
 
-/* What a kernel about probe i is given; its time is not read. */
+/* Arguments of a kernel for probe i; its time is not read. */
 #define GIVEN(points, q, u, i)                                                                     \
     (points)->p, (points)->none, q, u, (points)->memory, (points)->ends + END_NUMBERS * (i)
 
@@ -51,7 +51,7 @@ int mstmm_compiled_points_poses(const void *record, real none, const real *const
     return failed;
 }
 
-/* A kernel with one answer. */
+/* A kernel with one result. */
 typedef int kernel(const double *p, const double *t, const double *q, const double *u,
                    const double *memory, const double *end, double *answer);
 typedef kernel *chosen(const mstmm_fused *code);

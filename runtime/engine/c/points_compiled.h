@@ -1,4 +1,4 @@
-/* Points of a scene that has code of its own: kinematics alone, one state after the other. */
+/* Points of a scene by its compiled code: kinematics only, one state at a time. */
 #ifndef MSTMM_POINTS_COMPILED_H
 #define MSTMM_POINTS_COMPILED_H
 

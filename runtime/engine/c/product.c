@@ -10,8 +10,8 @@
 #include "product.h"
 #include "sweep_steps.h"
 
-/* Parts of the accelerations of an open chain that are rounding where closing its loops cancels
- * them, as at rest. */
+/* Relative accelerations of an open chain that are rounding if closing its loops cancels them, as
+ * at rest. */
 #define CANCELLED 1e-13
 
 static void multiply(const real *a, const real *b, real *out)
@@ -32,7 +32,7 @@ static void apply(const real *a, const real *z, real *out)
     }
 }
 
-/* Where `alone`, nothing turns and nothing but `applied` acts. */
+/* With `alone`, nothing rotates and only `applied` acts. */
 static void body_matrix(const mstmm_state *state, int index, const real *applied, int alone,
                         real *store)
 {

@@ -1,5 +1,5 @@
-/* What holds at the ends of a chain whose matrices are multiplied: the ground's state from the
- * overall matrix, by least squares. */
+/* Boundary conditions of a chain whose matrices are multiplied: the ground's state from the overall
+ * matrix, by least squares. */
 #include <math.h>
 #include <stdint.h>
 #include <string.h>

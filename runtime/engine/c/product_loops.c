@@ -1,7 +1,7 @@
 /* Closed loops in the plain product: both ends of a cut hinge are boundaries of the chain, which
  * the hinge's conditions tie together.
  *
- * Along the chain every state goes linearly with the loads that the ends put on each other.  One
+* Along the chain every state is linear in the loads between the two ends.  One
  * multiplier for each direction that the hinge holds makes them equal and opposite; that the ends
  * accelerate alike along these directions are as many equations, whose columns are products of the
  * same matrices under one multiplier alone. */
@@ -18,7 +18,7 @@ static const real *numbers_of(const mstmm_state *state, int frame, int64_t first
            first;
 }
 
-/* What a direction of a closing hinge does in the motion of the chain. */
+/* Acceleration of the chain along a direction of a closing hinge. */
 static real along(const mstmm_state *state, int frame, int direction, int alone)
 {
     const int ends[] = {state->model->bodies[frame].parent,
@@ -48,7 +48,7 @@ static void add_efforts(const mstmm_state *state, int frame)
         }
 }
 
-/* One column of the equations: what all rows do under a load. */
+/* One column of the equations: response of all rows to a load. */
 static void column(const mstmm_state *state, int which, real *system, int at, int width)
 {
     const mstmm_model *model = state->model;
@@ -94,7 +94,7 @@ int mstmm_product_closed(mstmm_state *state, real *open)
     int code = 0, last = 0;
     for (int i = 0; i < model->n_bodies && !code; i++) {
         if (model->looped[i].closure) add_efforts(state, last = i);
-        else code = mstmm_at_hinge_motion(state, i); /* the elimination lay there */
+        else code = mstmm_at_hinge_motion(state, i); /* overwritten by the elimination */
     }
     for (int which = -1; which < rows && !code; which++) {
         code = mstmm_product_chain(state, which < 0 ? ACTING : which);

@@ -1,12 +1,12 @@
-/* Amplitudes under harmonic pushes; see response.h. */
+/* Harmonic response; see response.h. */
 #include "response.h"
 
 #include <string.h>
 
-/* Steps so long that coordinates follow nothing: their share is lost beside any other. */
+/* A step so long that the contribution of coordinates is negligible. */
 #define MSTMM_STILL 1e300
 
-/* Stiffness that is larger by the losses, less the stiffness. */
+/* Increase of the stiffness by the loss factors. */
 static int bring_losses(mstmm_response *of)
 {
     real *lost = of->brought + 2 * of->n_numbers;
@@ -66,7 +66,7 @@ void mstmm_response_many(mstmm_response *of, int64_t count, const real *s, int64
         const int some = count - k < most ? (int)(count - k) : most;
         mstmm_response at = from(of, k);
         by(&at, some, s + 2 * k, n, columns, x + k * size, growth + k, grown + k);
-        /* One that is singular spoils those beside it. */
+        /* A singular one invalidates the others in its vector. */
         const int spoiled = some > 1 && !isfinite(growth[k]);
         for (int j = 0; spoiled && j < some; j++) {
             at = from(of, k + j);

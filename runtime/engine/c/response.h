@@ -1,6 +1,6 @@
-/* Amplitudes under harmonic pushes: Z(s) x = r with Z(s) = s^2 M + s C + K, the tangent in complex
- * numbers.  What bodies bring is put together once a state; every s is one elimination, O(bodies),
- * of several s at a time. */
+/* Harmonic response: Z(s) x = r with Z(s) = s^2 M + s C + K, the tangent in complex numbers.
+ * Contributions of bodies are computed once per state; every s is one elimination, O(bodies), of
+ * several s at a time. */
 #ifndef MSTMM_RESPONSE_HEADER
 #define MSTMM_RESPONSE_HEADER
 
@@ -34,7 +34,7 @@ typedef struct {
     real *closure;       /* n_coupled x (4 n_coupled + 2) complex */
 } mstmm_response;
 
-/* What bodies bring about the state of the last residual. */
+/* Contributions of bodies about the state of the last residual. */
 int mstmm_response_begin(mstmm_response *of);
 /* Amplitudes x (count, n, nu) of n right-hand sides (n, nu) at every s (count), x and s pairs of
  * real and imaginary parts; how many times larger the elimination made inertia, and the body where
@@ -44,12 +44,12 @@ void mstmm_response_many(mstmm_response *of, int64_t count, const real *s, int64
                          const real *columns, real *x, real *growth, int *grown);
 /* cdef end */
 
-/* The same for few enough s to go together, at most `lanes` of them. */
+/* The same for at most `lanes` values of s, in one vector. */
 typedef void mstmm_response_few(mstmm_response *of, int count, const real *s, int64_t n,
                                 const real *columns, real *x, real *growth, int *grown);
 mstmm_response_few mstmm_response_by_2, mstmm_response_by_4;
 
-/* Is there code for processors with wider registers than all have? */
+/* True if there is code for processors with wide registers. */
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define MSTMM_FOUR_LANES
 #endif

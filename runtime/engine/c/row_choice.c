@@ -1,5 +1,5 @@
-/* Which rows of a closure are met, where some repeat others: those that pivoting takes, in parts of
- * their mobility, before the first of them is closed. */
+/* Choice of the satisfied rows of a closure with redundant rows: pivoting with pivots relative to
+ * the mobility, before the first of them is closed. */
 #include <math.h>
 #include <string.h>
 
@@ -8,19 +8,19 @@
 #include "sweep_steps.h"
 
 #define MOST 6
-/* A choice stays while its smallest pivot is more than this part of the best one's, and where even
- * that one is as small as what repeats others. */
+/* A choice is kept while its smallest pivot exceeds this fraction of the best one's, and if even
+ * that one is as small as that of redundant rows. */
 #define WORSE 0.5
 #define REPEATED 1e-6
-/* Where none has been made, the first rows that say something are taken, as compiled code takes them,
- * unless they are worse than this. */
+/* Where none has been made, the first rows that say something are taken, as compiled code takes
+ * them, unless they are worse than this. */
 #define BAD 1e-2
-/* A later row is taken where its pivot is so many times larger: symmetry makes some equal but for
+/* A later row is preferred if its pivot is larger by this factor: symmetry makes some equal up to
  * rounding. */
 #define LARGER 1.1
 
-/* The entries of L between the rows, in parts of their mobilities; those of rows of which nothing is
- * asked now are zero. */
+/* The entries of L between the rows, in parts of their mobilities; those of rows of which nothing
+ * is asked now are zero. */
 static void scaled_entries(const mstmm_state *state, const mstmm_choice *one, real (*found)[MOST])
 {
     const real *loops = state->workspace + state->model->loops;
@@ -60,7 +60,7 @@ static real pivoted(int n, int count, real (*entries)[MOST], int *met)
     return smallest;
 }
 
-/* The first so many of the rows that say something, in the order in which they are closed. */
+/* The first so many independent rows, in the order in which they are closed. */
 static void in_order(int n, int count, real (*entries)[MOST], int *met)
 {
     real left[MOST][MOST];

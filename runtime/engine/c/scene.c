@@ -56,7 +56,7 @@ void mstmm_point_shown(const mstmm_state *state, const mstmm_probe *probe, const
     mstmm_frames_end_frame(.A = a, .R_end = probe->axes, .A_end = out + 15);
 }
 
-/* Behind a sweep, which leaves deviations from the bias motion. */
+/* After a sweep, which leaves deviations from the bias motion. */
 static void observe_probe(const mstmm_state *state, const mstmm_probe *probe, real *out)
 {
     const real *block = mstmm_block(state->model, state->workspace, probe->body);
@@ -89,8 +89,8 @@ static void observe_hinges(const mstmm_state *state, const real *udot,
     }
 }
 
-/* Kinetic energy of a body with the rotors of its inboard hinge, and what it comes from: its inertia
- * and, of a flexible one, its momentum. */
+/* Kinetic energy of a body with the rotors of its inboard hinge, and what it comes from: its
+ * inertia and, of a flexible one, its momentum. */
 static real kinetic_energy(mstmm_state *state, int i, real *inertia, real *momentum)
 {
     const mstmm_body *body = &state->model->bodies[i];
@@ -243,7 +243,7 @@ static void remember_twists(mstmm_scene_run *run, const real *y)
     }
 }
 
-/* Unit quaternions, what drives say, and loops closed. */
+/* Unit quaternions, driven values, and closed loops. */
 static int put_in_order(mstmm_scene_run *run, real t, real *y)
 {
     const mstmm_model *model = run->model;
@@ -269,7 +269,7 @@ int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, cons
     real *own = run->memory;
     int first = 0;
     for (int64_t k = 0; k < n; k++) {
-        run->memory = m ? memory + k * m : own; /* settling writes the turn it ends in */
+        run->memory = m ? memory + k * m : own; /* the projection writes the final turn */
         const int code = mstmm_scene_settle(run, t[k], y + k * width);
         if (code && !first) first = code;
     }
@@ -326,7 +326,7 @@ int mstmm_kinetic_seen(mstmm_scene_run *run, real t, const real *y, const real *
     return code;
 }
 
-/* A state inside a step, to be put in order behind the numbers of the probes. */
+/* A state inside a step, to be projected, after the numbers of the probes. */
 static int seen_inside(mstmm_scene_run *run, real t, const real **y)
 {
     real *own = run->probe_values + 6 * run->n_probes + MSTMM_PROBE_NUMBERS;
@@ -366,7 +366,7 @@ static int scene_lets_through(void *context, int event, double t, const double *
     return seen_inside(context, t, &y) ? 0 : mstmm_lets_through(context, event, t, y, g);
 }
 
-/* Is there anything to do behind a step? */
+/* True if there is anything to do after a step. */
 static int needs_settling(const mstmm_scene_run *run)
 {
     const mstmm_model *model = run->model;
@@ -382,7 +382,7 @@ void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system)
     memset(system, 0, sizeof *system);
     system->context = run;
     system->n_state = model->nq + model->nu + (run->with_power ? 1 : 0);
-    system->n_error = system->n_state; /* the work too: its power has kinks that motion has not */
+    system->n_error = system->n_state; /* the work too: its power has additional kinks */
     system->rhs = scene_rhs;
     system->accept = needs_settling(run) ? scene_accept : NULL;
     system->attainable = run->model->looped ? &run->attainable : NULL;

@@ -1,4 +1,4 @@
-/* A scene as the integrator sees it, and what is observed of it at given states. */
+/* Interface of a scene to the integrator, and observation of given states. */
 #ifndef MSTMM_SCENE_H
 #define MSTMM_SCENE_H
 
@@ -31,7 +31,7 @@ typedef struct {
     real *rows;    /* n_rows: multipliers of closed loops, or NULL */
 } mstmm_observation;
 
-/* Everything asked for at one state; returns 0 or a reason, with `failure` filled. */
+/* All requested quantities at one state; returns 0 or a reason, with `failure` filled. */
 int mstmm_observe(const mstmm_model *model, real *workspace, real t, const real *q, const real *u,
                   const real *memory, const mstmm_observation *wanted, mstmm_failure *failure);
 /* The same for n states; arrays of `wanted` hold n blocks one after the other. */
@@ -61,8 +61,8 @@ typedef struct {
 } mstmm_event_action;
 
 /* How the value of a bounce's event changes at a state: its rate, the sum of the sizes of that's
- * terms, that of its slopes by places, 1/m, 1/rad, and that of these times the places or 1 m, 1 rad,
- * in parts of which the value is known. */
+ * terms, that of its slopes by places, 1/m, 1/rad, and that of these times the places or 1 m, 1
+ * rad, in parts of which the value is known. */
 typedef struct {
     real rate, size, steepness, reach;
 } mstmm_meeting;
@@ -74,7 +74,7 @@ typedef struct {
     int64_t used;
 } mstmm_implicit_parts;
 
-/* Code compiled for what implicit methods ask, and the looped engine's way, its last resort */
+/* Compiled code for implicit methods, and the looped engine as fallback */
 typedef struct {
     const mstmm_fused *fused; /* NULL: there is none */
     real *p;
@@ -101,7 +101,7 @@ typedef struct {
     const mstmm_probe *probes;
     real *probe_values; /* n_probes x 6, MSTMM_PROBE_NUMBERS of scratch, and nq + nu of a state */
     /* Of the tape's inputs: components of the state that it reads, bounds of all its slots */
-    int n_read;         /* 0: nothing is known between two looks */
+    int n_read;         /* 0: no bounds between two evaluations */
     const int *read;
     mstmm_bounds *bounds;
     real *later; /* nq + nu: scratch; NULL where it reads no velocities of probes */
@@ -117,31 +117,31 @@ typedef struct {
      * NULL: not prepared */
     mstmm_tangent *base, *stage;
     mstmm_implicit implicit;
-    real strain;      /* of the loops when their slips were stopped last: see mstmm_strain */
+    real strain;      /* of the loops at the last projection of speeds: see mstmm_strain */
     double attainable; /* see mstmm_system: near a singular pose */
-    int rechosen;     /* rows have been chosen anew when they were closed last */
+    int rechosen;     /* rows were chosen again when they were last closed */
     real *speeds;     /* nu: those of a stage near a singular pose; NULL: there are no loops */
-    int on_positions; /* the step at hand closes gaps, and leaves slips: index 3 */
-    int steady;       /* nothing in the scene goes by time */
+    int on_positions; /* the present step closes gaps but no velocity errors: index 3 */
+    int steady;       /* nothing in the scene depends on time */
     int *coordinates; /* nu: see mstmm_implicit */
     real *known;      /* nq + 3 nu: scratch */
     mstmm_implicit_code implicit_code;
 } mstmm_scene_run;
 
-/* Lets implicit methods integrate `run`, whose last fields have been given. */
+/* Enables implicit methods for `run`, whose last fields have been set. */
 void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system);
 
-/* From now on their steps may ask rows of positions where they end, and nothing of speeds. */
+/* From now on their steps may satisfy rows of positions at their end, and none of speeds. */
 void mstmm_scene_on_positions(mstmm_scene_run *run);
 
-/* Driven coordinates, unit quaternions and memory put in order at t; as after an accepted step. */
+/* Projects driven coordinates, quaternions and memory at t, as after an accepted step. */
 int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y);
 /* The same for n states in rows of `width` numbers, each with its own memory; the run's memory is
  * what it was, the rows take the turns they end in.  Returns the code of the first that fails, the
  * others are settled all the same. */
 int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, const real *t,
                             real *memory, real *y);
-/* How event number `event`, which bounces, is met at y with the speeds u (nu). */
+/* Approach of event number `event`, which bounces, at y with the speeds u (nu). */
 int mstmm_meeting_of(mstmm_scene_run *run, int event, real t, const real *y, const real *u,
                      mstmm_meeting *found);
 /* cdef end */

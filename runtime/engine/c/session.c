@@ -6,7 +6,7 @@
 
 static const real SAME = 1e-9; /* of a step: a time so near to a grid point is that point */
 
-/* Where one run of the same steps would have made one end, there the tick ends. */
+/* The tick ends where a single run with the same steps would end a step. */
 static real end_of(const mstmm_run *run, real dt)
 {
     const real end = run->real.t + dt, h = run->fixed_step;
@@ -28,7 +28,7 @@ static int refuse(mstmm_session *session, int which)
 int mstmm_session_rest(mstmm_session *session, real wall)
 {
     for (;;) {
-        session->run->n_samples = 0; /* only events leave any */
+        session->run->n_samples = 0; /* only events leave samples */
         const int status = mstmm_advance(session->run, wall);
         if (status != MSTMM_BUFFER_FULL) return status;
     }

@@ -1,4 +1,4 @@
-/* A run that its caller takes forward piece by piece, setting inputs in between. */
+/* A run that its caller advances in ticks, setting inputs in between. */
 #ifndef MSTMM_SESSION_H
 #define MSTMM_SESSION_H
 
@@ -17,14 +17,14 @@ typedef struct {
 
 enum {
     MSTMM_REFUSED = -100, /* see `refused`; nothing has changed */
-    MSTMM_UNMAPPED = 100  /* breaks have to be looked for first; nothing has changed */
+    MSTMM_UNMAPPED = 100  /* breaks must be computed first; nothing has changed */
 };
 
-/* On by dt (s) with the inputs that are given, for `wall` seconds at most; the status of
+/* Advances by dt (s) with the given inputs, for at most `wall` seconds; the status of
  * mstmm_advance, or one of the above.  With fixed steps a time beside their grid by rounding is the
  * grid's. */
 int mstmm_session_advance(mstmm_session *session, real dt, real wall);
-/* The rest of the way where that came back for want of time. */
+/* Completes a tick that ended because of the time limit. */
 int mstmm_session_rest(mstmm_session *session, real wall);
 /* cdef end */
 

@@ -1,5 +1,5 @@
-/* What calls the passes: states begun, expressions evaluated, entries for Python; see sweep.h.  The
- * passes themselves are printed from the schedule (sweep_steps.c). */
+/* Calls of the passes: initialisation, evaluation of expressions, entries for Python; see
+ * sweep.h.  The passes themselves are printed from the schedule (sweep_steps.c). */
 #include <math.h>
 #include <stdint.h>
 #include <string.h>

@@ -149,9 +149,9 @@ typedef struct {
     const int *pairs; /* of those with the ones that stay, up to this one */
 } mstmm_other;
 
-/* Rows of one closure of which only so many count at a time: the others repeat these.  In the order in
- * which they are closed; pairs: their entries of L behind `loops`, of row i with row j < i at
- * i (i - 1) / 2 + j. */
+/* Rows of one closure of which only so many count at a time: the others repeat these.  In the
+ * order in which they are closed; pairs: their entries of L behind `loops`, of row i with row j <
+ * i at i (i - 1) / 2 + j. */
 typedef struct {
     int n, count;
     int rows[6];
@@ -178,8 +178,8 @@ typedef struct {
 #define MSTMM_PLANE 2
 #define MSTMM_ROLLING 3
 
-/* What closes a loop: the frame C of a hinge, a body without mass, is to be where an end of B is, or
- * a constraint asks less of the two. */
+/* What closes a loop: the frame C of a hinge, a body without mass, is to be where an end of B is,
+ * or a constraint asks less of the two. */
 typedef struct {
     int frame, outboard; /* C, B */
     int kind;
@@ -197,8 +197,8 @@ typedef struct {
     int64_t inner, outer, tau;
 } mstmm_own;
 
-/* A row between coordinates (-1: others do what it asks), or of speeds, of which nothing is asked of
- * positions; from `numbers` on stand those of MSTMM_COUPLING, behind `loops`. */
+/* A row between coordinates (-1: others do what it asks), or of speeds, of which nothing is asked
+ * of positions; from `numbers` on stand those of MSTMM_COUPLING, behind `loops`. */
 typedef struct {
     int row, of_speeds;
     real kept; /* value that it keeps */
@@ -350,8 +350,9 @@ int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q
 int mstmm_moved(const mstmm_model *model, real *workspace, real t, real *q, const real *change,
                 const real *memory, int n_quaternions, const int *quaternions,
                 mstmm_failure *failure);
-/* Chooses, of rows that repeat others, those that are met, and writes that to `memory`: the choice that
- * is there stays while it is not much worse than the best.  *changed: whether there is a new one. */
+/* Chooses, of rows that repeat others, those that are met, and writes that to `memory`: the choice
+ * that is there stays while it is not much worse than the best.  *changed: whether there is a new
+ * one. */
 int mstmm_choose_rows(const mstmm_model *model, real *workspace, real t, const real *q,
                       real *memory, int *changed, mstmm_failure *failure);
 /* Gaps closed and, unless `gaps_alone`, slips stopped in place; driven coordinates are filled in. */
@@ -527,8 +528,8 @@ static inline real mstmm_value_at(const mstmm_state *state, int place)
     return place < 0 ? 0 : mstmm_values(state)[place];
 }
 
-/* The largest pivot of a row that is rounding; before it is told of the first of rows that are chosen,
- * they are, where they have not been yet. */
+/* The largest pivot of a row that is rounding; before it is told of the first of rows that are
+ * chosen, they are, where they have not been yet. */
 const real *mstmm_row_floor(mstmm_state *state, const mstmm_loop_row *row);
 /* Is a row not met because others of its choice are? */
 int mstmm_rests(const mstmm_state *state, const mstmm_loop_row *row);
@@ -540,8 +541,8 @@ int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real 
 int mstmm_given_effort_slope(mstmm_state *state, const mstmm_tape *slope, const real *length,
                              const real *d_length, real *d_value);
 
-/* Compilers make calls of loops that set or copy numbers, which costs more than the few numbers of a
- * hinge do; an empty piece of assembler keeps them loops. */
+/* Compilers make calls of loops that set or copy numbers, which costs more than the few numbers of
+ * a hinge do; an empty piece of assembler keeps them loops. */
 #ifdef __GNUC__
 #define MSTMM_ONE_BY_ONE __asm__ volatile("")
 #else

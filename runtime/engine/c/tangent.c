@@ -78,7 +78,7 @@ int64_t mstmm_residual_work(const mstmm_model *model)
     return cut(model, 0, NULL).used_by_residual;
 }
 
-/* Rows of speeds that somebody imposes are no equations. */
+/* Prescribed speeds have no equations. */
 static void without_imposed(const mstmm_model *model, const real *memory, real *rows)
 {
     for (int i = 0; model->n_imposed && i < model->n_bodies; i++) {
@@ -261,9 +261,9 @@ int mstmm_tangent_brought(mstmm_tangent *at, real rate, real s, real sq)
 int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
 {
     take_steps(at, rate, s, sq, kappa);
-    /* With couplings left out a body may topple that they hold. */
+    /* Without couplings a body that they stabilise may be unstable. */
     int negative = 0;
-    /* Where loads need poses all bodies are begun before one is eliminated. */
+    /* If loads need poses, all bodies are initialised before the first elimination. */
     const int kept = at->keeps || at->model->needs_pose || at->model->product;
     const int code = run_tangent(at, mstmm_run_tangent,
                                  at->n_coupled || at->counts ? &negative : NULL, kept);
@@ -366,7 +366,7 @@ int mstmm_accelerations_rate(mstmm_tangent *at, real *rate)
     return code ? code : mstmm_across_solve(at, parts.still_efforts, NULL, missing, rate);
 }
 
-/* Coordinates and speeds that somebody imposes do not change, and have no rates of their own. */
+/* Prescribed coordinates and speeds do not change and have no rates. */
 static void without_imposed_coordinates(const mstmm_model *model, const real *memory, real *dq)
 {
     for (int i = 0; model->n_imposed && i < model->n_bodies; i++) {

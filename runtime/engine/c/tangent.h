@@ -1,23 +1,23 @@
-/* The residual of a scene and its tangent: what implicit methods, equilibria and linear models ask
- * for.  R(t, q, u, a) are the efforts that accelerations a need beyond all that acts. */
+/* Residual of a scene and its tangent, for implicit methods, equilibria and linear models.
+ * R(t, q, u, a) are the efforts that accelerations a need in addition to all acting loads. */
 #ifndef MSTMM_TANGENT_HEADER
 #define MSTMM_TANGENT_HEADER
 
 #include "sweep.h"
 
 /* cdef begin */
-/* An unknown of a hinge that closes a loop: the acceleration of a speed of its own, or the multiplier
- * of a row; or that of a coupling. */
+/* An unknown of a hinge that closes a loop: the acceleration of a speed of its own, or the
+ * multiplier of a row; or that of a coupling. */
 typedef struct {
     int frame, direction; /* the hinge's frame (-1: a coupling), and which of its six directions */
     int speed, row;       /* -1: the other is meant */
 } mstmm_coupled_row;
 
-/* What the elimination does not see, as it reaches across the tree: loads on bodies that change with
- * what other bodies do, efforts that expressions of the state and couplings give, hinges that close
- * loops, and couplings.  These unknowns (n_coupled) come in groups, each of which moves its speeds
- * and is read by some of the unknowns; lists of those go from first_.. of a group or a pass to that
- * of the next. */
+/* What the elimination does not see, as it reaches across the tree: loads on bodies that change
+ * with what other bodies do, efforts that expressions of the state and couplings give, hinges that
+ * close loops, and couplings.  These unknowns (n_coupled) come in groups, each of which moves its
+ * speeds and is read by some of the unknowns; lists of those go from first_.. of a group or a pass
+ * to that of the next. */
 typedef struct {
     int n_bodies, n_efforts, n_rows, n_passes;
     const int *bodies; /* on which such loads act: 6 numbers each */
@@ -44,9 +44,9 @@ typedef struct {
     real *closure;        /* n_coupled x (numbers of a row of the matrix + 4) */
     int known;            /* there has been a residual since the memory changed */
     int laws_alone;       /* the last tangent was that of mstmm_laws_factor */
-    int on_positions;     /* rows are asked of positions alone: see mstmm_across_solve */
+    int on_positions;     /* rows are those of positions only: see mstmm_across_solve */
     int rows_of_motion;   /* rows are those of small motions x, J x = 0, whatever s is */
-    int counts;           /* pivots may be negative: somebody counts them */
+    int counts;           /* pivots may be negative: they are counted */
     int keeps, kept;      /* tangents leave S of every body, as increments that are known ask for */
     real t, rate, s, sq, kappa; /* of the last residual and tangent */
     mstmm_failure failure;
@@ -76,17 +76,17 @@ int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const rea
 int mstmm_accelerations_rate(mstmm_tangent *at, real *rate);
 /* Change of the coordinates' rates (nq) along the direction of the last mstmm_residual_slope. */
 void mstmm_rates_slope(const mstmm_tangent *at, real *d_rates);
-/* Factors dR along unknowns x: du = rate x, da = s x, dq = (sq - kappa g_q)^-1 N x, where g_q are the
- * slopes of the coordinates' rates N u by the coordinates. */
+/* Factors dR along unknowns x: du = rate x, da = s x, dq = (sq - kappa g_q)^-1 N x, where g_q are
+ * the slopes of the coordinates' rates N u by the coordinates. */
 int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa);
-/* What the tangent is eliminated from, in `numbers`, and no more: linear in rate, s and 1 / sq. */
+/* Fills `numbers` without the elimination: linear in rate, s and 1 / sq. */
 int mstmm_tangent_brought(mstmm_tangent *at, real rate, real s, real sq);
 /* Change of every coupling along x for the coordinates, d_u and d_a (nu). */
 int mstmm_coupled_along(mstmm_tangent *at, const real *x, const real *d_u, const real *d_a,
                         real *changes);
 /* What the last factorisation divided by: of each body the pivot (n, n) of its shapes, then the
- * inverse of that of its hinge; both n in `sizes` (2 n_bodies).  Returns how many numbers these are,
- * and keeps them in `pivots` unless it is NULL. */
+ * inverse of that of its hinge; both n in `sizes` (2 n_bodies).  Returns how many numbers these
+ * are, and keeps them in `pivots` unless it is NULL. */
 int64_t mstmm_tangent_pivots(const mstmm_tangent *at, int *sizes, real *pivots);
 /* Increments that are there before any x: of coordinates (nq) and accelerations (nu). */
 typedef struct {
@@ -98,13 +98,13 @@ int mstmm_tangent_solve(mstmm_tangent *at, const real *r, const mstmm_known *kno
 /* In place of the tangent: inertia with the slopes of laws and modes alone, no more than their
  * symmetric part.  s and sq above zero. */
 int mstmm_laws_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa);
-/* Accelerations a (nu) that make the change of R equal to r, with coordinates and speeds that change
- * besides by dq and du; both NULL: none do. */
+/* Accelerations a (nu) that make the change of R equal to r, with coordinates and speeds that
+ * change besides by dq and du; both NULL: none do. */
 int mstmm_laws_solve(mstmm_tangent *at, const real *r, const real *dq, const real *du, real *a);
 /* dq = N(q) u, zero on coordinates that somebody imposes; q and u need not be those of the last
  * residual, whose workspace this writes to. */
 int mstmm_tangent_rates(mstmm_tangent *at, const real *q, const real *u, real *dq);
-/* Zeros in entries (nu) of speeds that somebody imposes. */
+/* Sets entries (nu) of prescribed speeds to zero. */
 void mstmm_tangent_free(const mstmm_tangent *at, real *entries);
 /* dq (nq) of an x: sq dq = kappa g_q dq + N x + rho; rho (nq) may be NULL. */
 int mstmm_tangent_coordinates(mstmm_tangent *at, const real *x, const real *rho, real *dq);

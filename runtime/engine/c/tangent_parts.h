@@ -1,4 +1,4 @@
-/* Where the residual and its tangent keep what they work on. */
+/* Working memory of the residual and its tangent. */
 #ifndef MSTMM_TANGENT_PARTS_H
 #define MSTMM_TANGENT_PARTS_H
 

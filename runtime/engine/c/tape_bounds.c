@@ -54,7 +54,7 @@ static interval size_of(interval a)
     return (interval){holds_zero(a) ? 0.0 : fmin(l, h), fmax(l, h)};
 }
 
-/* Does a hold one of first + 2 pi k? */
+/* True if a contains a point first + 2 pi k. */
 static int turns(interval a, double first)
 {
     return floor((a.hi - first) / (2.0 * PI)) != floor((a.lo - first) / (2.0 * PI));
@@ -171,7 +171,7 @@ static bounded opposite(bounded a)
     return (bounded){negative(a.value), negative(a.slope)};
 }
 
-/* 1 for sure, 0 for sure, or open */
+/* certainly 1, certainly 0, or undetermined */
 static bounded truth(int surely, int never)
 {
     const interval value = {surely ? 1.0 : 0.0, never ? 0.0 : 1.0};
@@ -233,7 +233,7 @@ static bounded result(int op, bounded a, bounded b, bounded c, int same)
     }
 }
 
-/* What is not a number may be anything. */
+/* nan becomes unbounded. */
 static mstmm_bounds written(bounded b)
 {
     if (isnan(b.value.lo) || isnan(b.value.hi)) b.value = ANYTHING;

@@ -1,5 +1,5 @@
-/* Scenes that the cache does not hold: what is near is used while it is there, what comes is asked
- * for in time. */
+/* Cache tiling for large scenes: data are reused while they are in the cache and prefetched in
+ * time. */
 #ifndef MSTMM_TILES_H
 #define MSTMM_TILES_H
 
@@ -31,10 +31,10 @@ static inline int mstmm_last_of(const mstmm_model *model, int loop)
     return closure->frame > closure->outboard ? closure->frame : closure->outboard;
 }
 
-/* So many bodies are some 10 MB; numbers of fewer are not asked for, which would only take time. */
+/* Scenes with fewer bodies (about 10 MB) are not prefetched, which would only cost time. */
 static inline int mstmm_beyond_cache(const mstmm_model *model) { return model->n_bodies >= 4000; }
 
-/* Compilers drop calls of functions that do no more than ask for memory, if they are calls. */
+/* Compilers drop calls of functions that only prefetch, so this is inlined. */
 #ifdef __GNUC__
 #define MSTMM_AT_ONCE __attribute__((always_inline)) static inline
 #else
@@ -53,7 +53,7 @@ MSTMM_AT_ONCE void mstmm_fetch(const void *from, const void *to)
 /* Numbers of a rigid body. */
 #define MSTMM_RIGID_NUMBERS 10
 
-/* Asks for the law that will be met `ahead` of law `index`. */
+/* Prefetches the law that follows `ahead` laws after `index`. */
 MSTMM_AT_ONCE void mstmm_fetch_law(const mstmm_model *model, int index, int ahead)
 {
     const int near = index + ahead, far = near + ahead;

@@ -1,16 +1,16 @@
-/* The family of Newmark: one acceleration a step is unknown, coordinates and speeds at its end are
+/* Newmark's family: one acceleration per step is unknown, coordinates and speeds at its end are
  * linear in it.  Generalised alpha, HHT and Newmark, Wilson's collocation, Houbolt's differences.
  *
  * Over a step the coordinates move along q' = N(q) theta, theta constant, so that rotations need no
  * chart (O. Brüls, A. Cardona, M. Arnold, Mechanism and Machine Theory 48 (2012) 121-137).
- * Behind the state and its accelerations stand auxiliary accelerations (M. Arnold, O. Brüls,
+ * The state and its accelerations are followed by auxiliary accelerations (M. Arnold, O. Brüls,
  * Multibody System Dynamics 18 (2007) 185-202), or the last two theta for Houbolt's differences. */
 #include <math.h>
 #include <string.h>
 
 #include "implicit_step.h"
 
-/* work->flow := where q arrives along q' = N(q) theta from `from` within time 1, by the classical
+/* work->flow := q after time 1 along q' = N(q) theta from `from`, by the classical
  * Runge-Kutta method: exact but for rotations, and there beyond what the family resolves. */
 static int flow(const mstmm_work *work, double t, const double *from, const double *theta,
                 double *to) {
@@ -50,10 +50,10 @@ static int move(const mstmm_work *work, const mstmm_newton_equations *stage) {
   return place(work, stage);
 }
 
-/* ---- the maps from the acceleration at the stage ---- */
+/* ---- formulas in terms of the acceleration at the stage ---- */
 
-/* Auxiliary acceleration i at the step's start: it lies at a time of its own, which moves when the
- * step changes; without that the order is lost. */
+/* Auxiliary acceleration i at the step's start: its time differs from that of the state and moves
+ * when the step changes; without that correction the order is lost. */
 static double auxiliary(const mstmm_work *work, int i) {
   const double now = work->k[work->implicit->n_q + i], before = work->run->real.h_previous;
   const double kept = mstmm_row_behind(work, work->y)[i];
@@ -62,17 +62,17 @@ static double auxiliary(const mstmm_work *work, int i) {
              : now;
 }
 
-/* The constants by which a step goes */
+/* Constants of a step */
 typedef struct constants {
   double alpha_m, alpha_f, beta, gamma, part; /* part of an acceleration in the auxiliary one */
 } constants;
 
-/* So many steps auxiliary accelerations lie behind those of a smooth motion. */
+/* Delay of auxiliary accelerations in a smooth motion, in steps. */
 static double lag(const mstmm_tableau *t) { return t->alpha_f - t->alpha_m; }
 
-/* A step on rows of accelerations, of whose start nothing but the motion is known, takes the motion
- * to be smooth: it begins and ends with auxiliary accelerations that lag behind by as much, which
- * needs none of them and keeps the order. */
+/* A step with rows of accelerations from a start at which only the motion is known assumes a
+ * smooth motion: its auxiliary accelerations at start and end have the same delay, which needs
+ * none of them and keeps the order. */
 static int starts_smoothly(const mstmm_work *work) {
   return work->implicit->placing && !mstmm_step_places(work) && work->run->real.h_previous == 0.0;
 }
@@ -92,7 +92,7 @@ static double known_part(const mstmm_work *work, const constants *by, int i) {
   return (by->alpha_f * now - by->alpha_m * auxiliary(work, i)) / (1.0 - by->alpha_m);
 }
 
-/* Newmark's map over the time `h` */
+/* Newmark's formulas over the time `h` */
 static void map_alpha(const mstmm_work *work, mstmm_newton_equations *stage, double h) {
   const constants by = constants_of(work);
   const double *u = work->y + work->implicit->n_q;
@@ -119,7 +119,7 @@ static void map_backward(const mstmm_work *work, mstmm_newton_equations *stage, 
 
 /* ---- the step ---- */
 
-/* Are there two increments of steps of this length? */
+/* True if increments of two steps of this length exist. */
 static int has_history(const mstmm_work *work) {
   const mstmm_run *run = work->run;
   return work->tableau->backward && run->count.history == 2 &&
@@ -138,7 +138,7 @@ static int come_back(const mstmm_work *work, mstmm_newton_equations *stage) {
   return place(work, stage);
 }
 
-/* What the next step must know, behind the state of y_new. */
+/* Data for the next step, after the state in y_new. */
 static void remember(const mstmm_work *work, const mstmm_newton_equations *stage) {
   const mstmm_tableau *t = work->tableau;
   const int n_u = work->implicit->n_u, smooth = starts_smoothly(work);
@@ -166,9 +166,10 @@ static int fill_rows(const mstmm_work *work, double t) {
   return mstmm_step_rates(work, t, work->y_new, work->rho_u, error);
 }
 
-/* A step on rows of accelerations begins with such as obey them at its start, which loops have been
- * closed at since the step before.  One on positions leaves nothing else: what its accelerations
- * err by, slips over its length, may grow where it is carried to steps of other lengths. */
+/* A step with rows of accelerations starts with accelerations that satisfy them, because loops
+ * were closed after the previous step.  A step with rows of positions must do so as well: the
+ * error of its accelerations, velocity errors over its length, may grow in steps of other
+ * lengths. */
 static int obey_rows(const mstmm_work *work) {
   double *a = mstmm_row_a(work, work->y), *behind = mstmm_row_behind(work, work->y);
   const int status = mstmm_step_residual(work, mstmm_time_in(work->run, 0.0), work->y, NULL);

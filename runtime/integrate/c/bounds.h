@@ -1,4 +1,4 @@
-/* What a number is between two times, and how fast it changes there. */
+/* Bounds of a quantity between two times, and of its rate. */
 #ifndef MSTMM_BOUNDS_H
 #define MSTMM_BOUNDS_H
 

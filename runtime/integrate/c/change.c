@@ -1,11 +1,11 @@
-/* The sign that another kind of method would suit a run better, the change to it between steps, and
- * a run that goes on behind its end. */
+/* Signs that another kind of method suits a run better, the change to it between steps, and the
+ * continuation of a run after its end. */
 #include <math.h>
 #include <string.h>
 
 #include "step.h"
 
-/* So many other steps in a row, and those that spoke for a change before count no more (as in the
+/* After so many other steps in a row, earlier signs for a change no longer count (as in the
  * codes of E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), section
  * IV.2). */
 enum { FORGOTTEN_AFTER = 6 };
@@ -13,7 +13,7 @@ enum { FORGOTTEN_AFTER = 6 };
 void mstmm_watch_sign(mstmm_run *run, int limited) {
   mstmm_run_count *count = &run->count;
   const int implicit = run->tableau->kind != MSTMM_EXPLICIT;
-  if (implicit && run->count.cut_short) return; /* its length says nothing */
+  if (implicit && run->count.cut_short) return; /* its length is no sign */
   if (implicit ? run->real.h < run->short_step : limited) {
     count->sign++;
     count->sign_against = 0;
@@ -29,7 +29,7 @@ int mstmm_is_asked(mstmm_run *run) {
   return (int)run->count.asked;
 }
 
-/* Between two steps, or after a step that could not be made: then as at a start. */
+/* Between two steps, or after an impossible step: then as at a start. */
 static int goes_on(mstmm_run *run) {
   if (run->count.phase <= PHASE_STEP) return 1;
   if (!run->count.no_step) return 0;
@@ -40,7 +40,7 @@ static int goes_on(mstmm_run *run) {
   return 1;
 }
 
-/* What belongs to the method is as at a start; the rest of the run is what it was. */
+/* Data of the method are reset as at a start; the rest of the run is unchanged. */
 static void forget_method(mstmm_run *run) {
   mstmm_run_count *count = &run->count;
   run->real.h_previous = run->real.error_previous = 0.0;

@@ -1,4 +1,4 @@
-/* The trial step: where it ends, whether its error is small enough, how long the next one is. */
+/* Step control: end of the trial step, test of its error, length of the next step. */
 #include <math.h>
 
 #include "implicit_step.h"
@@ -6,7 +6,7 @@
 
 static const double SAFETY = 0.9, SMALLEST_FACTOR = 0.2, LARGEST_FACTOR = 10.0;
 static const double LARGEST_IMPLICIT = 6.0; /* the same for implicit methods */
-static const double WORTH = 1.2; /* a longer step pays for a new tangent of Newton's iteration */
+static const double WORTH = 1.2; /* step ratio that justifies a new tangent of Newton's iteration */
 static const double AFTER_FAILURE = 0.25; /* of the step whose stages could not be evaluated */
 static const double SAME = 1e-9;      /* of a step: a grid point so near to a break is the break */
 static const double STRETCH = 1.01;   /* a step may be this much longer to end at a stop */
@@ -15,7 +15,7 @@ static const double NEAR_LIMIT = 0.9; /* of the stability limit: the step goes n
 static const double GAP = 0x1p-39;    /* of the time or the run: two breaks that are one */
 static const double NO_END = 1e10;    /* steps of a run that have no end in sight */
 enum { MANY_STEPS = 50, LARGE_PART = 10, MOST_REJECTIONS = 200 };
-enum { SOME_STEPS = 1 << 17, SOON = 1 << 12 }; /* between looks at how the run gets on */
+enum { SOME_STEPS = 1 << 17, SOON = 1 << 12 }; /* between checks of the progress of the run */
 
 static double next_stop(const mstmm_run *run, int *is_break) {
   const int64_t i = run->count.break_index;
@@ -74,7 +74,7 @@ static double factor_from(const mstmm_run *run, double error) {
   return fmin(LARGEST_FACTOR, factor);
 }
 
-/* As errors have grown lately they are taken to go on (K. Gustafsson, ACM Transactions on
+/* The recent growth of errors is extrapolated (K. Gustafsson, ACM Transactions on
  * Mathematical Software 20 (1994) 496-517). */
 static double predicted_factor(const mstmm_run *run, double error) {
   const double order = run->tableau->error_order + 1.0, before = run->real.error_previous;
@@ -116,7 +116,7 @@ void mstmm_count_step(mstmm_run *run, double error, double absolute) {
   run->real.largest_step = fmax(run->real.largest_step, run->real.h);
 }
 
-/* Was the step as long as stability allows? */
+/* True if the step was as long as stability permits. */
 static int watch_stability(const mstmm_work *work) {
   mstmm_run *run = work->run;
   mstmm_run_count *count = &run->count;
@@ -191,7 +191,7 @@ static int attempt(const mstmm_work *work, double *error, double *absolute) {
   if (!work->implicit) return dense ? mstmm_build_dense(work) : 0;
   status = mstmm_implicit_finish(work, dense);
   if (!status && work->tableau->n_errors && !mstmm_in_gap(run))
-    *error = mstmm_error_norm(work, absolute); /* that of quadratures is known now */
+    *error = mstmm_error_norm(work, absolute); /* the error of quadratures is known now */
   return status;
 }
 

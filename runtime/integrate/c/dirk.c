@@ -7,7 +7,7 @@
 
 #include "implicit_step.h"
 
-/* -s (q - q* - gamma h N(q) u): zero up to what turns while the iteration goes on */
+/* -s (q - q* - gamma h N(q) u): zero except for rotations during the iteration */
 static int defect(const mstmm_work *work, const mstmm_newton_equations *stage) {
   const int n_q = work->implicit->n_q;
   const double *y = work->y_stage;
@@ -29,7 +29,7 @@ static int move(const mstmm_work *work, const mstmm_newton_equations *stage) {
   return mstmm_step_impose(work, stage->t, y);
 }
 
-/* y_stage = y* + gamma h k with k as the stages before foretell it */
+/* y_stage = y* + gamma h k with k extrapolated from the previous stages */
 MSTMM_WIDE static int start(const mstmm_work *work, int i, const mstmm_newton_equations *stage) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
   const mstmm_terms terms = mstmm_second_terms(work->tableau, i);

@@ -1,11 +1,12 @@
-/* Finding the first event inside a step, or the first switch, on the dense output. */
+/* Location of the first event or switch inside a step, on the dense output. */
 #include <math.h>
 #include <string.h>
 
 #include "step.h"
 
-/* Where in a step the events are looked at.  A step that starts with a fired event is looked at
- * soon after its start too, since the event may become true again quickly (a small bounce). */
+/* Times in a step at which events are evaluated.  A step that starts with a fired event is
+ * evaluated soon after its start too, since the event may become true again quickly (a small
+ * bounce). */
 static const double places[] = {0x1p-20, 0x1p-14, 0x1p-9, 0x1p-5, 0.125, 0.25, 0.5, 0.75, 1.0};
 /* A condition is narrow where its bounds above values nearby are so far, as part of those of the
  * whole step. */
@@ -26,8 +27,8 @@ int mstmm_event_values(const mstmm_work *work, double t, const double *y, double
   return 0;
 }
 
-/* At the start of a step: on which side a switch stands.  One that is zero is watched once it has
- * left. */
+/* Side of a switch at the start of a step.  A switch that is zero is watched once it has left
+ * zero. */
 static void take_sides(const mstmm_work *work, double *g) {
   for (int i = work->system->n_events; i < mstmm_n_watched(work->system); i++) {
     if (g[i] > 0.0) {
@@ -44,7 +45,7 @@ static int values(const mstmm_work *work, double t, double *g) {
   return mstmm_event_values(work, t, work->y_stage, g);
 }
 
-/* The same, and what the conditions read there, to row `place` of what is seen. */
+/* The same, and the quantities that the conditions read there, to row `place` of the records. */
 enum { LEFT, RIGHT, MIDDLE };
 static double *seen_at(const mstmm_work *work, int place) {
   return work->seen + place * work->seen_row;
@@ -111,7 +112,7 @@ static int locate(const mstmm_work *work, int i, double left, double g_left, dou
 }
 
 /* A maximum between samples that are all false: does the parabola through three of them rise far
- * enough to be worth a look?  Then looks, a few times, and locates the event if it is there. */
+ * enough?  Then evaluates a few times, and locates the event if there is one. */
 static int search_maximum(const mstmm_work *work, int i, const double *at, const double *g,
                           double *root) {
   double t[3] = {at[0], at[1], at[2]}, v[3] = {g[0], g[1], g[2]};
@@ -146,7 +147,7 @@ static int search_maximum(const mstmm_work *work, int i, const double *at, const
   return 0;
 }
 
-/* ---- between two looks ---- */
+/* ---- between two evaluations ---- */
 
 /* An end of a part of a step: its time, and the value of event or switch i there */
 typedef struct border {
@@ -155,7 +156,7 @@ typedef struct border {
 
 enum { NOTHING_THERE, ONE_CROSSING, OPEN };
 
-/* What lies between two ends that are known to be `bounded` in this way, the left one false */
+/* Whether the part between two ends with the bounds `bounded`, the left one false, is clear */
 static int judge(const mstmm_work *work, int i, const mstmm_bounds *bounded, const border *left,
                  const border *right, double *highest) {
   const double h = right->t - left->t;
@@ -171,19 +172,18 @@ static int judge(const mstmm_work *work, int i, const mstmm_bounds *bounded, con
   return *highest < 0.0 || s0 >= 0.0 || s1 <= 0.0 ? NOTHING_THERE : OPEN;
 }
 
-/* Looks that a part of a step may take between others, until something may have passed unseen and
- * from then on */
+/* Maximum number of evaluations within a part of a step, before and after a possible miss */
 enum { MOST_LOOKS = 4000, FEW_LOOKS = 64 };
 
-/* What is not looked at more closely may have passed there. */
+/* An event may be missed in parts that are not examined further. */
 static void note_unseen(mstmm_run *run, int i, double t) {
   if (run->count.unseen >= 0) return;
   run->count.unseen = i;
   run->real.unseen_time = t;
 }
 
-/* Halves what is open between left and right until nothing is, and locates the first time at which
- * event or switch i holds; *root stays if it nowhere does.  Rows LEFT and RIGHT of what is seen are
+/* Halves undecided parts between left and right, and locates the first time at which event or
+ * switch i is true; *root is unchanged if there is none.  Rows LEFT and RIGHT of the records are
  * those of the two ends. */
 static int search(const mstmm_work *work, int i, border left, border right, double *root) {
   const mstmm_system *system = work->system;
@@ -280,7 +280,7 @@ static void learn_events(const mstmm_work *work, const double *g) {
     if (work->truth[i] != UNWATCHED) work->truth[i] = g[i] >= 0.0 ? HOLDS : UNTRUE;
 }
 
-/* A switch that began at zero has left it, to either side. */
+/* A switch that started at zero has left it, to either side. */
 static void learn_switches(const mstmm_work *work, const double *g) {
   for (int i = work->system->n_events; i < mstmm_n_watched(work->system); i++)
     if (work->truth[i] == HOLDS && g[i] != 0.0) {
@@ -289,7 +289,7 @@ static void learn_switches(const mstmm_work *work, const double *g) {
     }
 }
 
-/* Goes through the places behind `left` up to `end`, until one of the numbers is found. */
+/* Evaluates at the times after `left` up to `end` until one of the events is found. */
 static int look(const mstmm_work *work, int first, int last, double left, double end,
                 void (*learn)(const mstmm_work *, const double *)) {
   mstmm_run *run = work->run;
@@ -344,7 +344,7 @@ int mstmm_find_switch(const mstmm_work *work) {
   return work->system->n_switches ? find_switch(work) : 0;
 }
 
-/* What an event throws back comes to it; what lay on it as the step began does not. */
+/* A bounce needs an approach: a motion that was at the event when the step began has none. */
 static int nothing_let_through(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const mstmm_system *system = work->system;

@@ -1,16 +1,16 @@
 /* An exponential Rosenbrock method.  At a step's start the motion is linearised,
- * y' = f + J (y - y_0) + f_t (t - t_0) + what is left, and its linear part, however fast it swings,
- * is followed exactly:
+ * y' = f + J (y - y_0) + f_t (t - t_0) + remainder, and its linear part is integrated exactly,
+ * however fast it oscillates:
  *
  *   Y = y_0 + h phi_1(h J) f + h^2 phi_2(h J) f_t
  *   y_1 = Y + 2 h phi_3(h J) D,   D = f(t_1, Y) - f - J (Y - y_0) - h f_t
  *
- * Y is of second order and the last term its error.  Inside the step what is left of f grows as
+ * Y is of second order and the last term its error.  Inside the step the remainder of f grows as
  * D theta^2, so that dense output is the same motion at an earlier time.
  *
  * J comes from derivatives along single coordinates and speeds, the lower half of it and f_t behind
- * the inverse of the mass matrix.  Rows of what somebody imposes are zero, and so are those of f,
- * f_t and D: neither J nor the error knows of them.
+ * the inverse of the mass matrix.  Rows of prescribed coordinates are zero, also in f, f_t and D,
+ * so that neither J nor the error contains them.
  *
  * M. Hochbruck, A. Ostermann, J. Schweitzer, Exponential Rosenbrock-type methods, SIAM Journal on
  * Numerical Analysis 47 (2009) 786-803. */
@@ -63,7 +63,7 @@ static int fill_jacobian(const mstmm_work *work, double t) {
   return 0;
 }
 
-/* J and f_t at the step's start, unless a longer step from there has asked for them. */
+/* J and f_t at the step's start, unless a longer step from there has computed them. */
 static int linearise(const mstmm_work *work) {
   const mstmm_implicit *at = work->implicit;
   mstmm_run *run = work->run;
@@ -87,7 +87,7 @@ static int linearise(const mstmm_work *work) {
 
 /* Parts of work->motion, n each */
 typedef struct parts {
-  double *f, *way, *rest, *scratch; /* rates at the start, Y - y_0, D, and what comes between */
+  double *f, *way, *rest, *scratch; /* rates at the start, Y - y_0, D, and intermediate results */
 } parts;
 
 static parts parts_of(const mstmm_work *work) {
@@ -96,7 +96,7 @@ static parts parts_of(const mstmm_work *work) {
   return (parts){.f = first, .way = first + n, .rest = first + 2 * n, .scratch = first + 3 * n};
 }
 
-/* Rates of coordinates and speeds at a row, from its slope and without what somebody imposes */
+/* Rates of coordinates and speeds at a row, from its slope, zero for prescribed ones */
 static int free_rates(const mstmm_work *work, double t, const double *row, const double *slope,
                       double *to) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
@@ -127,7 +127,7 @@ static int go_linearly(const mstmm_work *work, const parts *at) {
   return mstmm_step_impose(work, mstmm_time_in(work->run, 1.0), work->y_stage);
 }
 
-/* D, and what it moves */
+/* D, and its contribution to the motion */
 static int see_the_rest(const mstmm_work *work, const parts *at) {
   const double h = work->run->real.h, t = mstmm_time_in(work->run, 1.0);
   const int n = unknowns(work);

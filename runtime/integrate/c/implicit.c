@@ -1,5 +1,5 @@
-/* What the implicit methods share: the calls of the system, the norm of their errors, and what a
- * step needs once it is accepted. */
+/* Common parts of the implicit methods: calls of the system, norm of their errors, and completion
+ * of an accepted step. */
 #include "implicit_step.h"
 
 #include <math.h>
@@ -72,9 +72,8 @@ int mstmm_step_slope(const mstmm_work *work, double t, const double *row, double
 }
 
 /* Accelerations at part c of a step of Newmark's family, to a row of its dense output: the slopes
- * of the speeds, so that the work of drives is what the speeds take up.  A fixed step may be far
- * too long for a vibration, between whose ends dense output swings: there speeds lie on a straight
- * line. */
+ * of the speeds, so that the work of drives agrees with the change of speeds.  A fixed step may be
+ * far too long for a vibration, so that dense output oscillates: there speeds are linear. */
 static int take_accelerations(const mstmm_work *work, double c, double t, double *row) {
   const int n_q = work->implicit->n_q, fixed = work->run->fixed_step > 0.0;
   const double *first = work->k + n_q, *last = first + work->tableau->n_stages * work->row;
@@ -130,10 +129,10 @@ int mstmm_implicit_stages(const mstmm_work *work) {
   }
 }
 
-/* The error of quadrature i of the step: the highest difference of its rates, squared against their
- * size, which has the order of the rule where they are smooth and is their size where they are not
- * (R. Piessens and others, QUADPACK, 1983, judge alike).  To where the error estimate finds it;
- * what the last stage of it stands for is known by then. */
+/* The error of quadrature i of the step: the highest difference of its rates, squared against
+ * their size, which has the order of the rule where they are smooth and is their size where they
+ * are not (R. Piessens and others, QUADPACK, 1983, use the same test).  It is stored where the
+ * error estimate reads it; the last stage is known by then. */
 static void estimate_quadrature(const mstmm_work *work, int i) {
   const mstmm_terms terms = mstmm_error_terms(work->tableau, 0);
   const int rest = mstmm_n_rest(work), n = work->tableau->n_inner + 2, last = terms.count - 1;
@@ -193,7 +192,7 @@ int mstmm_implicit_finish(const mstmm_work *work, int wants_dense) {
 
 MSTMM_INLINE double tolerance(const mstmm_work *work, const double *other, int64_t i) {
   const double here = fabs(work->y[i]), there = fabs(other[i]);
-  return work->atol[i] + work->run->rtol * (there > here ? there : here); /* fmax were a call */
+  return work->atol[i] + work->run->rtol * (there > here ? there : here); /* fmax would be a call */
 }
 
 /* Size of error e of component i in units of its tolerance, which goes with the size of the state
@@ -203,8 +202,8 @@ MSTMM_INLINE double scaled_plain(const mstmm_work *work, const double *other, in
   return unit > 0.0 ? fabs(e) / unit : 0.0;
 }
 
-/* The same of speed i - n_q: it is weighed by what it moves in a step, for the vibration of a stiff
- * spring is fast and small, and nobody asked for its speed. */
+/* The same for speed i - n_q: weighted by its displacement in a step, because the vibration of a
+ * stiff spring is fast and small and its speed irrelevant. */
 MSTMM_INLINE double scaled_speed(const mstmm_work *work, const double *other, int64_t i, double e) {
   const int *coordinates = work->implicit->coordinates;
   const int64_t j = i - work->implicit->n_q;
@@ -236,7 +235,7 @@ static double largest(double a, double b, double c) {
   return a + b + c != a + b + c ? NAN : found > c ? found : c;
 }
 
-/* Size of what stands in work->error */
+/* Norm of work->error */
 static double norm(const mstmm_work *work, const double *other) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
   return largest(rms(work, other, 0, n_q, 0), rms(work, other, n_q, n_q + n_u, 1),

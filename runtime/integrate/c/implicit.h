@@ -1,5 +1,5 @@
-/* What a mechanical system offers to implicit methods: its equations of motion as a residual, and
- * their linearisation factored and solved.  Whoever has it hangs it into mstmm_system. */
+/* Interface of a mechanical system to implicit methods: its equations of motion as a residual, and
+ * their linearisation factored and solved.  mstmm_system points to it. */
 #ifndef MSTMM_IMPLICIT_H
 #define MSTMM_IMPLICIT_H
 
@@ -8,8 +8,8 @@
  * K, C, M are the slopes of R in q, u, a.  Functions return 0 or a failure code. */
 typedef struct mstmm_implicit {
   int n_q, n_u;
-  /* R are accelerations beyond those of the right-hand side, a - f(t, q, u): nothing is gained by
-   * carrying a along as an unknown of its own. */
+  /* R are accelerations in addition to the right-hand side, a - f(t, q, u): carrying a as an
+   * unknown of its own has no advantage. */
   int evaluated;
   /* n_u: a coordinate that each speed changes, whose tolerance weighs the speed's error.  NULL,
    * where there are as many coordinates as speeds: the one of the same number. */
@@ -38,7 +38,7 @@ typedef struct mstmm_implicit {
    * approximation.  NULL: there is none. */
   int (*laws)(void *context, double t, const double *y, const double *a, double s, double sq,
               int kappa);
-  int laws_spare; /* it costs so much less than the tangent that iterations should try it */
+  int laws_spare; /* it is so much cheaper than the tangent that iterations should try it */
   /* With the last of both, K dq + C du + M da = r,  sq dq = kappa g_q dq + N du + rho_q,
    * s du = da + rho_u, at the base point; rho may be NULL (zeros).  Entries of imposed speeds come
    * back as zeros. */

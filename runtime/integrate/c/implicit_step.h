@@ -1,10 +1,10 @@
-/* What the implicit methods share among themselves and with the loop. */
+/* Declarations shared by the implicit methods and the loop. */
 #ifndef MSTMM_IMPLICIT_STEP_H
 #define MSTMM_IMPLICIT_STEP_H
 
 #include "work.h"
 
-/* ---- for the loop: as the functions of step.h without the word ---- */
+/* ---- for the loop: as the functions of step.h without "implicit" ---- */
 
 /* The slope at the start of a step has just been evaluated: accelerations from it, and nothing else
  * is known. */
@@ -24,8 +24,8 @@ int mstmm_rosenbrock_stages(const mstmm_work *work);
 int mstmm_dirk_stages(const mstmm_work *work);
 int mstmm_alpha_stages(const mstmm_work *work);
 int mstmm_exponential_stages(const mstmm_work *work);
-/* Coordinates and speeds inside the step at hand: exactly what its forces make of them, however
- * often the motion swings in it. */
+/* Coordinates and speeds inside the present step: the exact linear motion, however fast it
+ * oscillates. */
 void mstmm_exponential_dense(const mstmm_work *work, double theta, double *y);
 
 /* ---- the system, with its failures and counts; a row holds its accelerations ---- */
@@ -34,8 +34,8 @@ int mstmm_step_impose(const mstmm_work *work, double t, double *row);
 int mstmm_step_residual(const mstmm_work *work, double t, const double *row, double *rest);
 /* The same with gaps that an acceleration of one closes by 1 / closing. */
 int mstmm_step_placing(const mstmm_work *work, double t, const double *row, double closing);
-/* Does the step at hand ask rows of loops for positions?  One that is cut short asks them for
- * accelerations: gaps over its length squared would be nothing but slips and rounding. */
+/* True if the present step has rows of positions.  A shortened step has rows of accelerations: gaps
+ * over its squared length would be velocity errors and rounding only. */
 int mstmm_step_places(const mstmm_work *work);
 int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const double *u,
                      double *dq);
@@ -46,12 +46,12 @@ int mstmm_step_tangent(const mstmm_work *work, double t, const double *row, doub
 int mstmm_step_solve(const mstmm_work *work, double t, const double *rho_q, const double *rho_u);
 /* A slope row at a state row: rates, accelerations, and rates of the quadratures. */
 int mstmm_step_slope(const mstmm_work *work, double t, const double *row, double *slope);
-/* Is every number of y_new one, accelerations too? */
+/* True if all numbers of y_new are finite, accelerations too. */
 int mstmm_check_new(const mstmm_work *work);
 
 /* ---- Newton's iteration ---- */
 
-/* The equations of one stage, whose unknown state stands in work->y_stage. */
+/* Equations of one stage, whose unknown state is in work->y_stage. */
 typedef struct mstmm_newton_equations {
   double t, s, sq; /* as `tangent` takes them */
   int kappa;
@@ -63,7 +63,7 @@ typedef struct mstmm_newton_equations {
   int (*move)(const mstmm_work *work, const struct mstmm_newton_equations *stage);
 } mstmm_newton_equations;
 
-/* Solves a stage from where y_stage stands. */
+/* Solves a stage from the start value in y_stage. */
 int mstmm_newton_stage(const mstmm_work *work, const mstmm_newton_equations *stage);
 /* Size of the increments in work->dq and du in units of the tolerance. */
 double mstmm_increment_norm(const mstmm_work *work);

@@ -1,4 +1,4 @@
-/* The loop over the steps: what happens between them and inside an accepted one.  It is a small
+/* Loop over the steps: actions between them and inside an accepted one.  It is a small
  * state machine whose phase is kept in the run, so that it can leave between any two samples
  * (buffer full) and after any step (wall time) and continue bit for bit. */
 #ifndef _POSIX_C_SOURCE
@@ -43,7 +43,7 @@ static void restore_memory(const mstmm_work *work) {
     memcpy(system->memory, work->memory, (size_t)system->n_memory * sizeof(double));
 }
 
-/* Does the next free sample hold exactly this state and the present memory? */
+/* True if the last sample is exactly this state with the present memory. */
 static int sample_equals(const mstmm_run *run, const double *y) {
   const mstmm_system *system = run->system;
   const int64_t i = run->n_samples, n = system->n_state, nm = system->n_memory;
@@ -91,7 +91,7 @@ static int after_change(const mstmm_work *work, int i) {
   run->count.first_stage_valid = 0;
   if (run->count.fires_here > MOST_FIRES_HERE)
     return mstmm_note(run, MSTMM_EVENT_CHATTER, 0, -1, t);
-  /* an event that repeats is watched at the pace at which it came (a bouncing body) */
+  /* a repeated event is watched at the intervals at which it came (a bouncing body) */
   if (since > 0.0 && run->real.h_next > since) run->real.h_next = since;
   return 0;
 }
@@ -141,7 +141,7 @@ static int phase_here(const mstmm_work *work) {
 
 /* ---- the current state ---- */
 
-/* Samples the current state if it is wanted and not there yet. */
+/* Samples the current state if it is requested and not sampled yet. */
 static int sample_current(const mstmm_work *work) {
   mstmm_run *run = work->run;
   int64_t *i = &run->count.output_index;
@@ -178,10 +178,10 @@ static int hardly_any_time(const mstmm_run *run, double t) {
   return t <= AT_ONCE * fmax(fabs(run->real.t), run->t_end - run->t_start);
 }
 
-/* A step with a switch in it is no use: stages behind the switch spoil its result, and its dense
- * output even where they do not enter the result; all of them may have missed a window that begins
- * there and soon ends.  It is made again, to end just before the switch, until the rest is so short
- * that it does not matter. */
+/* A step across a switch is invalid: stages after the switch falsify its result, and its dense
+ * output even if they do not enter the result; all of them may have missed a window that begins
+ * there and soon ends.  It is repeated to end just before the switch, until the rest is negligibly
+ * short. */
 static int phase_switch(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const int status = mstmm_find_switch(work);
@@ -270,8 +270,8 @@ static int phase_fire(const mstmm_work *work) {
   return 0;
 }
 
-/* A switch that crosses again and again in hardly any time holds the motion where it is: it is
- * no longer watched, and the run goes on at the pace that the error allows. */
+/* A switch that chatters keeps the motion at its zero: it is no longer watched, and the run
+ * continues with the steps that the error permits. */
 static void note_crossing(const mstmm_work *work, int i) {
   mstmm_run *run = work->run;
   const double t = run->real.t, since = t - work->last_fire[i];
@@ -300,7 +300,7 @@ static int phase_cross(const mstmm_work *work) {
   return 0;
 }
 
-/* How many steps of one length have been made, as far as anybody asks */
+/* Number of steps of one length, counted up to 2 */
 static void note_length(mstmm_run *run) {
   const double h = run->real.h;
   const int same = fabs(h - run->real.h_previous) <= MSTMM_SAME_STEP * h;
@@ -346,7 +346,7 @@ static double seconds(void) {
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* Looks at the clock after the first step, then after as many as pass in about 0.1 ms. */
+/* Reads the clock after the first step, then about every 0.1 ms. */
 typedef struct pace {
   double deadline, last;
   int stride, left;

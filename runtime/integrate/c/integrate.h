@@ -1,10 +1,10 @@
 /* Time integration: one loop for explicit Runge-Kutta methods, Rosenbrock methods, diagonally
- * implicit ones and the family of Newmark, told which one by a tableau.  It knows nothing of
- * mechanics: a system is a right-hand side, a few call-backs (for implicit methods those of
+ * implicit ones and Newmark's family, selected by a tableau.  It is independent of mechanics: a
+ * system is a right-hand side, a few call-backs (for implicit methods those of
  * implicit.h) and an array of discrete memory.  The loop owns no memory, keeps no global and never
  * recurses.
  *
- * Between the two marks below stand the declarations that cffi reads as they are. */
+ * cffi reads the declarations between the two marks below. */
 #ifndef MSTMM_INTEGRATE_H
 #define MSTMM_INTEGRATE_H
 
@@ -27,12 +27,12 @@ typedef struct mstmm_system {
   /* Event i is true when g[i] >= 0; nonzero = failure code */
   int (*events)(void *context, double t, const double *y, double *g);
   /* Behind the events: n_switches margins, each zero where the right-hand side has a kink or jumps.
-   * Steps end where one changes its sign, either way; nothing is fired. */
+   * Steps end where one changes its sign in either direction; no event is fired. */
   int n_switches;
   /* Called with the accepted state at the located time.  MSTMM_FIRE_*; < 0 = failure code */
   int (*fire)(void *context, int event, double t, double *y);
-  /* Whether (t, y) moves on into event i, which held before the step and has value g there, though
-   * the event throws back what comes to it.  NULL: none does. */
+  /* Whether (t, y) moves further into event i, true before the step and with value g there,
+   * although the event bounces.  NULL: no event bounces. */
   int (*lets_through)(void *context, int event, double t, const double *y, double g);
   /* What is watched between two times of a step, n_seen > 0 if it is known.  `see`, called right
    * after `events` at the same (t, y), keeps n_seen numbers of what the conditions read, given the
@@ -48,7 +48,7 @@ typedef struct mstmm_system {
    * t[lane], y[i * lanes + lane], dy alike; codes[lane] as rhs returns; nonzero if any failed */
   int lanes;
   int (*rhs_lanes)(void *context, const double *t, const double *y, double *dy, int *codes);
-  const mstmm_implicit *implicit; /* what implicit methods ask; NULL: explicit methods alone */
+  const mstmm_implicit *implicit; /* interface of implicit methods; NULL: explicit methods only */
   const double *attainable; /* relative error below which the right-hand side is noise here; NULL: 0 */
 } mstmm_system;
 
@@ -124,7 +124,7 @@ enum {
   MSTMM_BAD_ARGUMENT = -9,  /* `code` says which, see mstmm_run_start */
   MSTMM_TANGENT_FAILED = -10, /* with `code`, at `fail_time` */
   MSTMM_NOT_CONVERGED = -11,  /* Newton's iteration, at `fail_time`, least of all in `component` */
-  MSTMM_LET_THROUGH = -12,    /* what `event` should have thrown back, see lets_through */
+  MSTMM_LET_THROUGH = -12,    /* motion into an event that bounces, see lets_through */
   MSTMM_POLE = -13            /* the right-hand side has a pole there, see mstmm_run.pole */
 };
 
@@ -164,7 +164,7 @@ typedef struct mstmm_run_count {
   int64_t phase, status;
   int64_t fail_status, code, component, event;
   int64_t break_index, output_index, grid_index, bound_index;
-  int64_t at_break;      /* t is a break: the first stage looks to its right */
+  int64_t at_break;      /* t is a break: the first stage uses its right side */
   int64_t lands_on_break, lands_on_grid, cut_short; /* of the trial step */
   int64_t first_stage_valid, restarted, sampled, rejected_last;
   int64_t fires_here; /* events fired without time passing */
@@ -202,7 +202,7 @@ typedef struct mstmm_run {
   double rtol;
   const double *atol; /* n_error; may be NULL with fixed steps */
   double first_step, min_step, max_step; /* 0: chosen */
-  int64_t max_steps; /* 0: as many as it takes, if the end is in sight */
+  int64_t max_steps; /* 0: no limit, unless the end is out of reach */
   int64_t pause_steps; /* mstmm_advance returns when so many steps have been made; 0: never */
   /* It returns too, with count.asked, between steps: when so many of the last ones spoke for
    * another kind of method (of explicit methods those as long as stability allows, of implicit ones
@@ -239,21 +239,21 @@ int64_t mstmm_workspace_size(const mstmm_system *system, const mstmm_tableau *ta
  * MSTMM_BAD_ARGUMENT with count.code = 1 sizes, 2 times, 3 tolerances or steps, 4 breaks,
  * 5 output times, 6 sample buffer. */
 int mstmm_run_start(mstmm_run *run, const double *y0);
-/* Goes on until finished, failed, stopped, buffer full, or wall_seconds have passed; one step is
- * always made, and the clock is looked at about every 0.1 ms or every step. */
+/* Advances until finished, failed, stopped, buffer full, or wall_seconds have passed; at least one
+ * step is made, and the clock is read about every 0.1 ms or every step. */
 int mstmm_advance(mstmm_run *run, double wall_seconds);
-/* Goes on with another method from where the run stands between two steps: what has been counted,
- * the proposed step and what is known of events stay.  `workspace` has mstmm_workspace_size doubles
- * for that method and takes the place of the run's.  Returns 0, or MSTMM_BAD_ARGUMENT with the run
- * unchanged: within a step, with fixed steps, for a method that the system does not allow.  A run
- * that failed goes on if it was for want of a step (count.no_step). */
+/* Continues with another method between two steps: counts, the proposed step and the state of
+ * events are kept.  `workspace` has mstmm_workspace_size doubles for that method and replaces the
+ * run's. Returns 0, or MSTMM_BAD_ARGUMENT with the run unchanged: within a step, with fixed steps,
+ * for a method that the system does not support.  A failed run continues if no step was possible
+ * (count.no_step). */
 int mstmm_run_change(mstmm_run *run, const mstmm_tableau *tableau, double *workspace);
-/* To another end, not before the current good state: what has finished there goes on as if that end
- * had been meant from the start, and what has failed tries again from its last good state.
+/* Sets another end, not before the current good state: a finished run continues as if that end had
+ * been given from the start, and a failed run tries again from its last good state.
  * `changed` says that the caller has changed memory, as an event may.  Returns 0, or
  * MSTMM_BAD_ARGUMENT with the run unchanged: within a step, and for a run that an event stopped. */
 int mstmm_run_go_on(mstmm_run *run, double t_end, int changed);
-/* Times to look out for from now on, in the place of those that the run was started with. */
+/* Replaces the breaks, bounds and pole with which the run was started. */
 void mstmm_run_map(mstmm_run *run, int64_t n_breaks, const double *breaks, int64_t n_bounds,
                    const double *bound_starts, const double *bounds, const double *pole);
 /* The current good state, n_state doubles inside the workspace. */

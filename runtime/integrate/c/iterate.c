@@ -1,7 +1,7 @@
 /* Stages of an iterated Runge-Kutta method: after the first one, blocks of up to eight nodes whose
- * right-hand sides do not wait for each other, so that they fill the lanes of a vector.
+ * right-hand sides are independent, so that they fill the lanes of a vector.
  *
- * States lie side by side: component i of node j at [(j / L) n L + i L + j % L] with L lanes. */
+ * States are interleaved: component i of node j at [(j / L) n L + i L + j % L] with L lanes. */
 #include <string.h>
 
 #include "iterate.h"
@@ -64,7 +64,7 @@ static int evaluate_lanes(const mstmm_work *work, const double *t) {
   return 0;
 }
 
-/* Copies a block of stages to where the step, the error and dense output look for them. */
+/* Copies a block of stages to the rows that the step, the error and dense output read. */
 MSTMM_INLINE void keep_block(const mstmm_work *work, int nodes, int lanes, int iteration) {
   const int64_t n = work->system->n_state;
   double *k = work->k + (1 + iteration * nodes) * work->row;

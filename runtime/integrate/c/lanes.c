@@ -1,4 +1,4 @@
-/* Steps of several trajectories side by side; see lanes.h.  Component i of a lane stands at
+/* Steps of several trajectories in SIMD lanes; see lanes.h.  Component i of a lane is at
  * [i * lanes + lane], so that all arithmetic but that of step control goes over whole vectors. */
 #ifndef _POSIX_C_SOURCE
 #define _POSIX_C_SOURCE 199309L /* clock_gettime */
@@ -213,7 +213,7 @@ static int aim(const mstmm_cut_group *c, mstmm_attempt *a) {
   return any;
 }
 
-/* Is the error of an active lane small enough? */
+/* True if the error of an active lane is small enough. */
 static int good(const mstmm_cut_group *c, const mstmm_attempt *a, int lane) {
   return a->active[lane] && !a->failed[lane] &&
          (c->group->runs[lane].fixed_step > 0.0 || a->error[lane] < 1.0 ||

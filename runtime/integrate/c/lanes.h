@@ -1,8 +1,7 @@
-/* Many independent trajectories of one system, several of them side by side in the lanes of
- * vectors.  Every lane has its own time, step and error control, and nothing of a lane reaches
- * another: the numbers of a trajectory depend neither on how many there are, nor on its neighbours,
- * nor on the number of threads.  A lane whose trajectory has ended takes the next one that nobody
- * has begun.
+/* Many independent trajectories of one system, several of them in SIMD lanes.  Every lane has its
+ * own time, step and error control, and lanes do not influence each other: the numbers of a
+ * trajectory depend neither on the number of trajectories, nor on its neighbours, nor on the
+ * number of threads. A lane whose trajectory has ended starts the next one.
  *
  * For systems without events and memory. */
 #ifndef MSTMM_LANES_H
@@ -26,7 +25,7 @@ typedef struct mstmm_many {
   double *samples;         /* n x n_outputs x n_state: as far as a trajectory came */
   double *last;            /* n x n_state: the last good state */
   mstmm_outcome *outcomes; /* n */
-  int64_t next;            /* the first trajectory that nobody has begun */
+  int64_t next;            /* the first trajectory not started yet */
 } mstmm_many;
 
 /* The lanes of one thread. */
@@ -48,7 +47,7 @@ typedef struct mstmm_group {
 int64_t mstmm_group_size(const mstmm_system *system, const mstmm_tableau *tableau);
 /* Every lane idle.  MSTMM_BAD_ARGUMENT for arguments that make no sense, else 0. */
 int mstmm_group_start(mstmm_group *group);
-/* Goes on until all trajectories have been begun and this group's have ended, MSTMM_FINISHED, or
+/* Advances until all trajectories have started and this group's have ended, MSTMM_FINISHED, or
  * wall_seconds have passed, MSTMM_RUNNING. */
 int mstmm_group_advance(mstmm_group *group, double wall_seconds);
 /* cdef end */

@@ -1,4 +1,4 @@
-/* Arithmetic of steps of several trajectories side by side: stages, errors, dense output. */
+/* Arithmetic of steps in SIMD lanes: stages, errors, dense output. */
 #include <math.h>
 #include <string.h>
 

@@ -1,4 +1,4 @@
-/* What the two parts of lanes share; nobody else includes this. */
+/* Private declarations of lanes.c and lanes_step.c. */
 #ifndef MSTMM_LANES_STEP_H
 #define MSTMM_LANES_STEP_H
 
@@ -17,7 +17,7 @@ typedef struct mstmm_cut_group {
   double *one;                             /* n_state: a single state */
 } mstmm_cut_group;
 
-/* What is known of the attempt that all lanes make. */
+/* Data of the present attempt of all lanes. */
 typedef struct mstmm_attempt {
   double h[GROUP];                               /* of each place of a row */
   double start[GROUP], end[GROUP], t[GROUP];     /* of the lanes: of the step, and of a stage */

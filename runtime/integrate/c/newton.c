@@ -1,13 +1,12 @@
-/* Newton's iteration for a stage of an implicit method, with a tangent that is kept from step to
- * step as long as it serves.
+/* Newton's iteration for a stage of an implicit method, with a tangent that is kept over steps as
+ * long as it converges.
  *
- * Where the tangent by laws alone is much cheaper it comes first: what it leaves out, slopes of
- * inertia and loads, contracts an iteration like (h w)^2, w the fastest motion that they cause.
- * Where that contraction turns out slow, some stages are solved with exact tangents before it is
- * tried again.
+ * If the approximate tangent by laws is much cheaper it is used first: the omitted derivatives of
+ * inertia and loads give a contraction like (h w)^2, w the fastest motion that they cause.  If
+ * that is slow, some stages are solved with exact tangents before it is tried again.
  *
- * Where it was taken is part of the run's state, so that a run that is continued elsewhere factors
- * the same tangent again and goes on bit for bit. */
+ * The state of the tangent is part of the run's state, so that a restarted run factors the same
+ * tangent again and continues bit for bit. */
 #include "implicit_step.h"
 
 #include <math.h>
@@ -28,7 +27,7 @@ static const double TOO_SLOW = 0.25; /* contraction by new laws: an exact tangen
 static const double HOPELESS = 0.5;  /* and at once, in the midst of an iteration */
 enum { MOST_ITERATIONS = 10, FIRST_EXACT = 8, MOST_EXACT = 256 };
 
-/* How hard to try: with the tangent in hand, with a new one, with a new one in every iteration */
+/* Levels of effort: with the present tangent, a new one, a new one in every iteration */
 enum { KEPT, RENEWED, EACH };
 
 static int may_take_laws(const mstmm_work *work) {
@@ -66,7 +65,7 @@ static int take(const mstmm_work *work, const mstmm_newton_equations *stage, int
   return status;
 }
 
-/* Does the tangent in hand serve this stage? */
+/* True if the present tangent suits this stage. */
 static int serves(const mstmm_work *work, const mstmm_newton_equations *stage) {
   const mstmm_run *run = work->run;
   const int laws = (int)run->count.by_laws;
@@ -75,7 +74,7 @@ static int serves(const mstmm_work *work, const mstmm_newton_equations *stage) {
          fabs(stage->s / run->real.tangent_s - 1.0) <= (laws ? CHANGED_BY_LAWS : CHANGED);
 }
 
-/* Factors the kept tangent again where somebody else may have used the system since. */
+/* Factors the kept tangent again if the caller may have used the system since. */
 static int hold(const mstmm_work *work, const mstmm_newton_equations *stage) {
   mstmm_run *run = work->run;
   const mstmm_implicit *at = work->implicit;
@@ -117,7 +116,7 @@ static double enough(const mstmm_work *work) {
   return fmax(ENOUGH, part * run->real.error_previous);
 }
 
-/* Is there a better tangent than the one in hand? */
+/* True if there is a better tangent than the present one. */
 static int may_go_exact(const mstmm_work *work) {
   return work->run->count.by_laws && work->run->tangents == MSTMM_ANY_TANGENT;
 }
@@ -174,8 +173,8 @@ static int attempt(const mstmm_work *work, const mstmm_newton_equations *stage, 
   return status ? status : iterate(work, stage, effort);
 }
 
-/* Laws alone may have a tangent where there is no exact one, as where an expression rises infinitely
- * fast.  If they lead nowhere either, that there is none is the reason. */
+/* Laws alone may have a tangent where there is no exact one, as where an expression rises
+ * infinitely fast.  If they lead nowhere either, that there is none is the reason. */
 static int without_exact(const mstmm_work *work, const mstmm_newton_equations *stage) {
   mstmm_run *run = work->run;
   const int64_t code = run->count.code;

@@ -1,4 +1,4 @@
-/* How large the error of a step is, how fast the motion, and how long the first step may be. */
+/* Error norm of a step, stiffness index, and length of the first step. */
 #include <math.h>
 #include <stddef.h>
 

@@ -6,8 +6,8 @@
  *   a_1(2 tau) = E a_1 + a_1,  a_2(2 tau) = E a_2 + a_2 + tau a_1,
  *   a_3(2 tau) = E a_3 + a_3 + tau a_2 + tau^2/2 a_1.
  *
- * Kept is E - 1, squared as 2 (E - 1) + (E - 1)^2: beside fast motion the first levels of a slow
- * one are so close to 1 that they would lose it.
+ * E - 1 is stored, squared as 2 (E - 1) + (E - 1)^2: with fast motions the first levels of a slow
+ * one are so close to 1 that it would be lost.
  *
  * All levels are kept: w(theta) is a piece of the first level by the polynomial and one product for
  * every bit of what is left.
@@ -98,7 +98,7 @@ static void sizes(const mstmm_phi *phi, int i, double *of_row, double *of_column
   }
 }
 
-/* Row i divided and column i multiplied by a power of two; was it worth while? */
+/* Row i divided and column i multiplied by a power of two; returns whether that helped. */
 static int balance_one(const mstmm_phi *phi, int i) {
   double of_row, of_column, factor = 1.0;
   sizes(phi, i, &of_row, &of_column);
@@ -169,7 +169,7 @@ static void square_up(const mstmm_phi *phi, const double *from, double *to) {
   for (int64_t i = 0; i < square_of(phi); i++) to[i] += 2.0 * from[i];
 }
 
-/* Is all of h J finite, and so small that sums of it are? */
+/* True if all of h J is finite and so small that sums of it are. */
 static int take(const mstmm_phi *phi, double h, const double *J) {
   double size = 0.0;
   memset(phi->matrix, 0, (size_t)square_of(phi) * sizeof(double));

@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 
-/* Everything is the caller's: mstmm_phi_lay places it in mstmm_phi_size doubles. */
+/* The caller owns all memory: mstmm_phi_lay places it in mstmm_phi_size doubles. */
 typedef struct mstmm_phi {
   int n, row;      /* rows of X, and doubles from one row of a matrix or vector to the next */
   double *levels;  /* 1: X / 2^levels is small */

@@ -1,14 +1,14 @@
 /* Rosenbrock methods: one tangent a step, one solution a stage and no iteration, in two forms.
  *
- * Carried: a stage takes one residual, and accelerations go along as unknowns of the algebraic
- * equation R = 0.  Where stiff springs hold bodies together this form errs least.  But a stage sees
- * the mass matrix of its own place through the tangent of the step's start alone, and where bodies
- * turn over by far within a step, the estimate of the error does not see what that costs.
- * Evaluated: a stage evaluates the accelerations, which are no unknowns then.
+ * Carried: a stage evaluates one residual, and accelerations are unknowns of the algebraic
+ * equation R = 0.  With stiff springs between bodies this form is the most accurate.  But a stage
+ * has its mass matrix only through the tangent of the step's start, and the error estimate does
+ * not contain the error of large rotations within a step. Evaluated: a stage evaluates the
+ * accelerations, which are then no unknowns.
  *
- * Steps are made in the first form, and again in the second where the accelerations carried to the
- * end lie elsewhere than those evaluated there, for another reason than stiff springs or by too
- * much; some steps after that are made in the second at once.
+ * Steps are made in the first form, and repeated in the second if the accelerations carried to the
+ * end differ from those evaluated there, for another reason than stiff springs or by too much;
+ * some steps after that use the second form at once.
  *
  * E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), sections IV.7 (the form
  * without products by the Jacobian) and VI.3, VI.4 (differential-algebraic equations). */
@@ -67,7 +67,7 @@ static void add_others(const mstmm_work *work, int i) {
   }
 }
 
-/* k_i = U_i / h; quadratures are not the stages' affair */
+/* k_i = U_i / h; stages do not contain quadratures */
 static void keep(const mstmm_work *work, int i) {
   const mstmm_implicit *at = work->implicit;
   double *k = work->k + i * work->row, *a = mstmm_row_a(work, k);
@@ -94,7 +94,7 @@ static int stage(const mstmm_work *work, int i, form *prepare) {
   return status ? status : solve_stage(work, i, t);
 }
 
-/* Methods of order whatever the tangent have it in the second form alone. */
+/* W-methods have their order in the second form only. */
 static int by_laws(const mstmm_work *work) { return work->run->tangents == MSTMM_LAWS_TANGENT; }
 
 /* The tangent, and the first stage, which is the same in both forms */
@@ -142,8 +142,8 @@ static int effects_of_gap(const mstmm_work *work, double *alone, double *held) {
   return status;
 }
 
-/* Are the accelerations carried to the step's end those there, but for stiff springs and by no more
- * than the step errs?  That is about one order less than the estimate. */
+/* True if the accelerations carried to the step's end are those there, except for stiff springs and
+ * the error of the step, which is about one order less than the estimate. */
 static int carried_well(const mstmm_work *work) {
   const mstmm_implicit *at = work->implicit;
   const double *f = work->k + work->tableau->n_stages * work->row + at->n_q;

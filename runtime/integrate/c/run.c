@@ -1,4 +1,4 @@
-/* A run before and after the loop: sizes, workspace, arguments, and its state as plain numbers. */
+/* Set-up and state of a run: sizes, workspace, arguments, and its state as plain numbers. */
 #include <math.h>
 #include <string.h>
 
@@ -8,7 +8,7 @@
 
 enum { ALIGNMENT = 64 };
 
-/* What is being cut, and how much of it is used; base NULL only counts. */
+/* Memory that is divided, and its used part; base NULL only counts. */
 typedef struct cutting {
   double *base;
   int64_t used;
@@ -153,7 +153,7 @@ static int increasing(int64_t n, const double *x) {
   return 1;
 }
 
-/* Number of the first argument that makes no sense, 0 if none */
+/* Number of the first invalid argument, 0 if none */
 static int bad_argument(const mstmm_run *run) {
   const mstmm_system *system = run->system;
   if (!sizes_are_sound(system, run->tableau) || !run->workspace) return 1;

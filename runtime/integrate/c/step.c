@@ -1,5 +1,4 @@
-/* Arithmetic of one step: the stages of explicit Runge-Kutta methods, and everyone's dense
- * output. */
+/* Arithmetic of one step: stages of explicit Runge-Kutta methods, dense output of all methods. */
 #include <math.h>
 #include <string.h>
 

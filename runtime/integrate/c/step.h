@@ -1,10 +1,10 @@
-/* What the parts of the time integration share among themselves; nobody else includes this. */
+/* Private declarations of the time integration. */
 #ifndef MSTMM_STEP_H
 #define MSTMM_STEP_H
 
 #include "work.h"
 
-/* Where the loop stands between two calls */
+/* Phase of the loop between two calls */
 enum {
   PHASE_START,   /* sample the start */
   PHASE_HERE,    /* fire what has become true at the current state */
@@ -43,15 +43,15 @@ int64_t mstmm_worst_component(const mstmm_work *work);
 double mstmm_stiffness(const mstmm_work *work);
 double mstmm_initial_step(const mstmm_work *work, double interval);
 
-/* The parts of step control, which look at nothing but the run.
+/* Parts of step control, which read only the run.
  * Aim: where the trial step ends (t_new, h); 0, or a failure.  Interval: to the next stop.
  * Reject: a shorter step after an error above 1 or a failure already noted; 0, or the status with
  * which the run ends.  Propose: the next step, after a step with this error.  */
 int mstmm_aim(mstmm_run *run);
 /* Between two breaks that are one but for rounding no error is asked for. */
 int mstmm_in_gap(const mstmm_run *run);
-/* Does the run end here: at a pole, after too many steps, without an end in sight?  0, or a
- * failure. */
+/* Failure if the run ends here (at a pole, after too many steps, or with its end out of reach),
+ * else 0. */
 int mstmm_no_further(mstmm_run *run);
 double mstmm_smallest_step(const mstmm_run *run);
 double mstmm_interval(const mstmm_run *run);
@@ -59,9 +59,9 @@ int mstmm_output_inside(const mstmm_run *run);
 int mstmm_reject(mstmm_run *run, int failed, double error);
 void mstmm_propose(mstmm_run *run, double error);
 void mstmm_count_step(mstmm_run *run, double error, double absolute);
-/* Notes what a step says of the method: an explicit one whether stability limited it. */
+/* Records signs for or against the method: for explicit ones whether stability limited the step. */
 void mstmm_watch_sign(mstmm_run *run, int limited);
-/* Is the caller to look at the run, as it asked for? */
+/* True if a call-back condition of the caller is met. */
 int mstmm_is_asked(mstmm_run *run);
 /* First step: a guess from y and k, and the step from the slope f1 at y + guess k.  Components lie
  * `stride` doubles apart, tolerances side by side. */

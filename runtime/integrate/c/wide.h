@@ -1,5 +1,5 @@
-/* Four numbers at once, in GNU C's portable vectors, and the weighted sums that every step of a
- * Runge-Kutta method consists of.  Longer vectors are kept in memory by compilers that may not
+/* Vectors of four numbers, in portable GNU C, and the weighted sums of which every step of a
+ * Runge-Kutta method consists.  Longer vectors are kept in memory by compilers that may not
  * count on AVX-512, and are slower than one number at a time. */
 #ifndef MSTMM_WIDE_H
 #define MSTMM_WIDE_H
@@ -45,7 +45,7 @@ MSTMM_INLINE void mstmm_size(const double *x, wide *size) {
   *size = (wide)(*(const wide_mask *)x & bits);
 }
 
-/* Where the mask is set the first, elsewhere the second. */
+/* The first argument where the mask is set, else the second. */
 MSTMM_INLINE void mstmm_choose(const wide_mask *mask, const wide *first, const wide *second,
                                wide *chosen) {
   *chosen = (wide)((*mask & (wide_mask)*first) | (~*mask & (wide_mask)*second));

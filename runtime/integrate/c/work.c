@@ -1,4 +1,4 @@
-/* Failures of a run, and numbers that are none. */
+/* Failures of a run, and numbers that are not finite. */
 #include "work.h"
 
 int mstmm_note(mstmm_run *run, int status, int64_t code, int64_t component, double time) {

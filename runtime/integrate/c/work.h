@@ -1,5 +1,5 @@
-/* The workspace of a run, its right-hand side and its failures: what every part of the time
- * integration stands on. */
+/* Workspace of a run, its right-hand side and its failures: the basis of all parts of the time
+ * integration. */
 #ifndef MSTMM_WORK_H
 #define MSTMM_WORK_H
 
@@ -12,8 +12,8 @@
 #define MSTMM_DEPTH 40 /* times that a part of a step is halved in search of an event */
 #define MSTMM_SAME_STEP 1e-9 /* relative difference of two steps that are of one length */
 
-/* The workspace cut into named arrays.  First lies what must be kept between steps: the state, the
- * first stage, what is known of events; the rest matters only inside a step.  Rows of the state
+/* Workspace divided into named arrays.  The first part is kept between steps: the state, the first
+ * stage, data of events; the rest is used only inside a step.  Rows of the state
  * hold `row` numbers, n_state rounded up to whole vectors; those behind n_state stay 0. */
 typedef struct mstmm_work {
   mstmm_run *run;
@@ -35,9 +35,9 @@ typedef struct mstmm_work {
   double *seen;         /* 3 + MSTMM_DEPTH rows: what is seen at left, right and between */
   double *rates;        /* a row */
   mstmm_bounds *bounds, *first_bounds; /* events and switches */
-  /* Implicit methods, NULL and nothing for others.  Rows of the state are longer then: behind the
-   * n_state components stand the accelerations, and with the family of Newmark what else a step
-   * leaves to the next, see alpha.c. */
+  /* Implicit methods, NULL and empty for others.  Rows of the state are longer then: the n_state
+   * components are followed by the accelerations, and in Newmark's family by other data for the
+   * next step, see alpha.c. */
   const mstmm_implicit *implicit;
   double *base;                /* a row, kept: where the tangent of Newton's iteration was taken */
   double *y_star, *y_first, *error; /* a row each */

@@ -1,4 +1,4 @@
-/* Calls of C from Python at the least cost: rows of doubles in, new arrays of doubles out.
+/* Calls of C from Python with the lowest overhead: rows of doubles in, new arrays of doubles out.
  *
  * A second Python module beside the one that cffi writes, in the same library.  `prepare` makes a
  * function of a C function and its record once; what it is given is checked here, and answers are
@@ -41,7 +41,7 @@ static const double *row_of(PyObject *given, npy_intp width)
     return fits ? PyArray_DATA(array) : NULL;
 }
 
-/* Fills number and rows; 0 where what is given is no such state. */
+/* Fills number and rows; 0 if the arguments are no such state. */
 static int taken(const prepared *one, PyObject *const *given, double *number, const double **rows)
 {
     if (one->numbered) {
@@ -56,7 +56,7 @@ static int taken(const prepared *one, PyObject *const *given, double *number, co
     return 1;
 }
 
-/* New arrays for the answers; 0 without memory. */
+/* New arrays for the results; 0 without memory. */
 static int made(const prepared *one, PyObject **arrays, double **answers)
 {
     for (int k = 0; k < one->n_answers; k++) {
