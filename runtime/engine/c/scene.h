@@ -8,7 +8,7 @@
 #include "tangent.h"
 
 /* cdef begin */
-/* A point of a body with axes of its own, whose motion is wanted. */
+/* A point of a body with axes whose motion is observed. */
 typedef struct {
     int body; /* -1: ground */
     real axes[9], offset[3];
@@ -51,7 +51,7 @@ int mstmm_accelerations_many(const mstmm_model *model, real *workspace, int64_t 
 
 typedef struct {
     int action; /* MSTMM_FIRE_STOP, or MSTMM_FIRE_RESTART with `release` */
-    int release; /* place in memory; of a bounce that of the fastest one */
+    int release; /* index in memory; of a bounce that of the fastest one */
     /* A bounce: slopes of the event's value by time, then by coordinates and places of probes */
     const mstmm_tape *slopes; /* t, q, u, probes, inputs -> slopes; NULL: no bounce */
     int n_slopes;
@@ -67,7 +67,7 @@ typedef struct {
     real rate, size, steepness, reach;
 } mstmm_meeting;
 
-/* Parts of what that code works on: the base point (t, q, u, a), steps, slopes, factors, known
+/* Workspace of that code: the base point (t, q, u, a), steps, derivatives, factors, known
  * increments. */
 typedef struct {
     real *t, *q, *u, *a, *steps, *slopes, *factors, *still_q, *still_u, *known_q, *known_a, *right;
@@ -95,7 +95,7 @@ typedef struct {
     const int *quaternions; /* first coordinate of each */
     int n_events;
     const mstmm_event_action *events;
-    int n_switches; /* their margins stand behind the events' values */
+    int n_switches; /* their margins follow the events' values */
     const mstmm_tape *event_tape; /* t, q, u, probe positions and velocities -> values */
     int n_probes;
     const mstmm_probe *probes;
@@ -105,7 +105,7 @@ typedef struct {
     const int *read;
     mstmm_bounds *bounds;
     real *later; /* nq + nu: scratch; NULL where it reads no velocities of probes */
-    int closes;         /* events read states inside a step, whose loops must be closed first */
+    int closes;         /* events read states inside a step, whose loops are closed first */
     int n_controllers;
     const struct mstmm_controller *controllers; /* see control.h */
     /* Code compiled for this scene, or NULL: see mstmm_scene_compiled */
@@ -146,23 +146,23 @@ int mstmm_meeting_of(mstmm_scene_run *run, int event, real t, const real *y, con
                      mstmm_meeting *found);
 /* cdef end */
 
-/* The numbers of a probe whose body moves as its bias motion and `delta` (6) say. */
+/* Numbers of a probe whose body moves with its bias motion and `delta` (6). */
 void mstmm_point_shown(const mstmm_state *state, const mstmm_probe *probe, const real *delta,
                        real *out);
 
 /* Gaps of closed loops closed and slips stopped in place, by compiled code where there is some. */
 int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y);
 
-/* *u, which are speeds of a state inside a step: near a singular pose they are taken without slips,
- * for whose sake accelerations there would be wrong by the slips over the distance from it. */
+/* Returns *u, the speeds of a state inside a step: near a singular pose projected speeds, because
+ * accelerations there have the error of the velocity errors over the distance from it. */
 int mstmm_stage_state(mstmm_scene_run *run, double t, const double **y, const double **u);
 int mstmm_stage_speeds(mstmm_scene_run *run, double t, const double *y, const double **u);
 
 /* Places and velocities of the probes of a state with speeds u, to `probe_values`. */
 int mstmm_probes_seen(mstmm_scene_run *run, real t, const real *y, const real *u);
-/* Kinetic energy of a state with speeds u, rotors and flexible bodies' modes with it. */
+/* Kinetic energy of a state with speeds u, including rotors and modes of flexible bodies. */
 int mstmm_kinetic_seen(mstmm_scene_run *run, real t, const real *y, const real *u, real *energy);
-/* The integrator's view of `run`, evaluated by the looped engine. */
+/* Interface of `run` to the integrator, evaluated by the looped engine. */
 void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system);
 
 #endif

@@ -13,11 +13,11 @@ typedef struct {
     int speed, row;       /* -1: the other is meant */
 } mstmm_coupled_row;
 
-/* What the elimination does not see, as it reaches across the tree: loads on bodies that change
- * with what other bodies do, efforts that expressions of the state and couplings give, hinges that
- * close loops, and couplings.  These unknowns (n_coupled) come in groups, each of which moves its
- * speeds and is read by some of the unknowns; lists of those go from first_.. of a group or a pass
- * to that of the next. */
+/* Couplings that the elimination along the tree does not contain: loads on bodies that change with
+ * other bodies, efforts by expressions of the state and by couplings, closing hinges, and
+ * couplings.  These unknowns (n_coupled) are in groups, each of which moves its speeds and is read
+ * by some of the unknowns; their lists go from first_.. of a group or a pass to that of the
+ * next. */
 typedef struct {
     int n_bodies, n_efforts, n_rows, n_passes;
     const int *bodies; /* on which such loads act: 6 numbers each */
@@ -26,10 +26,10 @@ typedef struct {
     const mstmm_coupled_row *rows;
     const int *group, *rank; /* of every unknown, its group and its place in the matrix */
     const int *first_reader, *reader, *first_moved, *moved; /* by group: unknowns, and speeds */
-    const int *first_seed, *seed; /* by pass: unknowns that are answered together */
-    const int *first_unit;        /* and where the loads among these stand, */
+    const int *first_seed, *seed; /* by pass: unknowns that are solved together */
+    const int *first_unit;        /* and the positions of the loads among these, */
     const int64_t *unit;          /* in the derivatives' workspace */
-    int below, above;             /* how far the matrix is filled beside its diagonal */
+    int below, above;             /* lower and upper bandwidth of the matrix */
 } mstmm_couplings;
 
 /* A scene at one state with its derivatives: everything is the caller's.  `work` has
@@ -45,9 +45,9 @@ typedef struct {
     int known;            /* there has been a residual since the memory changed */
     int laws_alone;       /* the last tangent was that of mstmm_laws_factor */
     int on_positions;     /* rows are those of positions only: see mstmm_across_solve */
-    int rows_of_motion;   /* rows are those of small motions x, J x = 0, whatever s is */
+    int rows_of_motion;   /* rows are those of small motions x, J x = 0, for any s */
     int counts;           /* pivots may be negative: they are counted */
-    int keeps, kept;      /* tangents leave S of every body, as increments that are known ask for */
+    int keeps, kept;      /* tangents keep S of every body, as known increments need */
     real t, rate, s, sq, kappa; /* of the last residual and tangent */
     mstmm_failure failure;
 } mstmm_tangent;
@@ -57,22 +57,22 @@ typedef struct {
  * derivatives. */
 int64_t mstmm_tangent_lay(mstmm_model *model);
 int64_t mstmm_tangent_work(const mstmm_model *model, int64_t slots);
-/* Numbers of `work` for one that knows mstmm_residual and mstmm_tangent_rates alone. */
+/* Number of doubles of `work` for mstmm_residual and mstmm_tangent_rates only. */
 int64_t mstmm_residual_work(const mstmm_model *model);
-/* R (nu) at a state, which the next calls refer to; zero on speeds that somebody imposes.
- * `balance` may be NULL; its power is that of everything that is not stored.  `a` NULL: the
- * accelerations there.  With closed loops their multipliers are those there, whatever `a`; where a
- * hinge closes one, R are the accelerations that its speeds lack. */
+/* R (nu) at a state, to which the next calls refer; zero on prescribed speeds.  `balance` may be
+ * NULL; its power is that of everything that is not stored.  `a` NULL: the accelerations
+ * there.  Multipliers of closed loops are those there, whatever `a`; for closing hinges R are the
+ * errors of their accelerations. */
 int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, const real *a, real *r,
                    mstmm_balance *balance);
-/* Is this the state of the last residual, under the same memory?  `a` NULL: whatever they were. */
+/* True if this is the state of the last residual with the same memory.  `a` NULL: any. */
 int mstmm_residual_is_at(const mstmm_tangent *at, real t, const real *q, const real *u,
                          const real *a);
 /* Derivative of R (nu) along d_t, d_q, d_u, d_a. */
 int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const real *d_u,
                          const real *d_a, real *d_r);
-/* Derivative of the accelerations (nu) by the time at given coordinates and speeds, at the state of
- * the last residual, which was one without `a`.  Spoils the tangent. */
+/* Partial derivative of the accelerations (nu) with respect to time, at the state of the last
+ * residual, which was one without `a`.  Invalidates the tangent. */
 int mstmm_accelerations_rate(mstmm_tangent *at, real *rate);
 /* Change of the coordinates' rates (nq) along the direction of the last mstmm_residual_slope. */
 void mstmm_rates_slope(const mstmm_tangent *at, real *d_rates);
@@ -84,25 +84,25 @@ int mstmm_tangent_brought(mstmm_tangent *at, real rate, real s, real sq);
 /* Change of every coupling along x for the coordinates, d_u and d_a (nu). */
 int mstmm_coupled_along(mstmm_tangent *at, const real *x, const real *d_u, const real *d_a,
                         real *changes);
-/* What the last factorisation divided by: of each body the pivot (n, n) of its shapes, then the
- * inverse of that of its hinge; both n in `sizes` (2 n_bodies).  Returns how many numbers these
- * are, and keeps them in `pivots` unless it is NULL. */
+/* Pivots of the last factorisation: of each body that of its shapes (n, n), then the inverse of
+ * that of its hinge; both n in `sizes` (2 n_bodies).  Returns how many numbers these are, and
+ * writes them to `pivots` unless it is NULL. */
 int64_t mstmm_tangent_pivots(const mstmm_tangent *at, int *sizes, real *pivots);
-/* Increments that are there before any x: of coordinates (nq) and accelerations (nu). */
+/* Known increments in addition to x: of coordinates (nq) and accelerations (nu). */
 typedef struct {
     const real *q, *a;
 } mstmm_known;
-/* x (nu) that makes the change of R equal to r, beside what is known (NULL: nothing), which must be
- * zero where somebody imposes.  By laws alone nothing is known. */
+/* x (nu) with the change r of R, in addition to known increments (NULL: none), which must be zero
+ * for prescribed speeds.  With the approximate tangent there are none. */
 int mstmm_tangent_solve(mstmm_tangent *at, const real *r, const mstmm_known *known, real *x);
-/* In place of the tangent: inertia with the slopes of laws and modes alone, no more than their
- * symmetric part.  s and sq above zero. */
+/* Factors the approximate tangent: inertia with the symmetric part of the derivatives of laws and
+ * modes.  s and sq are positive. */
 int mstmm_laws_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa);
-/* Accelerations a (nu) that make the change of R equal to r, with coordinates and speeds that
- * change besides by dq and du; both NULL: none do. */
+/* Accelerations a (nu) with the change r of R, in addition to changes dq and du of coordinates and
+ * speeds; both NULL: none. */
 int mstmm_laws_solve(mstmm_tangent *at, const real *r, const real *dq, const real *du, real *a);
-/* dq = N(q) u, zero on coordinates that somebody imposes; q and u need not be those of the last
- * residual, whose workspace this writes to. */
+/* dq = N(q) u, zero for prescribed coordinates; q and u need not be those of the last residual,
+ * whose workspace this overwrites. */
 int mstmm_tangent_rates(mstmm_tangent *at, const real *q, const real *u, real *dq);
 /* Sets entries (nu) of prescribed speeds to zero. */
 void mstmm_tangent_free(const mstmm_tangent *at, real *entries);
