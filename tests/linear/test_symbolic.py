@@ -323,7 +323,7 @@ def test_a_scene_with_a_release_is_refused() -> None:
 
 def test_a_model_made_by_hand_has_no_derivation() -> None:
     linear = Model(pendulum(1).scene).linearize()
-    with pytest.raises(EnvironmentFailure, match=r"without the means"):
+    with pytest.raises(EnvironmentFailure, match=r"without support"):
         linear.symbolic(["rod1.mass"])
 
 

@@ -241,7 +241,7 @@ def test_turned_too_far() -> None:
     result = model.simulate(1.0, initial=start)
     assert not result.success
     assert 'bushing "mount"' in result.message
-    assert "turned by more than 170 degrees from rest" in result.message
+    assert "rotated by more than 170 degrees from rest" in result.message
 
 
 def test_loss_factor() -> None:
