@@ -17,20 +17,20 @@ Function = Callable[..., Any]
 
 @lru_cache(maxsize=16)
 def _context(digits: int) -> Any:
-    """A context of its own, so that nobody's precision is touched."""
+    """mpmath context with its own precision, so that no global precision changes."""
     context = mpmath.MPContext()
     context.dps = digits
     return context
 
 
 class PreciseArithmetic:
-    """Numbers of `digits` decimal digits."""
+    """mpmath arithmetic with `digits` decimal digits."""
 
     def __init__(self, digits: int) -> None:
         self._context = context = _context(digits)
 
         def real(function: Function) -> Function:
-            """NaN where the value is complex, an infinity of the right sign at a pole."""
+            """Return NaN for a complex value and infinity at a pole."""
 
             def call(*operands: Any) -> Any:
                 try:

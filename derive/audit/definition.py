@@ -33,7 +33,7 @@ Numbers = dict[sp.Basic, float]
 
 
 def check(element: Element) -> None:
-    """All checks of an element.  Raises ElementError naming element and equation."""
+    """Run all checks of an element.  Raises ElementError that names element and equation."""
     _check_names(element)
     if isinstance(element, Hinge):
         check_hinge(element)
@@ -44,7 +44,7 @@ def check(element: Element) -> None:
 
 
 def _check_methods(where: str, element: Element) -> None:
-    """A method whose name is nearly one of the base class would silently do nothing."""
+    """Reject a method whose name nearly matches one of the base class: it would never be called."""
     base = next(kind for kind in (Hinge, Body, ForceElement) if isinstance(element, kind))
     known = [name for name in dir(base) if not name.startswith("_")]
     for name, value in vars(type(element)).items():
@@ -53,12 +53,12 @@ def _check_methods(where: str, element: Element) -> None:
         near = difflib.get_close_matches(name, known, 1, 0.75)
         if near:
             raise ElementError(
-                f"{where}: {name} is no method of a {kind_of(element)}; did you mean {near[0]}? "
+                f"{where}: {name} is not a method of a {kind_of(element)}; did you mean {near[0]}? "
                 "(begin the names of your own methods with _)"
             )
 
 
-#: Longest name of an element: it becomes part of file names.
+#: Maximum length of an element name, which becomes part of file names.
 _LONGEST = 60
 
 
@@ -85,7 +85,7 @@ def _check_names(element: Element) -> None:
 
 
 def _check_declared(where: str, group: object) -> None:
-    """A tuple of Param with names, known units, and bounds in order."""
+    """Check that a group is a tuple of Param with names, known units and ordered bounds."""
     if not isinstance(group, (tuple, list)) or not all(isinstance(p, Param) for p in group):
         raise ElementError(
             f'{where}: expected a tuple such as (Param("radius", "m"),), found {group!r:.80}'
@@ -123,7 +123,7 @@ def _check_bounds(where: str, p: Param) -> None:
 
 
 def check_hinge(hinge: Hinge) -> HingeMotion:
-    """Rotation, rank, stated H and bias, units; returns the derived motion."""
+    """Check rotation, rank, stated H and bias, and units; return the derived motion."""
     where = f"hinge {hinge.name}"
     if len(speeds_of(hinge)) > 6:
         raise ElementError(f"{where}: {len(speeds_of(hinge))} speeds; a hinge has at most six")
@@ -145,7 +145,7 @@ def check_hinge(hinge: Hinge) -> HingeMotion:
          "the velocity that follows from position and rotation": motion.subspace},
         {s: _range(c) for s, c in zip(motion.q, hinge.coordinates, strict=True)},
         points[:2],
-        "that would be an impulse; let the branches meet with equal values and slopes",
+        "a jump of the velocity is an impulse; define branches with equal values and slopes there",
     )  # fmt: skip
     for point in points:
         _is_rotation(where, motion, point)
@@ -156,13 +156,13 @@ def check_hinge(hinge: Hinge) -> HingeMotion:
     return motion
 
 
-#: Keys of a scene's hinge that a definition may read, and those that a frame needs.
+#: Keys of a hinge table that a definition may read, and those that each frame requires.
 _KEYS = ("axis", "axis2", "lead")
 _NEEDED = {"crossing": ("axis", "axis2"), "plane": ("axis", "axis2")}
 
 
 def _check_frame(where: str, hinge: Hinge) -> None:
-    """`frame` and `keys`: how the hinge lies in a scene."""
+    """Check `frame` and `keys`, which define how a scene places the hinge."""
     if hinge.frame not in FRAMES:
         words = ", ".join(f'"{frame}"' for frame in FRAMES)
         raise ElementError(f"{where}: frame: expected one of {words}, found {hinge.frame!r:.40}")
@@ -175,7 +175,7 @@ def _check_frame(where: str, hinge: Hinge) -> None:
         raise ElementError(f'{where}: frame "{hinge.frame}" needs {missing[0]} among the keys')
     names = [parameter.name for parameter in hinge.parameters]
     if "lead" in hinge.keys and "lead" not in names:
-        raise ElementError(f"{where}: keys: lead is no parameter of it; declare it")
+        raise ElementError(f"{where}: keys: lead is not a declared parameter; declare it")
     if hinge.frame == "crossing" and not names:
         raise ElementError(
             f'{where}: frame "crossing": its first parameter is the angle between the axes in rad; '
@@ -184,7 +184,7 @@ def _check_frame(where: str, hinge: Hinge) -> None:
 
 
 def _points(motion: HingeMotion) -> Iterable[Numbers]:
-    """Random values of q, u, p; quaternions need not be unit, since rotations are normalised."""
+    """Random values of q, u, p; quaternions need no unit norm, since rotations are normalised."""
     numbers = random.Random(20260)
     for _ in range(_POINTS):
         point: Numbers = {}
@@ -208,7 +208,7 @@ def _draw(parameter: Param, numbers: random.Random) -> float:
 
 
 def _range(parameter: Param) -> tuple[float, float]:
-    """Where a coordinate is looked at: between its bounds, or a turn about zero."""
+    """Sample interval of a coordinate: its bounds, or one turn about zero."""
     low = -3.5 if parameter.minimum is None else parameter.minimum
     return low, max(3.5, low + 7.0) if parameter.maximum is None else parameter.maximum
 
@@ -246,7 +246,7 @@ def _refuse_strange(where: str, what: str, matrix: sp.Basic, known: set[sp.Symbo
     if strange:
         allowed = what[what.find("(") + 1 : -1] if what.endswith(")") else "its arguments"
         raise ElementError(
-            f"{where}: {what} contains {', '.join(strange)}; it may use {allowed} alone"
+            f"{where}: {what} contains {', '.join(strange)}; expected only {allowed}"
         )
 
 
@@ -337,8 +337,7 @@ def _expect(
 
 
 def check_body(body: Body) -> None:
-    """Residual linear in the accelerations, mass matrix that of the energy, gyroscopic forces
-    without power, units."""
+    """Check that the residual is linear, agrees with the kinetic energy, and has correct units."""
     where = f"body {body.name}"
     p = Symbols("p", tuple(x.name for x in body.parameters))
     a, alpha, w, v = (
@@ -369,7 +368,7 @@ def check_body(body: Body) -> None:
 
 
 def _slopes(matrix: sp.Matrix, symbols: sp.Matrix) -> sp.Matrix:
-    """Jacobian of a column, a column for each symbol."""
+    """Jacobian of a column, one column per symbol."""
     return sp.Matrix.hstack(*(sp.Matrix(slope(matrix, s)) for s in symbols))
 
 
@@ -405,7 +404,7 @@ def _body_units(
 
 
 def check_force(force: ForceElement) -> None:
-    """Wrench in N and N*m, potential in J, nothing but its own arguments inside."""
+    """Check units (wrench N and N*m, potential J), arguments and continuity of the potential."""
     where = f"force {force.name}"
     p = Symbols("p", tuple(x.name for x in force.parameters))
     x, v, w = (sp.Matrix(sp.symbols(f"{n}_1 {n}_2 {n}_3", real=True)) for n in ("x", "v", "w"))
@@ -426,7 +425,7 @@ def check_force(force: ForceElement) -> None:
     refuse_jumps(
         where, {"potential(x, p)": sp.Matrix([energy.xreplace(_turned(rotation, angle))])},
         dict.fromkeys((*x, angle), (-2.0, 2.0)), drawn,
-        "energy would appear from nothing; let the branches meet with equal values",
+        "a jump of the potential creates energy; define branches with equal values there",
     )  # fmt: skip
     _expect(where, "the force of wrench", push, "N", known)
     _expect(where, "the moment of wrench", turn, "N*m", known)
@@ -451,7 +450,7 @@ def _energy(
 
 
 def _turned(rotation: sp.Matrix, angle: sp.Symbol) -> dict[sp.Symbol, sp.Expr]:
-    """Entries of a rotation by an angle about an axis that is none of the coordinates'."""
+    """Entries of a rotation by `angle` about an axis that is no coordinate axis."""
     axis = (sp.Rational(3, 13), sp.Rational(4, 13), sp.Rational(12, 13))
     return dict(zip(rotation, rotation_about(axis, angle), strict=True))
 

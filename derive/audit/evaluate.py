@@ -22,9 +22,9 @@ def evaluate(
     """Outputs of the kernel at `digits` decimal digits, each a flat list, row-major.
 
     `inputs[port]` is a number or a nested or flat sequence of int, float, Fraction, str or mpf;
-    floats are taken as the exact numbers they are.  `n` is the run-time size of a kernel that has
+    floats count as exact numbers.  `n` is the run-time size of a kernel that has
     one.  An output flagged `accumulate` holds the increment; an entry that is never stored is 0.
-    Values that no port asks for are ignored.
+    Values without a port of that name are ignored.
     Raises GuardFailure, and ValueError for a missing input, a wrong length or no `n`.
     """
     arithmetic = PreciseArithmetic(digits)

@@ -1,9 +1,9 @@
-"""A derivation evaluated as it is stated: the matrix equations before lowering, at any precision.
+"""Direct evaluation of a derivation's matrix equations, before lowering, at any precision.
 
 Products, blocks and sums are mpmath matrices, `Solve` is a solution of the linear system by
 elimination with row exchange, and declared zeros are computed like any other entry.  Nothing of
-`lower` or of the IR is used, so that agreement with them says something.  How a quantity is stored
-(upper triangle of symmetric ones) matters at the border only.
+`lower` or of the IR is used, so that agreement with them is an independent check.  The
+storage of a quantity (upper triangle of symmetric ones) matters only for inputs and outputs.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ def evaluate_equations(
 ) -> DirectValue:
     """Outputs of the derivation's definitions at `digits` decimal digits, each a flat list.
 
-    `inputs[name]` are the numbers as the kernel takes them (row-major, symmetric quantities as
-    their upper triangle); floats count as the exact numbers they are.  `n` replaces the run-time
+    `inputs[name]` are the numbers in the format of the kernel's inputs (row-major, of symmetric
+    quantities the upper triangle); floats count as exact numbers.  `n` replaces the run-time
     size of a derivation that has one.  Raises GuardBroken where a
     guard does not hold and Undefined where an equation has no finite value.
     """
@@ -72,7 +72,7 @@ def evaluate_equations(
 def evaluate_matrix(
     matrix: sp.MatrixBase, values: Mapping[sp.Basic, Any], digits: int = 50
 ) -> list[list[Number]]:
-    """A matrix of scalar expressions at given values of its symbols."""
+    """Evaluate a matrix of scalar expressions at given values of its symbols."""
     with mpmath.workdps(digits):
         evaluation = _Values(digits)
         evaluation.scalars = {symbol: _number(value) for symbol, value in values.items()}
@@ -98,7 +98,7 @@ def _read(quantity: Quantity, numbers: list[Number]) -> Matrix:
     rows, columns = quantity.rows, quantity.columns
     count = rows * (rows + 1) // 2 if quantity.symmetric else rows * columns
     if len(numbers) != count:
-        raise ValueError(f"{quantity.name} takes {count} numbers, not {len(numbers)}")
+        raise ValueError(f"{quantity.name}: expected {count} numbers, found {len(numbers)}")
     if quantity.symmetric:
         full = mpmath.matrix(rows, rows)
         entries = iter(numbers)
@@ -148,15 +148,15 @@ class _Values:
         self.scalars: dict[sp.Basic, Number] = {}
 
     def define(self, derivation: Derivation, guards: tuple[tuple[sp.Basic, int, str], ...]) -> None:
-        """Evaluate the definitions in order; a guard is looked at once its quantities are known."""
+        """Evaluate the definitions in order; a guard is checked once its quantities are known."""
         waiting = list(guards)
         for equation in derivation.definitions:
             self.known[str(equation.left.name)] = self.matrix(equation.right)
             waiting = [g for g in waiting if not self._holds(g)]
-        assert not waiting, "a guard asks for what no equation defines"
+        assert not waiting, "a guard reads a quantity that no equation defines"
 
     def _holds(self, guard: tuple[sp.Basic, int, str]) -> bool:
-        """False while the guard's quantities are not known yet."""
+        """Check a guard; return False while its quantities are not known."""
         condition, code, message = guard
         names = {str(s.name) for s in condition.atoms(sp.MatrixSymbol)}
         if not names <= self.known.keys():
@@ -238,8 +238,8 @@ class _Values:
             return factor
 
     def _triangle(self, a: Matrix, count: int) -> Matrix:
-        """Rows of R by making the columns orthogonal one after the other; a column that depends on
-        those before it has a row of zeros."""
+        """Rows of R by Gram-Schmidt orthogonalisation; a column that depends linearly on earlier
+        ones gives a row of zeros."""
         with mpmath.workdps(2 * self.digits):
             columns = [a[:, j] for j in range(a.cols)]
             sizes = [mpmath.norm(column) for column in columns]

@@ -1,4 +1,4 @@
-"""What must hold of the laws on coordinates: forces from energies, no work on closed paths."""
+"""Mechanical properties of hinge laws: forces from energies, no work on closed paths."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from .samples import Source
 def law_properties(
     call: Call, source: Source, kernels: Collection[str]
 ) -> Iterator[tuple[str, Property]]:
-    """(kernel, statement) for those laws on coordinates that `kernels` names."""
+    """Yield (kernel, property) for each hinge law named in `kernels`."""
     for name, count in (("linear", 3), ("full", 11)):
         if name not in kernels:
             continue
@@ -69,12 +69,12 @@ def _one_coordinate(
     here = law(now, u, effort)
     worst.see("P = tau u + dV/dt", here["P"], [here["tau"][0] * u + rate[0]], DIFFERENCES)
     lost = law(now, u)["P"][0]
-    worst.see("dampers and friction take energy", [max(lost, 0)], [0], 0.0)
+    worst.see("dampers and friction dissipate energy", [max(lost, 0)], [0], 0.0)
 
 
 @dataclass(frozen=True)
 class _Rotational:
-    """A law of a ball (places = 0) or free hinge (3 translations first)."""
+    """Law of a ball hinge (`places` = 0) or of a free hinge (3 translations first)."""
 
     call: Call
     name: str
@@ -163,16 +163,16 @@ def _power(law: _Rotational, q: list[Any], numbers: random.Random, worst: Worst)
     here = law(q, u, effort)
     power = mpmath.fsum(a * b for a, b in zip(here["tau"], u, strict=True)) + rate[0]
     worst.see("P = tau . u + dV/dt", here["P"], [power], DIFFERENCES)
-    worst.see("dampers take energy", [max(law(q, u)["P"][0], 0)], [0], 0.0)
+    worst.see("dampers dissipate energy", [max(law(q, u)["P"][0], 0)], [0], 0.0)
 
 
-#: Points on the closed path; the rule of trapezoids converges faster than any power on it.
+#: Points on the closed path; the trapezoidal rule converges exponentially on it.
 _PATH = 192
 
 
 def _closed_path(law: _Rotational, worst: Worst) -> None:
     """Work on a closed path through three half turns of twist each way, and the twist on it."""
-    # In the axes of the law, so that the twist is the angle that the path goes through.
+    # In the axes of the law, so that the twist equals the angle along the path.
     identity = [1, 0, 0, 0, 1, 0, 0, 0, 1]
     path = _Rotational(law.call, law.name, law.p, identity, law.places)
     place, still = [0] * law.places, [0] * (law.places + 3)

@@ -1,8 +1,8 @@
-"""What must hold of kernels whatever their equations: checks that know mechanics, not the kernels.
+"""Checks of kernels against the laws of mechanics, independent of their derivation.
 
 Velocities and accelerations by differences along a motion at 60 digits, forces by energies, balance
-of forces and moments, no work on closed paths.  Kernels are called by name through `Call`; nothing
-here looks at how they were derived.
+of forces and moments, no work on closed paths.  Kernels are called by name through `Call`; the
+checks do not use their derivation.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ End = tuple[Matrix, Matrix, Matrix, Matrix]  # axes, position, velocity, angular
 DIGITS = 60
 #: Step of the differences: they err by its square, and by 1e-60 over its square.
 STEP = mpmath.mpf(10) ** -15
-#: What the differences leave, with a wide margin.
+#: Largest error of the differences, with a wide margin.
 DIFFERENCES = 1e-22
-#: What algebra at 60 digits leaves.
+#: Largest error of algebra at 60 digits.
 ALGEBRA = 1e-40
 #: Accelerations of a body of unit size above which its hinge's coordinates count as singular.
 SINGULAR = 1e9
@@ -39,7 +39,7 @@ CONTINUOUS = 1e-6
 
 @dataclass(frozen=True)
 class Property:
-    """A statement of mechanics, the largest relative error found, and what is allowed."""
+    """A law of mechanics, the largest relative error found, and its limit."""
 
     name: str
     error: float
@@ -51,7 +51,7 @@ class Property:
 
 
 class Worst:
-    """Collects the largest error of each statement."""
+    """Largest error of each property."""
 
     def __init__(self) -> None:
         self._found: dict[str, tuple[float, float]] = {}
@@ -65,7 +65,7 @@ class Worst:
         self._found[name] = (max(error, self._found.get(name, (0.0, 0.0))[0]), limit)
 
     def include(self, other: Worst) -> None:
-        """Take over what another has seen."""
+        """Merge the errors of another collection."""
         for name, (error, limit) in other._found.items():
             self._found[name] = (max(error, self._found.get(name, (0.0, 0.0))[0]), limit)
 
@@ -81,12 +81,12 @@ class Worst:
 
 
 def rows(values: Sequence[Any], width: int) -> Matrix:
-    """The numbers as a matrix with rows of this width."""
+    """Matrix of the numbers, with rows of this width."""
     return mp.matrix([list(values[i : i + width]) for i in range(0, len(values), width)])
 
 
 def column(values: Sequence[Any]) -> Matrix:
-    """The numbers as a column."""
+    """Column of the numbers."""
     return mp.matrix(list(values))
 
 
@@ -119,7 +119,7 @@ def derivatives(path: Callable[[Number], Matrix]) -> tuple[Matrix, Matrix, Matri
 
 @dataclass(frozen=True)
 class _Hinge:
-    """A hinge's kernels and one state of it."""
+    """Kernels of a hinge and one of its states."""
 
     call: Call
     p: Numbers
@@ -186,9 +186,9 @@ def hinge_properties(call: Call, generic: Call, source: Source, nu: int) -> tupl
 
 
 def _beside(hinge: _Hinge, seen: Callable[[list[Any]], Worst]) -> Worst:
-    """The statements before and after a point where branches of the formulas may meet.
+    """Evaluate the properties on both sides of a point where branches may meet.
 
-    Differences across it err there.  What has to be continuous is compared at the point itself;
+    Differences across the point are wrong.  Continuous quantities are compared at the point;
     the bias may jump, and then lies between both sides.
     """
     before, after = hinge.coordinates(-BESIDE), hinge.coordinates(BESIDE)
@@ -215,7 +215,7 @@ def some(count: int, numbers: random.Random) -> list[Any]:
 def _relative_motion(hinge: _Hinge, nu: int, worst: Worst) -> None:
     found = hinge.kernel(hinge.q, hinge.u)
     if any(abs(x) > SINGULAR for x in found["qdot"]):
-        raise ArithmeticError("the coordinates fail here")
+        raise ArithmeticError("singular coordinates")
     turn, turn_rate, turn_second = derivatives(hinge.rotation)
     _, rate, second = derivatives(hinge.position)
     worst.see("R^T R = I", turn.T * turn, mp.eye(3), ALGEBRA)
@@ -270,7 +270,7 @@ def _specialised(
     balance = Balance.drawn(len(u), numbers)
     swept = [balance.sweep(call, own), balance.sweep(generic, given)]
     if any(abs(x) > SINGULAR for x in swept[1]["udot"]):
-        raise ArithmeticError("the coordinates fail here")
+        raise ArithmeticError("singular coordinates")
     for name in swept[0]:
         worst.see(
             f"{_STEP_OF[name]}: specialised = generic", swept[0][name], swept[1][name], ALGEBRA
@@ -284,7 +284,7 @@ _STEP_OF |= dict.fromkeys(("udot", "delta"), "recover")
 
 @dataclass(frozen=True)
 class Balance:
-    """One body behind a hinge: swept in, swept out, and looked at by d'Alembert's principle."""
+    """One body outboard of a hinge, swept and checked by d'Alembert's principle."""
 
     rotation: list[Any]
     shift: list[Any]

@@ -1,8 +1,8 @@
-"""How far rounding can move a kernel's outputs: a running first-order error bound.
+"""Running first-order bound of the rounding error of a kernel's outputs.
 
 Each operation in doubles adds at most half a unit in the last place (a library function a whole
-one) and passes on the errors of its operands times its slope.  The sum of all that bounds what
-compiled C may differ from the exact value by, so that a comparison of the two needs no tolerance
+one) and passes on the errors of its operands times its slope.  The sum bounds the
+difference between compiled C and the exact value, so that their comparison needs no tolerance
 chosen by hand (N. J. Higham, Accuracy and Stability of Numerical Algorithms, SIAM 2002, ch. 3).
 """
 
@@ -62,7 +62,7 @@ def rounding_bounds(
 ) -> dict[str, list[tuple[mpmath.mpf, float]]]:
     """(value at 40 digits, bound) of every output: C computes the value to within the bound.
 
-    Inputs are taken as exact.  Holds to first order, and as long as rounding turns no comparison.
+    Inputs count as exact.  Valid to first order, while rounding changes no comparison.
     Arguments and errors raised are those of `evaluate`.
     """
     results = run(kernel, inputs, _BoundedArithmetic(), n)
@@ -84,7 +84,7 @@ class _BoundedArithmetic:
             return one[name](*args)
 
         def passed_on(slope: Slope, value: Any, a: Bounded) -> Any:
-            # An exact operand passes nothing on, even where the slope has no bound.
+            # An exact operand adds no error, even where the slope is unbounded.
             try:
                 return a.error and abs(slope(call, value, (a.value,), (a.error,)))
             except ZeroDivisionError:

@@ -1,7 +1,7 @@
-"""Points at which kernels are compared: random ones, and those where a formula could break.
+"""Sample points at which kernels are compared: random ones and critical ones.
 
-Everything is drawn as doubles, so that exact and rounded evaluation start from the same numbers;
-but for pairs of cosine and sine, which as doubles would miss c^2 + s^2 = 1 and have sixty digits.
+All values are doubles, so that exact and rounded evaluation start from the same numbers.  Pairs
+of cosine and sine have sixty digits, since doubles would violate c^2 + s^2 = 1.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Numbers = list[float]
 _QUATERNION = "wxyz"
 _HALF = math.sqrt(0.5)
 
-#: Angle of every angular coordinate, and the quaternion that stands for it.
+#: Angle of every angular coordinate, and the equivalent quaternion.
 _TURNS: dict[str, tuple[float, tuple[float, float, float, float]]] = {
     "rest": (0.0, (1.0, 0.0, 0.0, 0.0)),
     "quarter turn": (math.pi / 2, (_HALF, _HALF, 0.0, 0.0)),
@@ -32,7 +32,7 @@ _TURNS: dict[str, tuple[float, tuple[float, float, float, float]]] = {
     "half turn back": (-math.pi, (0.0, -_HALF, 0.0, _HALF)),
 }
 _MASS = {"tiny masses": 1e-9, "huge masses": 1e9}
-#: What is zero at rest.
+#: Ports that are zero at rest.
 _MOTION_AND_LOAD = frozenset(
     ("u", "s", "motion", "motion_I", "v", "w", "tau", "e", "effort", "eta", "etad")
 )
@@ -43,7 +43,7 @@ _INERTIAL = frozenset({"S", "M", "J", "J_I"})
 
 @dataclass(frozen=True)
 class Point:
-    """Inputs of one kernel, as it takes them; `n` is its run-time size if it has one."""
+    """Inputs of one kernel; `n` is its run-time size if it has one."""
 
     label: str
     inputs: dict[str, Numbers]
@@ -60,7 +60,7 @@ class Source:
     seed: int = 20261
 
     def points(self, kernel: KernelIR, count: int = 2) -> Iterator[Point]:
-        """`count` random points, then the special ones that this kernel can tell apart.
+        """`count` random points, then the special ones that matter for this kernel.
 
         A kernel with a run-time size has them at several sizes.
         """
@@ -91,7 +91,7 @@ class Source:
         return {port.name: self.draw(port, kernel, numbers, n) for port in kernel.inputs}
 
     def draw(self, port: Port, kernel: KernelIR, numbers: random.Random, n: int = 0) -> Numbers:
-        """One random value of a port that the kernel could meet."""
+        """Draw an admissible random value of a port."""
         length = port.length(n)
         if any(isinstance(extent, str) for extent in port.shape):
             solved = {s.matrix for s in kernel.statements if isinstance(s, Solve)}
@@ -144,7 +144,7 @@ class Source:
         return values
 
     def _still(self, kernel: KernelIR, numbers: random.Random, n: int = 0) -> Point:
-        """No motion, no turn, no load: parameters and inertias alone."""
+        """Point without motion, rotation or load: only parameters and inertias."""
         inputs = {}
         for port in kernel.inputs:
             drawn = self.draw(port, kernel, numbers, n)
@@ -188,7 +188,7 @@ def _law_kind(kernel: KernelIR) -> tuple[str, ...]:
 
 
 def _law_parameters(length: int, numbers: random.Random) -> Numbers:
-    """Positive numbers; friction (3..6) and limits (7, 8) of the full law in order."""
+    """Positive numbers; friction (3..6) and limits (7, 8) of the full law are ordered."""
     p = [numbers.uniform(0.2, 2.0) for _ in range(length)]
     if length == 11:
         p[7:9] = [-0.5, 0.75]

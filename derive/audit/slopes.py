@@ -1,4 +1,4 @@
-"""Differentiated kernels against difference quotients of the kernels themselves, in many digits."""
+"""Check differentiated kernels against difference quotients in multiple precision."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .evaluate import evaluate
 from .samples import Source
 
 _DIGITS, _STEP = 60, mpmath.mpf(10) ** -20
-#: Names of derivatives begin, and names of the kernels that give them end.
+#: Prefix of derivative ports, and suffix of differentiated kernels.
 _PREFIX, _SUFFIX, _SIZE = "d_", "_slope", 3
 
 
@@ -50,7 +50,7 @@ def _error(kernel: KernelIR, base: KernelIR, source: Source) -> float:
 
 
 def _moved(base: KernelIR, inputs: Mapping[str, Any], step: Any, n: int | None) -> dict[str, Any]:
-    """The kernel a step along the direction."""
+    """Evaluate the kernel one step along the direction."""
     moved = {}
     for port in base.inputs:
         ways = inputs.get(_PREFIX + port.name, [0] * len(inputs[port.name]))

@@ -1,8 +1,8 @@
-"""Refuses definitions whose branches do not meet as mechanics needs.
+"""Reject definitions whose branches are discontinuous where mechanics requires continuity.
 
 A hinge's position, rotation and motion subspace must be continuous: where the slope of a position
 jumped, the velocities of the bodies would, which is an impulse that no hinge carries.  A potential
-must be continuous, or energy would appear from nothing.  Second derivatives and forces may jump.
+must be continuous, or a jump would create energy.  Second derivatives and forces may jump.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from ..language.switches import crossings, switches
 from .evaluate_equations import Undefined, evaluate_matrix
 
 _DIGITS = 40
-#: Distance from the place where branches meet at which both are looked at.
+#: Distance from the switching point at which both branches are evaluated.
 _BESIDE = mpmath.mpf(10) ** -15
-#: Largest difference, relative, between both sides of something continuous.
+#: Largest relative difference between both sides of a continuous quantity.
 _CONTINUOUS = 1e-9
-#: Values of a variable between which a change of sign is looked for.
+#: Number of samples of a variable in the search for sign changes.
 _SAMPLES = 41
 
 Range = tuple[float, float]
@@ -36,12 +36,12 @@ def refuse_jumps(
     points: Iterable[Mapping[sp.Symbol, float]],
     why: str,
 ) -> None:
-    """ElementError if one of the named matrices jumps where a branch takes over.
+    """Raise ElementError if one of the named matrices jumps where the branch changes.
 
     Args:
         expressions: name -> matrix in the symbols of the points.
-        along: the variables and the range in which each is moved, the others held at a point.
-        why: what is wrong with a jump, for the message.
+        along: the variables and the range in which each varies, the others fixed at a point.
+        why: consequence of a jump and its remedy, for the message.
     """
     found = list(switches(expressions.values()))
     if not found:
@@ -85,7 +85,7 @@ def _refuse_jump(
                 continue
         raise ElementError(
             f"{where}: {what} jumps at {_written(symbol)} = {_number(place[symbol])}, where "
-            f"{_written(node):.80} takes another branch: {why}"
+            f"{_written(node):.80} switches branches: {why}"
         )
 
 
@@ -94,7 +94,7 @@ def _number(x: mpmath.mpf) -> str:
 
 
 def _written(expression: sp.Basic) -> str:
-    """An expression on one line as its author wrote it: q.angle, not q_angle."""
+    """Expression on one line in the author's notation: q.angle, not q_angle."""
     return re.sub(r"\b([qup])_", r"\1.", " ".join(str(expression).split()))
 
 

@@ -1,4 +1,4 @@
-"""Dimensions of SymPy expressions: whether the units of a definition fit together."""
+"""Dimensions of SymPy expressions, to check the units of a definition."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def dimension(unit: str) -> Dimension:
         match = _FACTOR.fullmatch(part)
         if match is None or match[1] not in _UNITS:
             raise ElementError(
-                f"unit {unit!r}: {part!r} is not known; use m, kg, s, rad, N, J, W, Pa, Hz"
+                f"unit {unit!r}: unknown unit {part!r}; use m, kg, s, rad, N, J, W, Pa, Hz"
             )
         power = int(match[2] or 1) * (1 if above else -1)
         total = [t + power * e for t, e in zip(total, _UNITS[match[1]], strict=True)]
@@ -52,11 +52,11 @@ def text(dimensions: Dimension) -> str:
 
 
 class Misfit(Exception):
-    """A sum or function whose operands do not fit; the message names them."""
+    """A sum or function whose operands have incompatible dimensions; the message names them."""
 
 
 def dimension_of(expression: sp.Expr, known: Mapping[sp.Basic, Dimension]) -> Dimension | None:
-    """Dimension of an expression; None for zero, which fits everything.  Raises Misfit."""
+    """Dimension of an expression; None for zero, which has any dimension.  Raises Misfit."""
     if expression == 0:
         return None
     if expression.is_number:
@@ -84,7 +84,9 @@ def dimension_of(expression: sp.Expr, known: Mapping[sp.Basic, Dimension]) -> Di
     for argument in expression.args:
         found = dimension_of(argument, known)
         if found not in (None, _NONE):
-            raise Misfit(f"{expression.func}({argument}) takes a pure number, found {text(found)}")
+            raise Misfit(
+                f"{expression.func}({argument}) expects a pure number, found {text(found)}"
+            )
     return _NONE
 
 

@@ -1,4 +1,4 @@
-"""Which classical transfer matrices there are, and how they are lowered.
+"""Catalogue of the classical transfer matrices and their guards.
 
 `CLASSICAL` names them all, those of the discrete-time form included; `classical_guards` are the
 pivot guards to lower them with.
@@ -36,9 +36,8 @@ CLASSICAL: dict[str, Callable[[], Derivation]] = {
     **FLEXIBLE,
 }
 
-#: Those of which a run multiplies the matrices: of `sweep = "product"`, and of the discrete-time
-#: method.  They are generated and compiled; the others are derived when somebody shows or checks
-#: them.
+#: Elements whose matrices a run multiplies, for `sweep = "product"` and for the discrete-time
+#: method.  They are generated and compiled; the others are derived on demand.
 RUN = ("body_spatial", "pin_spatial", "ball", "acceleration", *STEPPED)
 
 

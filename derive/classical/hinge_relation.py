@@ -28,9 +28,9 @@ VANISHING_PIVOT = 2
 
 @dataclass(frozen=True)
 class HingeStatement:
-    """What one classical hinge states; everything else follows by elimination.
+    """Premises of one classical hinge; elimination gives everything else.
 
-    `premises` give the state behind the hinge (end O) from the state before it (end I) and the
+    `premises` give the outboard state (end O) from the inboard state (end I) and the
     free accelerations; `conditions` are the next hinge's equations for m and q at the output end N
     of the outboard body; `bias` are definitions that the premises use.
     """

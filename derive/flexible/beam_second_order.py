@@ -1,4 +1,4 @@
-"""Euler-Bernoulli beam: what its fields displace and turn to second order.
+"""Euler-Bernoulli beam: second-order displacements and rotations of its fields.
 
 Modal coordinates measure strain: s', psi', w'' and v'' are those of the bent and twisted rod and
 not of its linear part alone, so that the strain energy is 1/2 eta^T K eta to third order and all
@@ -56,7 +56,7 @@ def _both(pair: tuple[Quantity, Quantity]) -> Matrix:
 
 
 def _second(field: Matrix) -> Matrix:
-    """What a field in powers of `size` holds of its square."""
+    """Coefficient of the square of `size` in a field."""
     return Matrix(field.applyfunc(lambda e: sp.expand(e).coeff(_SIZE, 2)))
 
 

@@ -6,8 +6,9 @@ T(-Psi) Psid in the frame's, T(Psi) = 1 - b Psi~ + c Psi~ Psi~.  The even functi
 
     a = sin t / t,   b = (1 - cos t) / t^2,   c = (t - sin t) / t^3,    t^2 = s = Psi . Psi
 
-are taken as their series in s, which at the largest rotation that is accepted are exact to
-rounding; so there is no case of small angles, and a bending plane folds to plain sines and cosines.
+are evaluated by their series in s, which are exact to rounding up to the largest accepted
+rotation.  There is therefore no special case of small angles, and a bending plane folds to plain
+sines and cosines.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Entries that are computed alike, as a loop over pairs of them: less code, two numbers at a time.
+"""Vector loops over output entries with equal computations, two entries at a time.
 
-A straight-line kernel may say the same for every entry along an axis of an output: for each of the
-six components of a load, say.  Such entries are found to be copies of the first that move in
-arrays by one place, or it is an error to ask for this; they are printed once, in GNU C vectors of
-two.  What is the same for all of them stands before the loop.  Every operation is the kernel's own,
-so that the numbers are those of the straight line.
+A straight-line kernel may repeat one computation for every entry along an axis of an output, such
+as the six components of a load.  The entries must be copies of the first whose operands move by one
+entry in their arrays; otherwise the request is an error.  They are printed once, in GNU C vectors
+of two.  Values shared by all entries come before the loop.  Operations are unchanged, so that
+results equal those of the straight line.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from mstmm.ir import (
 )
 
 #: (element, kernel) -> (output, axis along which its entries are alike), in the order in which they
-#: are computed; what an output holds is read from there by those behind it.
+#: are computed; later outputs read the values of earlier ones.
 ALIKE: dict[tuple[str, str], tuple[tuple[str, int], ...]] = {
     ("frames", "tangent_carry"): (("T", 1), ("S_I", 0)),
     ("frames", "tangent_known"): (("e_S", 0), ("e_b", 0)),
@@ -32,14 +32,15 @@ ALIKE: dict[tuple[str, str], tuple[tuple[str, int], ...]] = {
     **{(f"generic{n}", "tangent_reduce"): (("gain", 1), ("V", 1), ("S", 1)) for n in range(1, 7)},
 }
 
-#: What a lane's value is: the same operand in every lane, or that of each lane in turn.
+#: Operand of each lane.
 _Lanes = tuple[Operand, ...]
 
 
 @dataclass(frozen=True)
 class Value:
-    """A number of every lane: `op` over `args`, or (no op) the entry of a port at `place`, which
-    moves along `axis`."""
+    """Value in every lane: `op` of `args`, or without `op` the entry `place` of a port.
+
+    The entry moves along `axis` from lane to lane."""
 
     number: int
     op: str
@@ -50,7 +51,7 @@ class Value:
 
 @dataclass
 class Loop:
-    """Entries of `port` along `axis`: what is shared, values in order, what is stored where."""
+    """Loop over entries of `port` along `axis`: shared temporaries, values in order, stores."""
 
     port: Port
     axis: int
@@ -60,7 +61,7 @@ class Loop:
 
     @property
     def taken_off(self) -> dict[int, Value]:
-        """Values that are but added to the port and are the opposite of another: which one."""
+        """Negated values that are only added to the port, with the value to subtract instead."""
         used = {a.number for v in self.values for a in v.args if isinstance(a, Value)}
         added = (v for _, v in self.stores) if self.port.accumulate else ()
         return {
@@ -79,11 +80,13 @@ class Loop:
 
 
 class Alike:
-    """The loops of one kernel, and the statements behind them."""
+    """Vector loops of one kernel, and the remaining stores."""
 
     def __init__(self, kernel: KernelIR, asked: Sequence[tuple[str, int]]) -> None:
         if kernel.size_symbol is not None:
-            raise ValueError(f"{kernel.name}: a kernel of run-time size has loops of its own")
+            raise ValueError(
+                f"{kernel.name}: expected a fixed size, found a kernel of run-time size"
+            )
         self.kernel = kernel
         self.assigned = {s.number: s for s in kernel.statements if isinstance(s, Assign)}
         self.ports = {port.name: port for port in kernel.outputs}
@@ -96,7 +99,7 @@ class Alike:
         self.others = [s for s in others if isinstance(s, Store) and s.port not in looped]
 
     def needed(self, operands: Sequence[Operand]) -> list[Assign]:
-        """What operands of the straight line are made of, in its order, kept outputs aside."""
+        """Assignments needed for `operands`, in kernel order, except values read from outputs."""
         found: set[int] = set()
         stack = list(operands)
         while stack:
@@ -109,7 +112,7 @@ class Alike:
         return [s for number, s in self.assigned.items() if number in found]
 
     def read(self, operand: Operand) -> Operand:
-        """The entry of an output where an operand is kept."""
+        """Output entry that stores an operand, or the operand."""
         return self.kept.get(operand, operand)
 
     def _loop(self, port: Port, axis: int) -> Loop:
@@ -132,7 +135,7 @@ class Alike:
 
 
 class _Builder:
-    """One loop as it grows."""
+    """Builder of one vector loop."""
 
     def __init__(self, whole: Alike, loop: Loop) -> None:
         self.whole, self.loop = whole, loop
@@ -149,7 +152,7 @@ class _Builder:
         return ValueError(f"{self.whole.kernel.name}: {text}")
 
     def value(self, lanes: _Lanes) -> Value | Operand:
-        """What these operands, one a lane, are."""
+        """Value of the operands, one per lane."""
         if all(lane == lanes[0] for lane in lanes):
             return self.shared(lanes[0])
         found = self.known.get(lanes)
@@ -180,7 +183,7 @@ class _Builder:
         return Value(len(self.loop.values), self.whole.assigned[first.number].op, args)
 
     def _args(self, first: Operand, other: Operand, k: int) -> tuple[Operand, ...]:
-        """Operands of lane k in the order of those of the first."""
+        """Operands of lane k, in the order of those of the first lane."""
         assert isinstance(first, Temporary) and isinstance(other, Temporary)
         mine, others = (self.whole.assigned[o.number].args for o in (first, other))
         if all(self.alike(a, b, k) for a, b in zip(mine, others, strict=True)):
@@ -188,7 +191,7 @@ class _Builder:
         return others[::-1]
 
     def alike(self, first: Operand, other: Operand, k: int) -> bool:
-        """Whether an operand of lane k is made as that of the first lane is."""
+        """Whether an operand of lane k has the same computation as in the first lane."""
         key = first, other, k
         if key not in self.like:
             self.like[key] = first == other or self._alike(first, other, k)
@@ -217,7 +220,7 @@ class _Builder:
 
 
 def _moves(places: Sequence[Operand | None]) -> int | None:
-    """The axis along which entries of a port move by one from lane to lane (None: not known)."""
+    """The axis along which entries of a port move by one from lane to lane (None: no such axis)."""
     first = places[0]
     if not isinstance(first, Element):
         return None

@@ -1,7 +1,7 @@
-"""Kernels called by the names of their ports: C that cannot mistake the order of arguments.
+"""C calls of kernels with named arguments, which exclude errors of argument order.
 
 For each kernel that the engine's C calls there is a struct of its arrays, by their names, and an
-inline function that hands them on in the kernel's own order; a macro makes a call of both:
+inline function that passes them in the kernel's order; a macro combines both:
 
     mstmm_frames_pose(.A_I = ..., .x_I = ..., .Rc = ..., .r = ..., .A = ..., .x = ...);
 """
@@ -43,7 +43,7 @@ DIRECT = {
     },
 }  # fmt: skip
 #: Kernels that a record points to: short name -> (element that has the same ports, kernels).  The
-#: names of a law's two kinds are those of the kernels they look like.
+#: two kinds of laws have the ports of the named kernels.
 POINTED = {
     "hinge": (
         ("hinge", "pin"),
@@ -72,8 +72,8 @@ POINTED = {
         ("sweep", "link_pin"), {k: k for k in ("turn", "forward", "condense", "recover")},
     ),
 }  # fmt: skip
-#: Largest number of speeds of a hinge, and the kernels that there are for every number, or for
-#: every number but none.
+#: Largest number of speeds of a hinge, and the kernels that exist for every number of speeds (some
+#: not for zero).
 MOST_SPEEDS = 6
 GENERIC = (
     "forward", "condense", "recover", "effort", "exerted", "project", "factor", "push",
@@ -88,7 +88,7 @@ GENERIC = (
 
 @dataclass(frozen=True)
 class Callee:
-    """A kernel as C calls it: `name` after "mstmm_"; `kernel` has its ports, the widest there is.
+    """A kernel as C calls it: `name` after "mstmm_"; `kernel` is the variant with the widest ports.
 
     `by`: "name" for a function, "speeds" for a table by numbers of speeds, "pointer".
     """
@@ -139,7 +139,7 @@ def _kernel(spec: ElementSpec, name: str) -> KernelIR:
 
 
 def _same_ports(kernels: Sequence[KernelIR]) -> None:
-    """ValueError unless all have the same ports in the same order."""
+    """Raise ValueError unless all kernels have the same ports in the same order."""
     ports = {tuple(port.name for port in (*k.inputs, *k.outputs)) for k in kernels}
     if len(ports) != 1:
         raise ValueError(f"{kernels[0].name}: not every element has the same ports: {ports}")
@@ -162,7 +162,7 @@ def calls_header(specs: Specs) -> str:
 
 
 def tables(specs: Specs, wanted: Collection[str] | None = None) -> str:
-    """C of the tables by numbers of speeds, all or those of the callees that are wanted."""
+    """C tables of kernels by number of speeds, for all callees or those named in `wanted`."""
     lines = []
     for callee in callees(specs).values():
         if callee.by != "speeds" or (wanted is not None and callee.name not in wanted):
@@ -219,7 +219,7 @@ def _type(port: str, inputs: Collection[str], plain: Collection[str]) -> str:
 
 
 def _arrays(name: str, callee: Callee) -> str:
-    """The same arrays in the order in which a tape takes them."""
+    """C function that collects the arrays in the order of a tape."""
     fields = callee.fields
     lines = [
         f"    inputs[{i}] = to.{fields[port.name]};" for i, port in enumerate(callee.kernel.inputs)

@@ -1,9 +1,9 @@
-"""The tangent's elimination in complex numbers: the same kernels and passes, printed once more.
+"""C text of the tangent's elimination in complex arithmetic, from the same kernels and passes.
 
 A number there is one of several frequencies at a time (runtime/engine/c/complex_lanes.h).  Under
-harmonic pushes the unknowns are complex amplitudes.  What bodies bring is linear in s^2, s and 1
-and is put together in plain numbers once a state; what is printed here runs for every s.  Ports
-that no s changes keep the plain type, so that products with them cost half.
+harmonic loads the unknowns are complex amplitudes.  Contributions of bodies are linear in s^2, s
+and 1 and are computed once per state in real numbers; the text printed here runs for every s.
+Ports independent of s keep the real type, which halves the cost of products with them.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .sweep import function_text, signature
 PASSES: tuple[Pass, ...] = (TANGENT_ELIMINATED, TANGENT_COLUMN, TANGENT_CARRIED, TANGENT_ANSWERED)
 #: Ports of rotations, places, velocities and subspaces of the state.
 PLAIN = frozenset({"Rc", "r", "w_I", "v", "w", "H"})
-#: Variables that point to numbers of the state, and slots of the tangent that are such.
+#: Variables that point to the state's numbers, and tangent slots stored there.
 _STATE = re.compile(r"\breal \*(?=(?:block|parent|laid|modes)\b)")
 _HELD = {
     "tangent + MSTMM_TANGENT_H(": "state->tangents->held + body->tangent + MSTMM_TANGENT_H(",
@@ -39,7 +39,7 @@ _NAMES = re.compile(
     r"(?=(?:state|fail|judged|solve_lu|set_zero|(?:at|sweep|generic|frames|tangent|modal)_\w+)\b)"
 )
 
-#: Numbers that begin at zero, and what is added to others.
+#: Zero initialisations, and additions to other values.
 _ZERO = re.compile(r"((?:mstmm_complex t\d+|\]) = |^ +: )0;", re.MULTILINE)
 _OWN = re.compile(
     r"^(?=int mstmm_complex_\w+(?<!_sized)\(|mstmm_complex_\w+_kernel \*const)", re.MULTILINE
@@ -48,7 +48,7 @@ _ADDED = re.compile(r"^( *)(\S.*) ([+-])= (.*);$", re.MULTILINE)
 
 
 def _called(specs: Specs) -> dict[str, Callee]:
-    """The kernels that the passes call, by "element.kernel"."""
+    """Kernels that the passes call, by "element.kernel"."""
     known = callees(specs)
     steps = (part for whole in PASSES for step in whole.steps for part in inner(step))
     names = (step.kernel.replace("{free}", "") for step in steps if isinstance(step, Call))
@@ -56,7 +56,7 @@ def _called(specs: Specs) -> dict[str, Callee]:
 
 
 def complex_kernels(specs: Specs) -> Iterator[tuple[ElementSpec, KernelIR]]:
-    """The kernels behind them, of hinges for every number of speeds."""
+    """Kernels of the complex passes, for hinges at every number of speeds."""
     for name in _called(specs):
         element, _, kernel = name.partition(".")
         keys = [DIRECT[element]] if element in DIRECT else [
@@ -67,7 +67,7 @@ def complex_kernels(specs: Specs) -> Iterator[tuple[ElementSpec, KernelIR]]:
 
 
 def complex_passes(specs: Specs) -> str:
-    """Calls by the names of ports, and the passes, in the words of the engine's own."""
+    """C text of the named calls and of the passes, in real notation."""
     found = _called(specs)
     wanted = {callee.name for callee in found.values()}
     parts = [caller(callee, PLAIN) for callee in found.values()]
@@ -77,7 +77,7 @@ def complex_passes(specs: Specs) -> str:
 
 
 def in_complex(text: str) -> str:
-    """C of the real elimination, with the types and names of the complex one."""
+    """Convert C text of the real elimination to complex types and names."""
     for plain, held in _HELD.items():
         text = text.replace(plain, held)
     text = _STATE.sub(f"{REAL} *", text)

@@ -45,12 +45,12 @@ _TRAITS = {
 }  # fmt: skip
 
 
-#: Those that are others in a plane.
+#: Traits with another condition for planar scenes.
 _FLAT = {"aside": "body->aside", "idle": "body->idle"}
 
 
 def condition(when: str, flat: bool = False) -> str:
-    """C expression of a condition.  ValueError for one that the looped engine does not know."""
+    """C expression of a condition.  Raises ValueError for an unknown condition."""
     words = []
     for word in when.split():
         text = _trait(word, flat)
@@ -63,7 +63,7 @@ def condition(when: str, flat: bool = False) -> str:
 
 
 def condition_needs(when: str, flat: bool = False) -> set[str]:
-    """Variables that it reads."""
+    """Variables that a condition reads."""
     texts = [_trait(word, flat) for word in when.split()]
     return {name for name in variables(flat) for text in texts if reads(text, name)}
 
@@ -72,5 +72,5 @@ def _trait(word: str, flat: bool) -> str:
     trait = word.lstrip("!")
     found = (_FLAT.get(trait) if flat else None) or _TRAITS.get(trait)
     if found is None:
-        raise ValueError(f"no condition {word!r}; there are {', '.join(_TRAITS)}")
+        raise ValueError(f"unknown condition {word!r}; expected one of {', '.join(_TRAITS)}")
     return found

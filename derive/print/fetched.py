@@ -1,4 +1,4 @@
-"""What a pass reads and writes of a body, asked for from memory before the body is met."""
+"""Prefetching of the data that a pass reads and writes of a body."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from .storage import BLOCK, PER_SPEED, SHARED, TANGENT, VARIABLES, place, reads,
 
 _NAMED = ("to", "source", "free", "imposed")
 _VARIABLES = ("block", "d_block", "tangent", "nu", "nq")
-#: Steps that few bodies of a scene take part in.
+#: Traits of steps that concern few bodies of a scene.
 _RARE = {
     **dict.fromkeys(
         ("modal", "section", "outward", "placed", "drag", "imposed", "parts", "curved"), True
     ),
     "directed": False,
 }
-#: Numbers of the scene that passes read of a body, side by side (runtime/pack/records/bodies.py).
+#: Scene data that passes read of a body, stored contiguously (runtime/pack/records/bodies.py).
 _GIVEN = ("connection.R", "body.rotor", "hinge.p", "body.p")
 _FIRST = ("body->connection", "body->rotor", "body->hinge_p", "body->body_p")
 _LAST = ("body->rotor", "body->hinge_p", "body->body_p", "body->body_p + MSTMM_RIGID_NUMBERS")
-#: Gaps of fewer numbers are as good as none: memory comes in lines of eight.
+#: Largest gap that is fetched as well: a cache line holds eight numbers.
 _LINE = 8
 
 
 @dataclass(frozen=True)
 class _Stretch:
-    """Numbers side by side, `begin` to `end` for a hinge of one speed, and as C expressions."""
+    """Contiguous numbers, `begin` to `end` for a hinge of one speed, and as C expressions."""
 
     variable: str
     begin: int
@@ -41,8 +41,9 @@ class _Stretch:
 
 
 def fetching(name: str, passes: Iterable[Pass]) -> str:
-    """C of a function that asks for what the passes need of body `index`; "" for nothing, and in a
-    plane, where little enough is kept of a body that it comes by itself."""
+    """C function that prefetches the data of body `index` for the passes; "" if none.
+
+    Planar passes need none: the data of a body are small enough for the hardware prefetcher."""
     passes = [whole for whole in passes if not whole.flat]
     slots = {slot for whole in passes if whole.subject == "body" for slot in _slots(whole)}
     stretches = _merged(stretch for slot in slots if (stretch := _stretch(slot)))
@@ -82,7 +83,7 @@ def _slots_of(step: Step) -> Iterator[str]:
 
 
 def _stretch(slot: str) -> _Stretch | None:
-    """Where a slot of the body's own lies; None for what lies elsewhere."""
+    """Memory range of a slot of the body itself; None for other slots."""
     name = slot.partition("[")[0]
     own = name.removeprefix(D)
     begin = _PLACES.get(SHARED.get(own, own))
@@ -96,7 +97,7 @@ def _stretch(slot: str) -> _Stretch | None:
 
 
 def _merged(stretches: Iterable[_Stretch]) -> list[_Stretch]:
-    """Those with little or nothing between them as one."""
+    """Merge stretches separated by small gaps."""
     found: list[_Stretch] = []
     for one in sorted(stretches, key=astuple):
         before = found[-1] if found else None
@@ -108,7 +109,7 @@ def _merged(stretches: Iterable[_Stretch]) -> list[_Stretch]:
 
 
 def _laid(layouts: Iterable[Iterable[tuple[str, int]]]) -> dict[str, int]:
-    """Where each slot begins in its layout, for a hinge of one speed."""
+    """Offset of each slot in its layout, for a hinge of one speed."""
     found: dict[str, int] = {}
     for layout in layouts:
         at = 0

@@ -1,25 +1,25 @@
-"""What the looped engine keeps of bodies in a plane, where it lies, and C that reads it."""
+"""Storage of planar bodies in the looped engine, and C expressions that read it."""
 
 from __future__ import annotations
 
 from ..schedule.words import ROLES
 
-#: Numbers of a body of a scene in a plane, in their order: slot -> (name in C, how many).  What is
-#: read of the frame of a hinge that closes a loop comes first.
+#: Numbers of a body of a scene in a plane, in their order: slot -> (name in C, how many).  Data
+#: read of the frame of a cut hinge come first.
 _BLOCK = {
     "body.A": ("A", 2), "body.x": ("X", 3), "body.v": ("V", 2), "body.motion": ("MOTION", 4),
     "body.S": ("S", 6), "body.e": ("E", 3), "body.R": ("R", 2), "body.tau": ("TAU", 1),
     "body.delta": ("DELTA", 3), "hinge.F": ("F", 1), "hinge.g": ("OFFSET", 1),
     "hinge.G": ("GAIN", 3),
 }  # fmt: skip
-#: What closes a loop has its numbers where its frame, without mass, has none: slot -> where.
+#: Cut hinges use the storage of their massless frame that is unused otherwise: slot -> name.
 _OF_CLOSURE = {"closure.J_A": "S", "closure.J_B": "S + 3", "closure.l": "DELTA"}
-#: And what its record gives of it.
+#: Data from the record of a body: slot -> (name in C, how many).
 _GIVEN = {
     "connection.R": ("TURN", 2), "connection.r": ("SHIFT", 3), "body.rotor": ("ROTOR", 1),
     "body.floor": ("FLOOR", 1), "body.p": ("P", 4),
 }  # fmt: skip
-#: Those that are others in a plane, where a body and its closed loops have one record.
+#: Variables with another declaration for planar scenes, where body and loops share one record.
 FLAT_VARIABLES: dict[str, tuple[str, tuple[str, ...]]] = {
     "body": ("const mstmm_flat_body *body = &state->model->flat[{body}];", ()),
     "block": ("real *block = mstmm_flat_block(state, {body});", ("body",)),
@@ -38,7 +38,7 @@ FLAT_VARIABLES: dict[str, tuple[str, tuple[str, ...]]] = {
 
 
 def flat_place(slot: str) -> str | None:
-    """Where a slot of a body in a plane lies."""
+    """C expression of a slot of a planar body; None if it has none."""
     owner, _, name = slot.partition(".")
     if slot in _GIVEN:
         return f"body->given + MSTMM_GIVEN_{_GIVEN[slot][0]}"
@@ -54,7 +54,7 @@ def flat_place(slot: str) -> str | None:
 
 
 def flat_layout() -> list[str]:
-    """Constants of where they begin, and of how many there are."""
+    """C constants of the offsets and sizes of the planar layouts."""
     lines = []
     for total, layout in (("FLAT", _BLOCK), ("GIVEN", _GIVEN)):
         at = 0

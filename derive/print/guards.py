@@ -1,8 +1,8 @@
-"""Guards of a straight line in C: judged as they come, and what they come to.
+"""C text of the guards of a straight-line kernel.
 
-Nothing depends on a guard, and a branch would only stand in the way of what comes behind it; so it
-is counted on the way how many hold before the first that does not.  In lanes guards are judged in
-the end.
+No later statement depends on a guard, and a branch would only hinder optimisation of the code after
+it.  The function therefore counts how many guards hold before the first failure.  In lanes the
+guards are evaluated at the end.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from mstmm.ir import Guard
 
 from .straight_line import StraightText
 
-#: C name of two numbers: whether every guard held so far, and how many did before one did not.
+#: C name of two numbers: whether all guards hold so far, and how many held before a failure.
 GUARDS = "guards"
 
 
@@ -22,15 +22,15 @@ class Guards:
         self._text, self._found = text, list[tuple[str, int]]()
         self.in_lanes = text.dialect.vector
         some = any(isinstance(s, Guard) for s in text.kernel.statements)
-        #: Whether they are counted on the way, in GUARDS.
+        #: Whether GUARDS counts them during evaluation.
         self.counted = some and not self.in_lanes
 
     def begun(self) -> list[str]:
-        """Before the first."""
+        """Lines before the first guard."""
         return [f"int {GUARDS}[2] = {{1, 0}};"] if self.counted else []
 
     def judged(self, guard: Guard) -> list[str]:
-        """One of them; counting waits for the first of another code."""
+        """Lines of one guard; the count is updated at the next different code."""
         truth, earlier = self._text.truth(guard.condition), self._found[-1:]
         self._found.append((truth, guard.code))
         if self.in_lanes:
@@ -39,7 +39,7 @@ class Guards:
         return [f"{GUARDS}[1] += {GUARDS}[0];"] * counted + [f"{GUARDS}[0] &= {truth};"]
 
     def verdict(self) -> list[str]:
-        """Behind the last: the function's result."""
+        """Lines after the last guard, which return the function's result."""
         if self.in_lanes:
             return self._of_lanes()
         if not self._found:

@@ -37,9 +37,9 @@ _COMPLEX = {
 
 
 def literal(text: str) -> str:
-    """C text of a constant ("3", "-1/3", "pi"): exact where a double is, else correctly rounded.
+    """C text of a constant ("3", "-1/3", "pi"): exact if a double is exact, else correctly rounded.
 
-    A quotient of two whole numbers that a double holds is left to the C compiler to divide.
+    The C compiler divides a quotient of two integers that doubles represent exactly.
     """
     if text == "pi":
         return "MSTMM_PI"
@@ -54,7 +54,7 @@ def literal(text: str) -> str:
 
 
 def solver(solve: Solve) -> str:
-    """The template with the C function, mstmm_ and this, that solves."""
+    """Name of the solver template; its C function is mstmm_ plus this name."""
     return "solve_ldl" if solve.symmetric else "solve_lu"
 
 
@@ -68,7 +68,7 @@ def string(text: str) -> str:
 
 
 def comment(text: str) -> str:
-    """Text that can stand inside a C comment on one line."""
+    """Text that is safe inside a C comment on one line."""
     return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *").rstrip("\\ ")
 
 
@@ -94,13 +94,13 @@ class KernelText:
         self._complex = bool(plain)
 
     def statements(self) -> list[dict[str, Any]]:
-        """One dictionary a statement; its `kind` is assign, sum, store, guard, solve or alike."""
+        """One dictionary per statement; its `kind` is assign, sum, store, guard, solve or alike."""
         if self.alike is not None:
             return self._loops(self.alike)
         return [self._statement(statement) for statement in self.kernel.statements]
 
     def _loops(self, alike: Alike) -> list[dict[str, Any]]:
-        """Loops over what is alike, each behind what its entries share; last what is not."""
+        """Vector loops, each after its shared values, then the remaining stores."""
         found: list[dict[str, Any]] = []
         known: set[int] = set()
 
@@ -119,8 +119,10 @@ class KernelText:
         return found
 
     def _loop(self, loop: Loop) -> list[str]:
-        """A pair of entries at a time; of an odd number the last comes with the one before it once
-        more, or with itself where they are added to the port."""
+        """C lines of one loop over pairs of entries.
+
+        For an odd count the last pair repeats the entry before it, or, if the port accumulates,
+        consists of the last entry twice."""
         port, last = self.ports[loop.port.name], loop.count - 1
         odd = loop.count % 2 == 1 and port.accumulate
         lines = [f"for (int k = 0; k < {loop.count}; k += 2) {{"]
@@ -150,7 +152,7 @@ class KernelText:
         return [*lines, *(f"    {line}" for line in second), "}"]
 
     def _pair(self, value: Value, odd: bool) -> str:
-        """A value of two neighbouring entries."""
+        """C expression of a value for two neighbouring entries."""
         if value.place is not None:
             port = self.ports[value.place.port]
             index = tuple(int(entry) for entry in value.place.index)
@@ -163,7 +165,7 @@ class KernelText:
         return OPERATIONS[value.op].c.format(*words)
 
     def _moving(self, port: Port, index: tuple[int, ...], axis: int) -> tuple[str, int]:
-        """Pointer to the entry of the loop's k, and how far it is to the next one's."""
+        """Pointer to the entry of the loop's k, and the distance to the next entry."""
         stride = port.offset((*index[:axis], index[axis] + 1, *index[axis + 1 :]))
         stride -= port.offset(index)
         moved = f"{stride} * k" if stride != 1 else "k"
@@ -240,7 +242,7 @@ class KernelText:
         )  # fmt: skip
 
     def _complex_assign(self, assign: Assign) -> dict[str, Any]:
-        """An operation on complex numbers, or on one and a plain one, by a function."""
+        """Operation on complex numbers, or on a complex and a real one, as a function call."""
         self._plain_numbers.discard(assign.number)
         if assign.op == "mul" and any(self._all_plain([a]) for a in assign.args):
             args = sorted(assign.args, key=lambda a: not self._all_plain([a]))
@@ -298,7 +300,7 @@ class KernelText:
 
 
 def _place(port: Port, index: tuple[int | str, ...]) -> str:
-    """Row-major place of an entry as C text; `n` and `k` where the shape or the index has them."""
+    """Row-major offset of an entry as C text, with `n` and `k` of the shape or the index."""
     terms: list[str] = []
     fixed = 0
     for axis, entry in enumerate(index):

@@ -10,21 +10,21 @@ from .conditions import condition
 from .fetched import fetching
 from .tiles import Chained, Tiled, tiled
 
-#: How many subjects a scene has.
+#: Number of subjects of a pass in a scene.
 _COUNTS = {
     "body": "n_bodies", "law": "n_laws", "load": "n_loads", "force": "n_forces",
     "drive": "n_drives", "speed": "nu", "row": "n_rows",
     "coupling": "n_couplings", "closure": "n_closures",
 }  # fmt: skip
-#: The first that a loop meets, where others are met on their way: rows that close on bodies.
+#: First index of a loop, where earlier subjects are visited with the bodies they close on.
 _FIRSTS = {"row": "model->first_ground_row"}
-#: Subjects that stand in the order of bodies: what counts them, how many there are, the last body
-#: that one is about.
+#: Subjects in the order of bodies: counter, number of subjects, and the last body that a subject
+#: refers to.
 _BEHIND = {
     "law": ("law", "n_laws", "model->laws[law].body"),
     "closure": ("loop", "n_closures", "mstmm_last_of(model, loop)"),
 }
-#: Laws of the bodies that a tile begins: they stand in the order of bodies.
+#: Laws of the bodies that a tile begins, in the order of bodies.
 _LAWS = """\
         const int behind = law;
         while (law > 0 && model->laws[law - 1].body >= least) law--;
@@ -32,7 +32,7 @@ _LAWS = """\
 
 
 def loops() -> list[str]:
-    """C of every loop, and behind them of every sweep."""
+    """C functions of every loop, followed by those of every sweep."""
     groups = [tiled(sweep) for sweep in SWEEPS]
     runs = [run for parts in groups for part in parts for run in _singly(part)]
     singly = {run.whole.name: run.whole for run in runs if run.whole}
@@ -45,14 +45,14 @@ def loops() -> list[str]:
 
 
 def _singly(part: Run | Tiled | Chained) -> Iterable[Run]:
-    """Runs that have a loop of their own."""
+    """Runs that need a separate loop."""
     if isinstance(part, Run):
         return [part]
     return part.runs if part.hindrances else []
 
 
 def _loop(whole: Pass) -> str:
-    """All subjects of a pass in its order."""
+    """C function that runs a pass for all subjects, in its order."""
     at, fetches = _at(whole), ""
     if whole.spares_links:
         text = (
@@ -77,7 +77,7 @@ def _loop(whole: Pass) -> str:
 
 
 def _at(whole: Pass, declared: str = "const int ") -> str:
-    """A pass for subject i, failures handed on."""
+    """C call of a pass for subject i, which returns failures."""
     handed = "".join(f", {_handed(slot)}" for slot in whole.given)
     return (
         f"{declared}code = mstmm_at_{whole.name}(state, i{handed});\n"
@@ -86,7 +86,7 @@ def _at(whole: Pass, declared: str = "const int ") -> str:
 
 
 def _handed(slot: str) -> str:
-    """What lies where a slot that the caller hands over usually does."""
+    """C pointer to the usual storage of a slot that the caller passes."""
     _, _, name = slot.partition(".")
     block = "mstmm_block(model, state->workspace, model->bodies[i].parent)"
     return f"{block} + MSTMM_BLOCK_{name.upper()}"
@@ -101,7 +101,7 @@ def _fetched_law(ahead: str) -> str:
 
 
 def _tiles(group: Tiled) -> str:
-    """Tiles of bodies begun and then swept."""
+    """C function that starts and sweeps bodies tile by tile."""
     begun = [run.whole for run in group.begun if run.whole is not None and not run.when]
     of_laws = any(run.whole is not None and run.whole.subject == "law" for run in group.begun)
     name = f"{group.swept.name}_tile"
@@ -125,7 +125,7 @@ def _tiles(group: Tiled) -> str:
 
 
 def _chained(group: Chained) -> str:
-    """Tiles of bodies met by one pass after the other, root to tips."""
+    """C function that runs several passes on each tile of bodies, root to tips."""
     subjects = {whole.subject for whole in group.passes}
     counters = "".join(f", {one[0]} = 0" for name, one in _BEHIND.items() if name in subjects)
     name = f"{group.name}_chain"
@@ -153,7 +153,7 @@ def _chained(group: Chained) -> str:
 
 
 def _behind(whole: Pass, at: str) -> str:
-    """A pass over those subjects of a tile that stand in the order of its bodies."""
+    """C loop of a pass over the subjects of a tile that are in the order of its bodies."""
     counter, count, last = _BEHIND[whole.subject]
     fetched = f"            {_fetched_law('MSTMM_TILE')}" if whole.subject == "law" else ""
     return (
@@ -163,7 +163,7 @@ def _behind(whole: Pass, at: str) -> str:
 
 
 def _begun(run: Run) -> str:
-    """A pass in a tile for what has not been begun yet."""
+    """C loop of a pass over the bodies of a tile that are not started yet."""
     assert run.whole is not None
     indent = " " * 8
     opened, closed = "", ""
@@ -180,7 +180,7 @@ def _begun(run: Run) -> str:
 
 
 def _sweep(sweep: Sweep, parts: list[Run | Tiled | Chained]) -> str:
-    """The passes of a sweep one after the other."""
+    """C function that runs the passes of a sweep in order."""
     lines = ["    int code;"]
     for part in parts:
         if isinstance(part, Run):
@@ -201,7 +201,7 @@ def _sweep(sweep: Sweep, parts: list[Run | Tiled | Chained]) -> str:
 
 
 def _called(run: Run, indent: str) -> list[str]:
-    """A pass over all its subjects, under its condition."""
+    """C lines that run a pass over all its subjects, under its condition."""
     called = f"mstmm_pass_{run.whole.name}" if run.whole else f"mstmm_hook_{run.hook}"
     lines = [f"code = {called}(state);", "if (code) return code;"]
     if run.when:

@@ -1,9 +1,9 @@
-"""A long straight line as several C functions, none of them longer than a compiler likes.
+"""Split a long straight-line function into several C functions, to limit compile time.
 
-What gcc takes for a function grows faster than its length: 4000 statements take 6.3 s in one piece
-and 1.8 s in parts, 52 000 take 70 and 6; and the parts also run quicker (a tree of 25 pins 1.65 us
-in place of 2.02).  Values that one part makes and others read are kept in arrays, whose places are
-used again once all have read them.
+The compile time of gcc grows faster than the length of a function: 4000 statements need 6.3 s in
+one piece and 1.8 s in parts, 52 000 need 70 s and 6 s.  The parts also run faster (a tree of 25
+pins 1.65 us instead of 2.02 us).  Arrays hold the values that one part computes and others read;
+their entries are reused after the last read.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from ..fuse.passes.line import Line, operands
 from .guards import GUARDS, Guards
 from .straight_line import StraightText, port_name, signature
 
-#: Statements of a part, and how long a line stays whole; measured.
+#: Statements per part, and the longest function that is not split; measured.
 SIZE, WHOLE = 1000, 2000
-#: C names: values that cross, truths that do.
+#: C names of the arrays of values and of truth values between parts.
 _KEPT, _TRUTHS = "kept", "truths"
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where values are kept that one part makes (0 is what comes before them) and others read."""
+    """Array indices of the values that one part computes (0: before all parts) and others read."""
 
     made: Mapping[int, int]
     places: Mapping[int, int]
@@ -35,7 +35,7 @@ class Crossing:
 def crossing(
     head: Iterable[int], parts: Sequence[Sequence[Line]], in_the_end: Iterable[int], kind: set[int]
 ) -> Crossing:
-    """Of the temporaries in `kind`; `in_the_end` are read behind all parts."""
+    """Assign indices to the temporaries in `kind`; `in_the_end` are read after all parts."""
     made = dict.fromkeys(head, 0)
     made |= {s.number: k for k, part in enumerate(parts, 1) for s in part if isinstance(s, Assign)}
     last: dict[int, int] = {}
@@ -63,7 +63,7 @@ def reads(statement: Line) -> list[int]:
 
 
 def printed(text: StraightText, statement: Line, guards: Guards) -> list[str]:
-    """One statement of a line."""
+    """C lines of one statement."""
     if isinstance(statement, Assign):
         return text.assign(statement)
     if isinstance(statement, Store):
@@ -72,7 +72,7 @@ def printed(text: StraightText, statement: Line, guards: Guards) -> list[str]:
 
 
 class Parts:
-    """The text of one line in parts, behind lines that make the temporaries `head`.
+    """C text of one straight line in parts, after lines that compute the temporaries `head`.
 
     `functions` are the parts.
     """
@@ -97,8 +97,7 @@ class Parts:
         self.functions = "\n".join(self._function(k, part) for k, part in enumerate(parts, 1))
 
     def calls(self) -> list[str]:
-        """What runs them, in the function that has made `head`; what is read behind them is at hand
-        again."""
+        """C lines that call the parts and reload the values that are read after them."""
         dialect, words = self._text.dialect, ", ".join(self._arguments())
         widths = max(1, self._values.width), max(1, self._truths.width)
         return [
@@ -138,7 +137,7 @@ class Parts:
         return f"{head}\n{{\n{body}\n}}\n"
 
     def _kept(self, numbers: Iterable[int]) -> list[str]:
-        """Lines that keep those temporaries that others read."""
+        """C lines that store the temporaries that other parts read."""
         found = []
         for number in numbers:
             if number in self._values.places:
@@ -148,7 +147,7 @@ class Parts:
         return found
 
     def _recalled(self, numbers: Iterable[int]) -> list[str]:
-        """Temporaries of other parts, by the names that they have there."""
+        """C lines that load temporaries of other parts, under the same names."""
         text, found = self._text, []
         for number in numbers:
             if number in self._values.places:
@@ -157,6 +156,6 @@ class Parts:
             else:
                 place = self._truths.places[number]
                 found.append(f"const {text.dialect.truth} m{number} = {_TRUTHS}[{place}];")
-                found.append(f"(void)m{number};")  # perhaps it is asked for as a number alone
+                found.append(f"(void)m{number};")  # possibly read only as a number
                 found += text.counted(number)
         return found

@@ -1,7 +1,7 @@
-"""ElementSpec -> C text: hands names, numbers and spelled expressions to the templates.
+"""Render ElementSpecs as C text: pass names, numbers and expressions to the templates.
 
-The templates lay text out; they know no arithmetic and no physics.  The bytes depend on the
-specs alone: no time, path, version or order of a set.
+The templates only lay out text and contain no arithmetic or physics.  The output depends only on
+the specs, not on time, path, version or the order of a set.
 """
 
 from __future__ import annotations
@@ -58,14 +58,14 @@ def elements_header(specs: Sequence[ElementSpec]) -> str:
 
 
 def border_headers() -> dict[str, str]:
-    """File name -> text of what the engine's own C knows of tapes, fused libraries, failures."""
+    """File name -> text of the engine's headers for tapes, fused libraries and failures."""
     return {name: _render(f"{name}.jinja") for name in ("tape.h", "fused.h", "failures.h")}
 
 
 def manifest(specs: Sequence[ElementSpec], files: Mapping[str, str]) -> str:
     """`manifest.json`: ABI number, SHA-256 of the C text, names and hashes of elements and kernels.
 
-    A module that was compiled from other text is told by it (`build_extension.built_from`).
+    It identifies a module that was compiled from other text (`build_extension.built_from`).
     """
     text = hashlib.sha256()
     for name in sorted(name for name in files if name.endswith((".c", ".h"))):
@@ -84,7 +84,7 @@ def manifest(specs: Sequence[ElementSpec], files: Mapping[str, str]) -> str:
 
 
 def catalogue(specs: Iterable[ElementSpec]) -> str:
-    """`catalogue.json`: what a list says of elements, without their kernels."""
+    """`catalogue.json`: element data for lists, without kernels."""
     found = [
         {
             "kind": spec.kind,
@@ -108,16 +108,16 @@ def generated_files(
 ) -> dict[str, str]:
     """File name -> text of everything generated, elements sorted by kind and name.
 
-    `hinges` are the facts of those that a scene may name; `on_demand` are elements whose kernels
-    are derived when they are asked for: listed, no more.
-    ValueError if two elements share kind and name.
+    `hinges` are the facts of the hinges that a scene may name.  `on_demand` are elements whose
+    kernels are derived at first use; they are only listed in the catalogue.
+    Raises ValueError if two elements share kind and name.
     """
     ordered = sorted(specs, key=_kind_and_name)
     files = {"mstmm.h": header(), "elements.h": elements_header(ordered), **border_headers()}
     for spec in ordered:
         stem = f"{spec.kind}_{spec.name}"
         if f"{stem}.json" in files:
-            raise ValueError(f"two elements are called {spec.kind} {spec.name!r}")
+            raise ValueError(f"two elements have the name {spec.kind} {spec.name!r}")
         if abi.has_c(spec):
             files[f"{stem}.c"] = element_source(spec)
         files[f"{stem}.json"] = element_to_json(spec)
@@ -132,7 +132,7 @@ def generated_files(
 
 
 def _engine_files(specs: Sequence[ElementSpec]) -> dict[str, str]:
-    """What the looped engine's own C is printed from: kernels by their ports' names, the passes."""
+    """Generated files of the looped engine: named kernel calls, layout and passes."""
     known = {(spec.kind, spec.name): spec for spec in specs}
     return {
         "kernel_calls.h": calls_header(known),
@@ -161,7 +161,7 @@ def write_generated(
     hinges: Sequence[HingeFacts] = (),
     on_demand: Iterable[ElementSpec] = (),
 ) -> list[Path]:
-    """Write `generated_files` into `folder` (made if missing); returns the paths, sorted."""
+    """Write `generated_files` into `folder` (created if missing); returns the paths, sorted."""
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     paths = []
@@ -268,7 +268,7 @@ def _name_tables(letter: str, group: Sequence[Param]) -> list[dict[str, Any]]:
 def _kernel_view(
     spec: ElementSpec, kernel: KernelIR, plain: Collection[str] = ()
 ) -> dict[str, Any]:
-    """`plain`: inputs that stay plain numbers where others are complex, entry by entry."""
+    """Template data of a kernel; `plain` names inputs that stay real in complex kernels."""
     alike = () if plain else ALIKE.get((spec.name, kernel.name), ())
     text = KernelText(kernel, alike, plain)
     outputs = abi.c_outputs(kernel)
@@ -308,7 +308,7 @@ def _kernel_view(
 
 
 def _sized_view(spec: ElementSpec, kernel: KernelIR, plain: Collection[str]) -> dict[str, Any]:
-    """The function that is compiled for some sizes of their own, and its arguments but the size."""
+    """Template data of the function compiled for fixed sizes, and its arguments but the size."""
     names = abi.parameter_names(kernel)
     return {
         "prototype": abi.prototype(spec.kind, spec.name, kernel, "_sized", plain),

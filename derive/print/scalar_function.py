@@ -1,8 +1,8 @@
 """A straight-line KernelIR as a C function in any real type: float, double, quadruple.
 
-The text stands alone and is meant for references and experiments: every sine is the C library's
-(libquadmath's for quadruple), every constant is rounded once to the type.  What runs scenes fast is
-printed by `fused_c`.
+The text is self-contained and serves references and experiments: every sine is the C library's
+(libquadmath's for quadruple), every constant is rounded once to the type.  `scene` prints the
+fast code for scenes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from mstmm.ir import Assign, Constant, Guard, KernelIR, Operand, Store
 from .scene import support
 from .straight_line import NUMBERS, StraightText, signature
 
-#: Name -> (C type, what its functions end in, what its literals end in).
+#: Name -> (C type, suffix of functions, suffix of literals).
 SCALARS = {
     "float": ("float", "f", "f"),
     "double": ("double", "", ""),
@@ -30,13 +30,13 @@ def scalar_source(kernel: KernelIR, scalar: str) -> str:
     """C text of `static int kernel_NAME(const real *restrict INPUT_, ..., real *restrict OUTPUT_)`.
 
     Arrays are dense and row-major, inputs before outputs, in the order of the ports.  Returns 0 or
-    the code of the first guard that does not hold; then what was written means nothing.
+    the code of the first guard that does not hold; then the outputs are undefined.
     `real` is the scalar type ("float", "double" or "quadruple"; the last needs libquadmath).
 
     Raises ValueError for another type, and for a kernel of run-time size.
     """
     if scalar not in SCALARS:
-        raise ValueError(f"{scalar!r} is no scalar type; there are: {', '.join(SCALARS)}")
+        raise ValueError(f"unknown scalar type {scalar!r}; expected one of {', '.join(SCALARS)}")
     real, ending, suffix = SCALARS[scalar]
     text = _ScalarText(kernel, suffix)
     lines = [
@@ -65,7 +65,7 @@ def _joined(word: str, ending: str) -> str:
 
 
 class _ScalarText(StraightText):
-    """Statements whose constants have the type of everything else."""
+    """Statements whose constants have the scalar type of the kernel."""
 
     def __init__(self, kernel: KernelIR, suffix: str) -> None:
         super().__init__(kernel, NUMBERS)

@@ -12,8 +12,8 @@ from mstmm.ir import KernelIR
 from .scalar_function import scalar_source
 from .straight_line import port_name
 
-#: How many numbers of the caller's arrays make one value: quadruple values come as unevaluated sums
-#: of two doubles, high part first.
+#: Load expressions by the count of array numbers per value: quadruple values come as unevaluated
+#: sums of two doubles, high part first.
 _IN = {1: "in[{place}][i]", 2: "(real)in[{place}][2 * i] + (real)in[{place}][2 * i + 1]"}
 _OUT = """\
         const number high = (number){port}[i];
@@ -37,7 +37,7 @@ def library_source(kernel: KernelIR, scalar: str) -> str:
 
 
 def _entry(kernel: KernelIR, parts: int) -> str:
-    """The exported function: arrays of the caller -> arrays of the kernel, and back."""
+    """Exported C function: copy the caller's arrays to the kernel, and the results back."""
     declared, before, after = [], [], []
     for place, port in enumerate(kernel.inputs):
         name, length = port_name(port.name), port.length()

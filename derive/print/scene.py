@@ -1,9 +1,8 @@
-"""KernelIRs of a whole scene -> one C text: for one state, or for several states side by side.
+"""C text of the kernels of a scene, for one state or for several states in lanes.
 
-The text stands alone: it includes nothing, and what it exports is its descriptor
-(`mstmm.border.fused`) and a test of itself.  It is printed without templates to fill, because it is
-printed whenever a scene is compiled for the first time; the parts that depend on no scene lie as
-plain C in templates/fused_*.c.
+The text is self-contained: it includes nothing, and exports its descriptor (`mstmm.border.fused`)
+and a self-test.  It is printed without templates, for speed: every scene needs it at its first
+compilation.  Parts that are common to all scenes are plain C in templates/fused_*.c.
 """
 
 from __future__ import annotations
@@ -29,11 +28,11 @@ __all__ = ["ABI", "FLAGS", "function_text", "fused_sources", "support"]
 
 
 class FusedKernels(Protocol):
-    """What `derive.fuse.scene` returns: kernels by name, and what their guard codes stand for."""
+    """Result of `derive.fuse.scene`: kernels by name, and the meaning of their guard codes."""
 
     @property
     def kernels(self) -> Mapping[str, KernelIR]:
-        """Those of `fuse`, `fuse_implicit`, `fuse_slopes`, `fuse_inverse` or `fuse_points`."""
+        """Kernels of `fuse`, `fuse_implicit`, `fuse_slopes`, `fuse_inverse` or `fuse_points`."""
 
     @property
     def failures(self) -> tuple[tuple[int, int, int], ...]:
@@ -41,7 +40,7 @@ class FusedKernels(Protocol):
 
     @property
     def power_is_cheap(self) -> bool:
-        """Whether "accelerations_power" serves for "accelerations" too."""
+        """Whether "accelerations_power" replaces "accelerations"."""
 
 
 #: First lines of every text: the scalar type and how the C library spells its functions.
@@ -55,10 +54,11 @@ typedef double real;
 #: Longer ones wait for their own instructions (the cache for them holds 32 kB on most processors),
 #: lanes for the multipliers: there registers are saved (`thrift`).
 _SHORT = 3000
-#: What "accelerations_power" has behind the outputs of "accelerations".
+#: Outputs of "accelerations_power" after those of "accelerations".
 _SUMS = ("power", "potential")
-#: Statements stand in an order of their own, which gcc's scheduler makes worse (10 % at 7 balls);
-#: told to mind how long values live it saves registers.  A pragma: others do not know the flag.
+#: The statements are scheduled already, and gcc's scheduler makes the order worse (10 % at 7
+#: balls). With this flag it minimises the lifetime of values.  A pragma, since other compilers lack
+#: the flag.
 _TUNING = """\
 #if defined __GNUC__ && !defined __clang__
 #pragma GCC optimize("live-range-shrinkage")
@@ -71,8 +71,8 @@ def fused_sources(fused: FusedKernels, key: str, part: str = "scalar") -> dict[s
 
     Part "scalar" holds the kernels for one state (accelerations, accelerations_power, gaps, slips),
     part "lanes" those for several states at once (accelerations_lanes, accelerations_many), part
-    "implicit" what implicit methods ask for, part "linear" the slopes about a state, part "inverse"
-    inverse dynamics and the mass matrix, part "points K" kinematics of points of body K.
+    "implicit" those for implicit methods, part "linear" the derivatives about a state, part
+    "inverse" inverse dynamics and the mass matrix, part "points K" kinematics of points of body K.
     """
     kernels = _written(fused, part)
     sizes = {port.name: port.length() for port in next(iter(kernels.values())).inputs}
@@ -98,7 +98,7 @@ def fused_sources(fused: FusedKernels, key: str, part: str = "scalar") -> dict[s
 
 
 def _written(fused: FusedKernels, part: str) -> dict[str, KernelIR]:
-    """The kernels whose text a part holds."""
+    """Kernels of a part of the library."""
     if part == "lanes":
         return {"accelerations": fused.kernels["accelerations"]}
     served = {"accelerations"} if fused.power_is_cheap else set()
@@ -106,7 +106,7 @@ def _written(fused: FusedKernels, part: str) -> dict[str, KernelIR]:
 
 
 def _without_power(kernel: KernelIR) -> str:
-    """The C function of accelerations alone, by that of accelerations and power."""
+    """C function of the accelerations, which calls that of accelerations and power."""
     parameters = signature(kernel, NUMBERS)[: -len(_SUMS)]
     words = [port_name(port.name) for port in (*kernel.inputs, *kernel.outputs)][: -len(_SUMS)]
     sums = ", ".join(f"{name}[1]" for name in _SUMS)
@@ -118,14 +118,15 @@ def _without_power(kernel: KernelIR) -> str:
 
 @cache
 def support(name: str) -> str:
-    """The text templates/fused_NAME.c."""
+    """Text of templates/fused_NAME.c."""
     path = Path(mstmm.templates.__path__[0]) / f"fused_{name}.c"
     return path.read_text(encoding="utf-8")
 
 
 def function_text(kernel: KernelIR, name: str, dialect: Dialect) -> str:
-    """C function `name` of a straight-line kernel, the long ones in parts; returns 0 or the code of
-    the first failed guard.
+    """C function `name` of a straight-line kernel; long functions are split into parts.
+
+    It returns 0 or the code of the first failed guard.
 
     In lanes there is one more argument, `int *codes`, and the result is non-zero if any lane
     failed.
@@ -170,7 +171,7 @@ def _lanes_angles(text: StraightText, angles: Sequence[Angle]) -> list[str]:
 
 
 def _four_angles(text: StraightText, angles: Sequence[Angle]) -> list[str]:
-    """Four arguments to a vector; the last vector is filled up with zeros."""
+    """C lines of sines and cosines, four per vector; zeros fill the last vector."""
     lines = []
     for first in range(0, len(angles), 4):
         some = angles[first : first + 4]
@@ -184,7 +185,7 @@ def _four_angles(text: StraightText, angles: Sequence[Angle]) -> list[str]:
 
 
 def _alone(text: StraightText, operand: Operand) -> str:
-    """An argument, loaded by itself: one load of neighbours waits for all that was just stored."""
+    """C text of an argument, loaded as a scalar: a vector load would stall on recent stores."""
     word = text.whole(operand)
     return f"*(const volatile real *)&{word}" if isinstance(operand, Element) else word
 
@@ -197,13 +198,13 @@ def _sizes(sizes: dict[str, int]) -> str:
 
 
 def _closures(kernels: dict[str, KernelIR]) -> int:
-    """How many hinges close loops."""
+    """Number of cut hinges."""
     told = kernels["gaps"].outputs if "gaps" in kernels else ()
     return sum(port.length() // 6 for port in told if port.name == "gap")
 
 
 def _lanes_entry(kernel: KernelIR) -> str:
-    """The lanes kernel by the descriptor's type: pointers to numbers."""
+    """C function of the lanes kernel with the descriptor's type: pointers to numbers."""
     ports = (*kernel.inputs, *kernel.outputs)
     constant = ["const "] * len(kernel.inputs) + [""] * len(kernel.outputs)
     parameters = [f"{c}double *{p.name}" for c, p in zip(constant, ports, strict=True)]
@@ -231,7 +232,7 @@ def _descriptor(
 
 
 def _self_test(kernels: dict[str, KernelIR], part: str) -> str:
-    """A call of every kernel on ones: what the processor cannot run ends here, not in a run."""
+    """C self-test that calls every kernel on ones, so that unsupported instructions fail early."""
     names = ["accelerations_lanes"] if part == "lanes" else list(kernels)
     called = {name: kernels[name.removesuffix("_lanes")] for name in names}
     ports = [port for kernel in called.values() for port in (*kernel.inputs, *kernel.outputs)]

@@ -1,4 +1,4 @@
-"""Steps of a pass as C: calls by the names of ports, and the little that moves numbers."""
+"""C text of the steps of a pass: named kernel calls and copies."""
 
 from __future__ import annotations
 
@@ -30,10 +30,9 @@ from .callers import MOST_SPEEDS, Callee
 from .conditions import condition, condition_needs
 from .storage import VARIABLES, Place, place, size_of
 
-#: Traits that only code for one scene has.
+#: Traits that only scene-specific code uses.
 NEVER = frozenset({"staged", "link", "turned", "unmoved"})
-#: Kernels' pointers in the records.
-#: Directions: how many, what points the derivatives along number c, variables that both read.
+#: Directions: count, C statement that selects direction c, variables that both read.
 _ALONG = {
     "free": ("speeds", "mstmm_aim_unknown(state, body, columns[c])", ("speeds", "columns", "body")),
     "felt": (
@@ -55,7 +54,7 @@ _ALONG = {
     "place": ("9", "mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), c)", ("place",)),
     "turn": ("3", "mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), c)", ("place",)),
 }  # fmt: skip
-#: What points them nowhere again.
+#: C statement that clears the selected direction.
 _RESTS = {
     **dict.fromkeys(
         ("free", "felt", "rates", "coordinates", "law"), "mstmm_aim_nowhere(state, body)"
@@ -64,7 +63,7 @@ _RESTS = {
     **dict.fromkeys(("motion", "spin"), "mstmm_aim_motion(d_block + MSTMM_BLOCK_MOTION, -1)"),
     **dict.fromkeys(("place", "turn"), "mstmm_aim_motion(place + MSTMM_PLACE_Z(0, 0), -1)"),
 }
-#: Rows met one by one: the loop, what it declares, variables that both read.
+#: Loops over rows: loop header, declaration, variables that both read.
 _EACH = {
     "closings": (
         "int r = looped->first_row; r < looped->first_row + looped->n_rows; r++", "", ("looped",),
@@ -113,9 +112,9 @@ _POINTERS = {"hinge": "body->kernels->{}", "body": "body->kernels->{}", "law": "
 
 
 class StepText:
-    """The steps of one pass.
+    """C text of the steps of one pass.
 
-    `locals` are the arrays of the function by their lengths, `given` the slots handed to it.
+    `locals` maps local arrays to their lengths, `given` the slots passed by the caller to C names.
     """
 
     def __init__(self, kernels: dict[str, Callee], whole: Pass) -> None:
@@ -132,12 +131,12 @@ class StepText:
             return found
         name, _, picked = slot.partition("[")
         if not name.removeprefix(D).startswith("local.") and name.removeprefix(D) not in SLOTS:
-            raise ValueError(f"pass {self.name}: there is no slot {name!r} (schedule/words.py)")
+            raise ValueError(f"pass {self.name}: unknown slot {name!r} (schedule/words.py)")
         text = f"{word_of(name)} + {picked.rstrip(']')}" if picked else word_of(name)
         return Place(text)
 
     def _local_sizes(self, whole: Pass) -> dict[str, int]:
-        """Local arrays, as long as the longest port that they meet."""
+        """Local arrays, each as long as the longest port that uses it."""
         found: dict[str, int] = {}
         for step in whole.steps:
             for part in () if never(step) else _printed_here(step):
@@ -349,7 +348,7 @@ class StepText:
         return [*lines, f"{indent}}}", f"{indent}{_RESTS[step.of]};"]
 
     def _inside(self, steps: Iterable[Step], indent: str) -> list[str]:
-        """Steps in a loop, each behind its condition."""
+        """C lines of steps in a loop, each under its condition."""
         lines = []
         for part in steps:
             if part.when:
@@ -385,14 +384,14 @@ def _entry(text: str, place: str = "j") -> str:
 
 
 def size_words(slot: str) -> set[str]:
-    """Variables that the length of a slot is told by."""
+    """Variables in the length of a slot."""
     if slot.removeprefix(D).startswith("local.") or "[" in slot:
         return set()
     return {word for word in size_of(slot).split(" * ") if word in VARIABLES}
 
 
 def _printed_here(step: Step) -> Iterator[Step]:
-    """The step and those inside it that are no call of another function."""
+    """The step and its inner steps, except those in other functions."""
     if isinstance(step, (EachSpeed, Along, Each)):
         for part in step.steps:
             yield from _printed_here(part)
@@ -401,12 +400,12 @@ def _printed_here(step: Step) -> Iterator[Step]:
 
 
 def never(step: Step) -> bool:
-    """Whether a step is for code of one scene alone."""
+    """Whether only scene-specific code runs a step."""
     return any(trait in NEVER and wanted for trait, wanted in step.traits)
 
 
 def word_of(slot: str) -> str:
-    """C name of a slot that is local or handed over."""
+    """C name of a slot that is local or passed by the caller."""
     if slot.startswith(D):
         return f"d_{word_of(slot.removeprefix(D))}"
     owner, _, name = slot.partition(".")
@@ -414,7 +413,7 @@ def word_of(slot: str) -> str:
 
 
 def _filled(words: list[str], indent: str) -> str:
-    """Arguments over as many lines as they take."""
+    """Arguments wrapped over several lines."""
     line, lines = indent + "    ", []
     for place_, word in enumerate(words):
         word += "," if place_ + 1 < len(words) else ")"

@@ -1,4 +1,4 @@
-"""Where the slots of the schedule lie in the looped engine's memory, as C expressions."""
+"""C expressions of the storage of schedule slots in the looped engine."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from ..schedule.slope import D
 from ..schedule.words import ROLES, SLOTS
 from .flat import FLAT_VARIABLES, flat_layout, flat_place
 
-#: Numbers of a body's block in the workspace, in their order: slot -> name in C.  What the same
-#: passes read and write stands together, as memory comes in lines; e stands behind S (links.c).
+#: Numbers of a body's block in the workspace, in their order: slot -> name in C.  Slots
+#: that the same passes use are adjacent, for cache lines; e follows S (links.c).
 BLOCK = {
     "body.A": "A", "body.x": "X", "body.v": "V", "body.delta": "DELTA", "body.floor": "FLOOR",
     "hinge.R": "HINGE_R", "hinge.d": "HINGE_D", "body.R": "R", "body.r": "SHIFT",
     "hinge.v": "HINGE_V", "hinge.w": "HINGE_W", "hinge.c": "HINGE_C", "body.S": "S",
     "body.e": "E", "body.motion": "MOTION",
 }  # fmt: skip
-#: Behind them, so many numbers per speed.
+#: Slots after them: slot -> (C name, numbers per speed).
 PER_SPEED = {
     "body.s": ("S", 1), "body.tau": ("TAU", 1), "hinge.H": ("H", 6), "hinge.g": ("OFFSET", 1),
     "hinge.rates": ("RATES", 1), "hinge.G": ("GAIN", 6), "hinge.H_free": ("H_FREE", 6),
@@ -49,7 +49,7 @@ TANGENT = {
     "tangent.unit": (0, 0, 0, 1, 0), "tangent.rates": (0, 0, 0, 1, 0),
     "tangent.lag": (0, 0, 0, 1, 0), "tangent.lag_work": (0, 0, 0, 1, 0),
 }  # fmt: skip
-#: And of a body whose loads change with its place.
+#: Numbers of the tangent of a body whose loads depend on its position.
 PLACE = {
     "place.S": (54, 0, 0, 0, 0), "place.z": (9, 0, 0, 0, 0), "place.known": (9, 0, 0, 0, 0),
     "place.B": (0, 9, 0, 0, 0), "place.gain": (0, 9, 0, 0, 0),
@@ -74,11 +74,11 @@ COUPLING = {f"coupling.{name}": 1 for name in structure.COUPLING}
 #: Numbers of a row: slot -> how many.
 ROW = {"row.K": 6, "row.known": 1, "row.pivot": 1, "row.inverse": 1, "row.x": 1,
        "row.told": 1}  # fmt: skip
-#: Slots that lie where another does, which is not wanted any more by then.
+#: Slots that share the storage of another slot, which is not needed at that time.
 SHARED = {
     "hinge.F": "hinge.H", "modes.felt": "modes.right", "bend.place_right": "bend.right",
     "body.U": "body.S", "body.d": "body.delta",
-    # One of the two tangents is held at a time.
+    # Only one of the two tangents exists at a time.
     "mass.S": "tangent.S", "mass.F": "tangent.gain", "mass.G": "tangent.V",
     "shapes.S_rf": "bend.V", "shapes.based": "bend.G", "shapes.S_ff": "bend.D",
     "shapes.right": "bend.right", "shapes.gain": "bend.gain",
@@ -94,7 +94,7 @@ _STATE = {"given": "given", "efforts": "efforts", "udot": "udot", "required": "r
           "column": "column", "answer": "answer"}  # fmt: skip
 
 _INBOARD = "state->tangents->numbers + mstmm_tangent_at(state, body->parent)"
-#: What the scene gives, and where results go.
+#: C expressions of scene data and of results.
 _PLACES = {
     "body.p": "body->body_p", "body.rotor": "body->rotor", "hinge.p": "body->hinge_p",
     "connection.R": "body->connection", "connection.r": "body->connection + 9",
@@ -216,14 +216,14 @@ VARIABLES: dict[str, tuple[str, tuple[str, ...]]] = {
     "speeds": ("const int speeds = mstmm_free_speeds(state->memory, body, columns);",
                ("body", "columns")),
 }  # fmt: skip
-#: Variables that have a counterpart in the second workspace, where derivatives lie.
+#: Variables with a counterpart in the second workspace, which holds derivatives.
 _DOUBLED = (
     "block", "parent", "on", "axes", "from", "to", "modes", "laid", "outboard", "loops", "closed",
 )  # fmt: skip
 
 
 def _derivative(text: str) -> str:
-    """A C expression of a number, of its derivative; "" where nothing moves the number."""
+    """C expression of the derivative of a number; "" for a constant number."""
     moving = re.compile(
         r"(?<![\w>.])(state)(?!->(?:memory|model))|(?<![\w>.])(" + "|".join(_DOUBLED) + r")\b"
     )
@@ -241,16 +241,16 @@ VARIABLES |= {
     )
     for name in _DOUBLED
 }  # fmt: skip
-# The body of a closure is told by it.
+# The closure defines its body.
 _IN_A_PLANE = {"closure": FLAT_VARIABLES["closure"], **VARIABLES, **FLAT_VARIABLES}
 
 
 def variables(flat: bool) -> dict[str, tuple[str, tuple[str, ...]]]:
-    """Variables of the functions of passes, of those of scenes in a plane."""
+    """Variables of the pass functions, of planar scenes if `flat`."""
     return _IN_A_PLANE if flat else VARIABLES
 
 
-#: Which body the subject of a pass is about.
+#: C expression of the body that the subject of a pass refers to.
 BODY_OF = {
     "body": "index", "law": "law->body", "drive": "drive->body", "load": "load->body",
     "force": "mstmm_held(force)", "closure": "closure->frame",
@@ -266,7 +266,7 @@ class Place:
 
 
 def place(slot: str, flat: bool = False) -> Place | None:
-    """Where a slot lies, in a plane where `flat`; None for one that is local to a function."""
+    """Storage of a slot, of a planar scene if `flat`; None for a local slot."""
     if slot.startswith(D):
         return _place_of_derivative(slot.removeprefix(D))
     name, _, picked = slot.partition("[")
@@ -286,7 +286,7 @@ def _place_of_derivative(slot: str) -> Place | None:
     return Place(text, {word for word in VARIABLES if reads(text, word)})
 
 
-#: Numbers of the row at hand in a loop over rows: slot -> its number.
+#: Row index in a loop over rows, by slot.
 _OF_ROWS = {
     "line.known": "closure->rows[c]", "line.x": "closure->rows[c]",
     "line.told": "closure->rows[c]", "other.known": "other->row", "other.x": "other->row",
@@ -330,7 +330,7 @@ def _macro(slot: str) -> str:
 
 
 def _listed(layout: Mapping[str, int], total: str) -> list[str]:
-    """Constants of where the slots of a layout begin, and of how long it is."""
+    """C constants of the offsets of a layout, and of its length."""
     lines, at = [], 0
     for slot, count in layout.items():
         lines.append(f"#define {_macro(slot)} {at}")
@@ -339,7 +339,7 @@ def _listed(layout: Mapping[str, int], total: str) -> list[str]:
 
 
 def _per_mode(layout: dict[str, tuple[int, int]]) -> list[str]:
-    """Constants of the slots whose place is a multiple of the number of modes."""
+    """C constants of the slots whose offset is a multiple of the number of modes."""
     lines, count = [], 0
     for slot, (one, other) in layout.items():
         lines.append(f"#define {_macro(slot)}_PER_MODE {count}")
@@ -350,7 +350,7 @@ def _per_mode(layout: dict[str, tuple[int, int]]) -> list[str]:
 
 
 def _offsets(layout: dict[str, tuple[int, int]], second: str) -> list[str]:
-    """Macros of where the slots of a layout begin, by the number of modes."""
+    """C macros of the offsets of a layout, by the number of modes."""
     lines, counts = [], [0, 0]
     for slot, sizes in layout.items():
         lines.append(f"#define {_macro(slot)}(n) ({counts[0]} * (size_t)(n) + {counts[1]}{second})")
@@ -362,7 +362,7 @@ _PAIRS = " * (size_t)(n) * (n)"
 
 
 def _offsets_by_speeds(layout: Mapping[str, tuple[int, ...]], total: str) -> list[str]:
-    """The same by the numbers of speeds and coordinates of a hinge, and `total`, all of them."""
+    """C macros of offsets by the speeds and coordinates of a hinge, and of the `total` length."""
     lines, counts = [], [0] * 5
 
     def macro(name: str) -> str:
@@ -383,7 +383,7 @@ def reads(text: str, word: str) -> bool:
 
 
 def size_of(slot: str) -> str:
-    """C expression of the length of a slot that is copied or added to."""
+    """C expression of the length of a slot."""
     name, _, picked = slot.removeprefix(D).partition("[")
     if picked:
         return "1"
@@ -395,7 +395,7 @@ def size_of(slot: str) -> str:
 
 
 def layout_header() -> str:
-    """`layout.h`: where the numbers of a body lie in the workspace."""
+    """`layout.h`: offsets of a body's numbers in the workspace."""
     lines, at = [], 0
     for slot, name in BLOCK.items():
         lines.append(f"#define MSTMM_BLOCK_{name} {at}")

@@ -1,10 +1,10 @@
 """Straight-line KernelIR as C statements, for one number or for several lanes at a time.
 
 A kernel without run-time size becomes one `const` per value, in an order in which every value
-stands behind its operands.  The same lines are printed in several dialects: plain numbers of any
+follows its operands.  The same lines are printed in several dialects: plain numbers of any
 real type, and GNU C vectors, whose operations are spelled as functions of the support text
-(templates/fused_*.c).  Ports get an underscore behind their names, so that they meet no other
-name of the text.
+(templates/fused_*.c).  Ports get an underscore behind their names, so that they clash with no
+other name.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Dialect:
 
 #: One number at a time, of the type `real` of the text around it.
 NUMBERS = Dialect("real", "real", "int", "real_")
-#: `lanes` numbers side by side.
+#: Several numbers at a time, one per lane.
 LANES = Dialect("lanes_t", "lanes_array_t", "mask_t", "lanes_", vector=True)
 
 
@@ -71,7 +71,7 @@ class StraightText:
         self._numbers = _used_as_numbers(kernel.statements) & self.truths
 
     def assign(self, statement: Assign) -> list[str]:
-        """`const real t12 = ...;`; a truth value is `m12`, and `t12` where somebody counts it."""
+        """`const real t12 = ...;`; a truth value is `m12`, also `t12` if it is used as a number."""
         number, op, args = statement.number, statement.op, statement.args
         if not OPERATIONS[op].truth:
             return [f"const {self.dialect.real} t{number} = {self._value(op, args)};"]
@@ -79,7 +79,7 @@ class StraightText:
         return [truth, *self.counted(number)]
 
     def counted(self, number: int) -> list[str]:
-        """A truth value as a number, where somebody counts it, if only in another part."""
+        """C lines that convert a truth value to a number, if any part uses it as such."""
         if number not in self._numbers:
             return []
         value = f"{self.dialect.prefix}number(m{number})"
@@ -93,13 +93,13 @@ class StraightText:
         return f"{port_name(port.name)}[{place}] {sign} {self.whole(statement.value)};"
 
     def truth(self, operand: Operand) -> str:
-        """Whether an operand is true, that is neither zero nor NaN."""
+        """Whether an operand is true, that is, neither zero nor NaN."""
         if isinstance(operand, Temporary) and operand.number in self.truths:
             return f"m{operand.number}"
         return f"{self.dialect.prefix}true({self.whole(operand)})"
 
     def word(self, operand: Operand) -> str:
-        """An operand beside an arithmetic sign: a literal, an entry of a port or a temporary."""
+        """Operand of an arithmetic operator: a literal, an entry of a port or a temporary."""
         if isinstance(operand, Constant):
             return literal(operand.text)
         if isinstance(operand, Temporary):
@@ -127,7 +127,7 @@ class StraightText:
 
     def _comparison(self, op: str, args: Sequence[Operand]) -> str:
         row = OPERATIONS[op]
-        if row.conditions:  # & and |: nothing hangs on the order, and && does not know lanes
+        if row.conditions:  # & and |: the order does not matter, and && does not accept vectors
             return f"{self.truth(args[0])} {row.sign[0]} {self.truth(args[1])}"
         if row.sign:
             return f"{self.whole(args[0])} {row.sign} {self.whole(args[1])}"
@@ -138,7 +138,7 @@ class StraightText:
 
 
 def _used_as_numbers(statements: Iterable[object]) -> set[int]:
-    """Temporaries that somebody reads as numbers, not as truths."""
+    """Temporaries that are used as numbers, not as truth values."""
     used: set[int] = set()
     for statement in statements:
         read = operands(statement)

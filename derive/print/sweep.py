@@ -1,8 +1,8 @@
 """The looped engine's passes as C, printed from the schedule.
 
-For every pass there is a function for one subject, `mstmm_at_NAME`, and one that meets all of them,
-`mstmm_pass_NAME`, or, with others, tile by tile, `mstmm_tiles_NAME`; for every sweep a function
-that runs its passes, `mstmm_run_NAME`.  Steps that only code for one scene can do are left out.
+For every pass there is a function for one subject, `mstmm_at_NAME`, and one for all of them,
+`mstmm_pass_NAME`, or, together with other passes, tile by tile, `mstmm_tiles_NAME`; for every sweep
+a function that runs its passes, `mstmm_run_NAME`.  Steps of scene-specific code are omitted.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Kernels = dict[str, Callee]
 
 
 def passes() -> list[Pass]:
-    """Every pass, those that others do before the others."""
+    """Every pass, inner passes before those that run them."""
     found: dict[str, Pass] = {}
 
     def visit(whole: Pass) -> None:
@@ -83,7 +83,7 @@ def _header(name: str, said: str, included: list[str], lines: Iterable[str]) -> 
 
 
 def _directions(specs: Specs) -> str:
-    """The directions of a pin about z in its plane, which are the same in every position."""
+    """C table of the constraint directions of a planar pin, which are constant."""
     kernel = next(k for k in specs["sweep", "generic1"].kernels if k.name == "complement")
     (numbers,) = evaluate_floats(kernel, {"H": [0, 0, 0, 0, 0, 1]}).values()
     rows = [[numbers[k + entry] for entry in LOAD] for k in range(0, len(numbers), 6)]
@@ -117,9 +117,9 @@ def signature(whole: Pass) -> str:
 
 
 def function_text(whole: Pass, kernels: Kernels) -> str:
-    """C of what a pass does with one subject.
+    """C function that runs a pass for one subject.
 
-    Variables of unconditional steps come first, those of others stand behind their condition.
+    Variables of unconditional steps come first, those of others follow their condition.
     """
     text = StepText(kernels, whole)
     steps = [_plainly(step) for step in whole.steps if not never(step)]
@@ -161,7 +161,7 @@ def _declared(whole: Pass, names: set[str], indent: str) -> list[str]:
 
 
 def _plainly(step: Step) -> Step:
-    """Without the conditions that always hold in a loop."""
+    """Remove conditions that always hold in the looped engine."""
     return replace(step, when=" ".join(w for w in step.when.split() if w.lstrip("!") not in NEVER))
 
 
@@ -178,7 +178,7 @@ def _constant(slot: str) -> str:
 
 
 def _closed(names: set[str], whole: Pass) -> set[str]:
-    """With the variables that their declarations need."""
+    """Add the variables that the declarations of `names` need."""
     found, known = set(names), variables(whole.flat)
     while True:
         more = {other for name in found for other in known[name][1]} - found

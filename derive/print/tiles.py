@@ -1,12 +1,12 @@
-"""Passes that are done tile by tile, so that what one brings into the cache the next finds there.
+"""Group passes into tiles of bodies, so that consecutive passes share cached data.
 
-In front of a pass from tips to root often stand some that begin the numbers of every body and read
-those of no other.  A scene that the cache does not hold is met once for all of them: a tile of
-bodies is begun, and then swept.  What is swept adds to the numbers of parents, so that bodies are
-begun ahead of the tile as far as its parents reach.
+Passes that initialise each body independently often precede a pass from tips to root.  Memory
+traffic of large scenes is reduced by running all of them on a tile of bodies: first the
+initialisation, then the sweep.  The sweep adds to the numbers of parents, so that initialisation
+also covers the parents of the tile.
 
-Passes from root to tips that follow one another read of others what parents have had since an
-earlier tile, so that they go tile by tile together (`Chained`).
+Consecutive passes from root to tips only read parents that an earlier tile has completed, so that
+they also run tile by tile (`Chained`).
 """
 
 from __future__ import annotations
@@ -20,15 +20,16 @@ from .conditions import condition
 
 #: Owners of numbers that belong to other bodies, to expressions or to the whole scene.
 _OTHERS = (*ROLES, "inboard", "sums", "outer", "inner")
-#: Those that stand already where bodies are met from root to tips; sums keep their order, and rows
-#: are met with the body that they close on.
+#: Owners that are complete when bodies are visited from root to tips; sums keep their order, and
+#: rows are visited with the body on which they close.
 _KNOWN = ("parent", "inboard", "sums", "meeting")
 
 
 @dataclass(frozen=True)
 class _Together:
-    """Passes that go tile by tile; one after the other where one of the `hindrances` runs, which
-    stand among them and fit into no tile."""
+    """Passes that run tile by tile, or separately if one of the `hindrances` runs.
+
+    The `hindrances` are passes between them that cannot run in tiles."""
 
     runs: tuple[Run, ...]
     hindrances: tuple[Run, ...]
@@ -42,7 +43,7 @@ class _Together:
 
 @dataclass(frozen=True)
 class Tiled(_Together):
-    """`begun` for all bodies of a tile, then `swept`, tips to root."""
+    """Passes `begun` for all bodies of a tile, then the pass `swept`, tips to root."""
 
     begun: tuple[Run, ...]
     swept: Pass
@@ -54,8 +55,9 @@ class Tiled(_Together):
 
 @dataclass(frozen=True)
 class Chained(_Together):
-    """`passes` of bodies, laws and loops, one after the other for a tile, root to tips; while
-    `main` goes over a tile the next is asked for."""
+    """Passes over bodies, laws and loops, in order for each tile, root to tips.
+
+    The pass `main` prefetches the next tile."""
 
     sweep: str
     passes: tuple[Pass, ...]
@@ -63,7 +65,7 @@ class Chained(_Together):
 
     @property
     def name(self) -> str:
-        """Of the passes together."""
+        """Name of the group."""
         return f"{self.sweep}_{self.main.name}"
 
     @property
@@ -72,7 +74,7 @@ class Chained(_Together):
 
 
 def tiled(sweep: Sweep) -> list[Run | Tiled | Chained]:
-    """The runs of a sweep, those together that go tile by tile."""
+    """Runs of a sweep, grouped where they run tile by tile."""
     found: list[Run | Tiled | Chained] = []
     rest: list[Run] = []
     for part in _swept(sweep):
@@ -85,10 +87,10 @@ def tiled(sweep: Sweep) -> list[Run | Tiled | Chained]:
 
 
 def _follows(run: Run) -> bool:
-    """Whether a pass reads of others what is known where bodies are met from root to tips."""
+    """Whether a pass only reads data that are complete in a visit from root to tips."""
     whole = run.whole
     if whole is not None and whole.subject == "closure":
-        return True  # each is met behind the bodies that it reads
+        return True  # each is visited after the bodies that it reads
     return (
         whole is not None and whole.subject in ("body", "law") and whole.order == ROOT_TO_TIPS
         and not any(_of_others(step, _KNOWN) for top in whole.steps for step in inner(top))
@@ -96,7 +98,7 @@ def _follows(run: Run) -> bool:
 
 
 def _chained(name: str, runs: list[Run]) -> list[Run | Tiled | Chained]:
-    """Runs with the unconditional ones among them together, if all bodies have part in one."""
+    """Chain the unconditional runs, if one of them visits all bodies."""
     always = [i for i, run in enumerate(runs) if not run.when]
     passes = tuple(run.whole for i in always if (run := runs[i]).whole is not None)
     main = [one for one in passes if one.subject == "body" and not one.spares_links]
@@ -109,7 +111,7 @@ def _chained(name: str, runs: list[Run]) -> list[Run | Tiled | Chained]:
 
 
 def _swept(sweep: Sweep) -> list[Run | Tiled]:
-    """The runs of a sweep, those together that end with one from tips to root."""
+    """Runs of a sweep, grouped with each pass from tips to root that they precede."""
     found: list[Run | Tiled] = []
     for run in sweep.runs:
         if run.whole is not None and run.whole.order == TIPS_TO_ROOT and not run.when:
@@ -123,7 +125,7 @@ def _swept(sweep: Sweep) -> list[Run | Tiled]:
 
 
 def _beginning(runs: list[Run | Tiled]) -> list[Run]:
-    """The last runs from one on that every body has part in, if all fit or may be absent."""
+    """Last runs that can start a tile, from the first that visits every body."""
     behind: list[Run] = []
     found: list[Run] = []
     for run in reversed(runs):
@@ -153,7 +155,7 @@ def _of_others(step: Step, known: tuple[str, ...] = ()) -> bool:
     if not known and (("section", True) in step.traits or ("outward", True) in step.traits):
         return True
     if isinstance(step, Do):
-        return False  # its steps are met by themselves
+        return False  # its steps are examined separately
     slots = [str(value) for value in vars(step).values()]
     slots += [slot for _, slot in getattr(step, "ports", ())]
     owners = {slot.removeprefix(D).split(".")[0] for slot in slots}

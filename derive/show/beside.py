@@ -1,4 +1,4 @@
-"""The same hinge twice: its classical transfer matrix beside its motion subspace."""
+"""Comparison of a hinge's classical transfer matrix with its motion subspace."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .document import Heading, Item, Paragraph, document
 from .measure import Columns
 from .subjects import view
 
-#: Hinges of which there is a classical matrix in acceleration form.
+#: Hinges that have a classical matrix in acceleration form.
 CLASSICAL = {"hinge_ball": "classical_ball", "hinge_pin": "classical_pin_spatial"}
 
 _SAID = (
@@ -27,11 +27,11 @@ _SAID = (
 def beside(name: str) -> tuple[str, Callable[[Columns], list[Item]]]:
     """Title and items of a hinge ("hinge_pin") in both forms.
 
-    Raises ElementError where there is but one.
+    Raises ElementError for a hinge without a classical matrix.
     """
     if name not in CLASSICAL:
         both = ", ".join(each.removeprefix("hinge_") for each in CLASSICAL)
-        raise ElementError(f"{name} has no classical matrix beside it; these have: {both}")
+        raise ElementError(f"{name}: no classical matrix exists; expected one of {both}")
     shown = view(name)
     title = f"{shown.title}, classical and by motion subspace"
 

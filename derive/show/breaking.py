@@ -1,4 +1,4 @@
-"""How wide formulas are on paper, and where a line of one breaks that is wider than the page."""
+"""Width of formulas on paper, and line breaks of formulas wider than the page."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from .layout import Fence, Fraction, Name, Node, Raised, Root, Row, Sign, Word
 
 #: Width of a line of text in points where letters are 10 points high (LaTeX's article).
 PAGE = 338.0
-#: Widths in the same points, rounded up: letters, their subscripts, and what stands around them.
+#: Widths in the same points, rounded up: letters, their subscripts, and the space around them.
 _LETTER, _SMALL, _SPACED, _THIN, _BRACKET, _GAP = 6.2, 4.2, 13.5, 1.7, 4.5, 10.0
 #: Lines after the first begin this much further right.
 HANG = 20.0
 
 
 def width(node: Node) -> float:
-    """Width on paper (points), a little more than it comes out."""
+    """Width on paper (points), slightly overestimated."""
     if isinstance(node, Name):
         letters = _LETTER * (len(node.name.base) if node.name.upright else 1.2)
         return letters + _SMALL * len(node.name.subscript + node.index)
@@ -40,15 +40,16 @@ def width(node: Node) -> float:
 
 @dataclass(frozen=True)
 class PaperLine:
-    """A line of a formula: what stands left of = in its first one, None in those that go on."""
+    """A line of a formula: the left side of = on the first line, None on continuation lines."""
 
     left: Node | None
     right: Node
 
 
 def paper_lines(lines: Sequence[Node]) -> Iterator[PaperLine]:
-    """Equations, and words between them, in lines that fit the page; all begin behind the widest
-    left side."""
+    """Break equations, and words between them, into lines that fit the page.
+
+    All lines begin after the widest left side."""
     sides = [_sides(line) for line in lines]
     room = PAGE - max((width(left) + _SPACED for left, _ in sides if left), default=0.0)
     for left, right in sides:
@@ -61,14 +62,14 @@ def paper_lines(lines: Sequence[Node]) -> Iterator[PaperLine]:
 
 
 def _sides(line: Node) -> tuple[Node | None, Node]:
-    """Left and right of =; no left side of what is no equation."""
+    """Left and right of =; no left side if the line is no equation."""
     if not isinstance(line, Row) or len(line.items) < 3 or line.items[1] != Sign("=", True):
         return None, line
     return line.items[0], Row(line.items[2:])
 
 
 def broken(node: Node, room: float) -> list[Node]:
-    """Lines of a node, each as wide as there is room where that can be: broken before signs.
+    """Break a node before signs into lines that fit the available width where possible.
 
     Parentheses that a line leaves open come as signs of their own.
     """
@@ -87,7 +88,7 @@ def broken(node: Node, room: float) -> list[Node]:
 
 
 def _pieces(node: Row, room: float) -> Iterator[list[Node]]:
-    """Parts of a row that stay together: what is between signs, and factors of what is too wide."""
+    """Unbreakable parts of a row: terms between signs, or factors of terms that are too wide."""
     for piece in _between_signs(node, room):
         if sum(map(width, piece)) <= room:
             yield piece
@@ -113,7 +114,7 @@ def _between_signs(node: Row, room: float) -> Iterator[list[Node]]:
 
 
 def _atoms(node: Node, room: float) -> Iterator[Node]:
-    """What stands in a row, with what is too wide for a line taken apart."""
+    """Nodes of a row, with nodes that are too wide for a line split up."""
     if isinstance(node, Row):
         for item in node.items:
             yield from _atoms(item, room)

@@ -1,7 +1,7 @@
-"""Formulas inside sentences, written plainly in the derivations (`S_Q = S - U G`), typeset.
+"""Typeset plain formulas inside sentences of derivations (`S_Q = S - U G`).
 
 What counts as a formula: names of a letter or a Greek letter, with their dots, subscripts and
-superscripts, and the signs between them.  Everything else stays the text that it is.
+superscripts, and the signs between them.  Everything else stays text.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def caption(text: str) -> Iterator[str | Node]:
 
 
 def as_text(text: str) -> str:
-    """A sentence, its formulas typeset in letters."""
+    """Sentence with its formulas as plain text."""
     return "".join(p if isinstance(p, str) else box(p).lines[0] for p in caption(text))
 
 
@@ -65,7 +65,7 @@ def _signed(node: Node) -> bool:
 
 
 def _token(match: re.Match[str]) -> Token:
-    """Kind, text, and what it is if it is a part of a formula for certain."""
+    """Kind, text, and the node if the token is certainly part of a formula."""
     kind, text = match.lastgroup or "", match.group()
     if match["name"] is None:
         return (kind, text, _power(Word(""), text[1:]) if kind == "raised" else None)
@@ -109,7 +109,7 @@ def _judged(tokens: list[Token]) -> Iterator[Token]:
 
 
 def _joined(neighbour: tuple[str, str]) -> bool:
-    """Whether an article beside this is a name after all."""
+    """Whether an article next to this token is a name."""
     kind, text = neighbour
     return kind in ("name", "raised") or (kind == "sign" and text != "-")
 

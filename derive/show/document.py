@@ -1,4 +1,4 @@
-"""What a page of `mstmm show` says, before any format: headings, quantities, formulas, code."""
+"""Format-independent content of a `mstmm show` page: headings, quantities, formulas, code."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .text import box
 
 STAGES = ("equations", "matrix", "ir", "c")
 
-#: What the blocks of a transfer matrix stand for, by the unit of a state's first block.
+#: Meaning of the blocks of a transfer matrix, by the unit of a state's first block.
 STATES = {
     "[m/s2": "blocks: acceleration, angular acceleration, moment, force, 1",
     "[m": "blocks: position, angle, moment, force, modal coordinates where there are any, 1",
@@ -29,7 +29,7 @@ STATES = {
 
 @dataclass(frozen=True)
 class ElementView:
-    """One element to show.  Kernels and C are made only when a stage asks for them.
+    """One element to show; kernels and C are only made for a stage that needs them.
 
     `sources` are those of the element; of an element (`is_element`, not a step of the sweep) all
     other sources of derivations and kernels are those of the sweep.
@@ -138,7 +138,7 @@ def _derived(
 
 
 def _equations(derivation: Derivation, written: Written) -> list[Item]:
-    """Quantities, premises, and what follows from them."""
+    """Items of quantities, premises and resulting equations."""
     items: list[Item] = [Heading("Given", 3), _quantities(derivation.inputs, written)]
     items += [Heading("Wanted", 3), _quantities(derivation.outputs, written)]
     if derivation.premises:
@@ -191,7 +191,7 @@ def _row(name: str, shape: tuple[int | str, ...], unit: str, meaning: str) -> Qu
 
 
 def _entries(array: str, parts: Parts) -> Iterator[QuantityRow]:
-    """What stands in an array, by the names of its author."""
+    """Rows of the entries of an array, by the author's names."""
     first = 0
     for part in parts:
         symbol = Name(own_name(part.name) if part.length == 1 else shown_name(part.name))
@@ -243,7 +243,7 @@ class Written:
         self.named = Named(derivation, names)
 
     def formula(self, e: Equation, labels: str = "") -> Formula:
-        """An equation, with what its blocks stand for."""
+        """Formula of an equation, with the meaning of its blocks."""
         zeros = ""
         if e.zeros:
             zeros = "entries " + ", ".join(f"({i + 1},{j + 1})" for i, j in e.zeros) + " vanish"
@@ -257,5 +257,5 @@ class Written:
 
 
 def _says(caption: str, lines: tuple[Node, ...]) -> bool:
-    """Whether a caption says no more than its formula does."""
+    """Whether a caption only repeats its formula."""
     return len(lines) == 1 and as_text(caption).split() == box(lines[0]).lines[0].split()

@@ -1,4 +1,4 @@
-"""A KernelIR as readable lines, one statement each; indices count from zero as the arrays do."""
+"""Listing of a KernelIR, one statement each; indices count from zero as the arrays do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What fits where: formulas in text are measured in columns, on paper in points."""
+"""Limits of formula widths: columns in text, points on paper."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ INNER_WIDTH = 16
 
 
 class Columns:
-    """Of text."""
+    """Width limits of text pages, in columns."""
 
     def line(self, node: Node) -> bool:
         """Whether a formula fits in a line."""
@@ -26,12 +26,12 @@ class Columns:
         return len(box(node).lines) == 1 and box(node).width <= CELL_WIDTH
 
     def inner(self, node: Node) -> bool:
-        """Whether a matrix may stand inside a formula that does not fit."""
+        """Whether a matrix may stay inside a formula that does not fit."""
         return box(node).width <= INNER_WIDTH
 
 
 class Paper(Columns):
-    """Of pages."""
+    """Width limits of paper pages, in points."""
 
     def line(self, node: Node) -> bool:
         return width(node) <= PAGE

@@ -1,5 +1,8 @@
-"""The sweep told in its equations: motion, absorbing, hinge, port, recovery, for a hinge of two
-speeds.  The equations are those of the kernels that the schedule calls."""
+"""The sweep explained by its equations, for a hinge of two speeds.
+
+Chapters: motion, absorbing, hinge, port, recovery.  The equations are those of the kernels
+that the schedule calls.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from .document import Heading, Item, Paragraph, Written
 from .entries import Declared
 from .measure import Columns
 
-#: The element whose kernels tell it, and the last equation on the hinge before the port.
+#: The element whose kernels are shown, and the last equation on the hinge before the port.
 _ELEMENT, _ON_THE_HINGE = "generic2", "e_Q"
 
 

@@ -1,4 +1,4 @@
-"""What `mstmm show` can show: every element and every step of the sweep, by name.
+"""Subjects of `mstmm show`: every element and every step of the sweep, by name.
 
 A full name is kind and name, as in the C files: hinge_pin, body_rigid, force_spring, sweep_frames,
 classical_ball.  The name alone means the first of these kinds that has it.
@@ -80,7 +80,7 @@ def of_element(element: Element) -> ElementView:
     return replace(shown, is_element=True)
 
 
-#: What the equations of an element come from, where that is a derivation of its own.
+#: Separate derivations that precede the equations of an element.
 _BEFORE: dict[type, Callable[[], Derivation]] = {RigidBody: newton_euler_form}
 
 

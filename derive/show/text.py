@@ -30,7 +30,7 @@ class Box:
 
 
 def columns(text: str) -> int:
-    """Columns a terminal needs: combining marks take none."""
+    """Columns a terminal needs: combining marks need none."""
     return sum(1 for c in text if not unicodedata.combining(c))
 
 
@@ -52,7 +52,7 @@ def text_name(name: ShownName, accent: str = "") -> str:
 
 
 def box(node: Node) -> Box:
-    """The node as a box; matrices and choices take several lines."""
+    """The node as a box; matrices and choices need several lines."""
     if isinstance(node, Name):
         return Box((text_name(node.name, node.accent) + _index(node.index),))
     if isinstance(node, Word):

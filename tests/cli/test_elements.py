@@ -133,7 +133,7 @@ def test_an_element_of_the_store_shows_its_equations(mstmm: Command, knee: Path)
         by_name.code == 0 and by_name.out == by_file.out and "position of P from Q" in by_name.out
     )
     beside = mstmm("show", "knee", "--beside")
-    assert beside.code == 2 and "hinge_knee has no classical matrix beside it" in beside.err
+    assert beside.code == 2 and "hinge_knee: no classical matrix exists" in beside.err
 
 
 @pytest.mark.parametrize("format", ["text", "latex", "html"])

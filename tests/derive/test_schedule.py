@@ -151,9 +151,9 @@ def test_hinges_of_one_room_have_the_same_ports() -> None:
         (call("frames.speed_power", tau="body.tau", u="body.u", x="body.x", P="local.P"),
          "has no port x"),
         (call("frames.speed_power", tau="body.tau", u="body.speed", P="local.P"),
-         "pass wrong: there is no slot 'body.speed'"),
+         "pass wrong: unknown slot 'body.speed'"),
         (call("frames.speed_power", when="modall", tau="body.tau", u="body.u", P="local.P"),
-         "no condition 'modall'"),
+         "unknown condition 'modall'"),
     ],
 )  # fmt: skip
 def test_names_that_nobody_knows_are_not_printed(step: Call, said: str) -> None:

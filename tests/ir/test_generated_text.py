@@ -64,7 +64,7 @@ def test_the_order_of_the_specs_does_not_matter() -> None:
 
 
 def test_two_elements_of_one_name_are_refused() -> None:
-    with pytest.raises(ValueError, match="two elements are called hinge 'drawn'"):
+    with pytest.raises(ValueError, match="two elements have the name hinge 'drawn'"):
         generated_files([SPEC, SPEC])
 
 

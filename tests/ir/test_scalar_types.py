@@ -64,5 +64,7 @@ def test_constants_have_the_precision_of_the_type(tmp_path: Path) -> None:
 
 
 def test_an_unknown_type_is_refused() -> None:
-    with pytest.raises(ValueError, match="'half' is no scalar type; there are: float, double"):
+    with pytest.raises(
+        ValueError, match="unknown scalar type 'half'; expected one of float, double"
+    ):
         scalar_source(constant_kernel(), "half")

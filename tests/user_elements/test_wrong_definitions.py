@@ -78,7 +78,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "frame": (own("frame = 'sideways'"), "frame: expected one of .*found 'sideways'"),
     "keys": (own("keys = ('axis3',)"), "keys: expected a tuple of axis, axis2, lead, found"),
     "one axis": (own("frame = 'crossing'"), 'frame "crossing" needs axis2 among the keys'),
-    "no lead": (own("keys = ('axis', 'lead')"), "keys: lead is no parameter of it"),
+    "no lead": (own("keys = ('axis', 'lead')"), "keys: lead is not a declared parameter"),
     "no angle": (
         own("frame, keys, parameters = 'crossing', ('axis', 'axis2'), ()"),
         "first parameter is the angle between the axes",
@@ -121,7 +121,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "open piecewise": (along("sp.Piecewise((p.r, q.a > 0))"), "without a last case"),
     "strange symbol": (
         along("p.r * sp.Symbol('z')"),
-        r"position\(q, p\) contains z; it may use q, p",
+        r"position\(q, p\) contains z; expected only q, p",
     ),
     "math": (along("p.r * math.sin(q.a)"), "take functions from sympy"),
     "numpy": (along("p.r * numpy.sin(q.a)"), "take functions from sympy"),
@@ -142,10 +142,10 @@ WRONG: dict[str, tuple[str, str]] = {
     # units
     "length from angle": (along("q.a"), r"entry \(1, 1\) of position\(q, p\) = q_a: expected m"),
     "sum": (along("p.r + p.r**2"), "adds m and m|adds m.2 and m"),
-    "sine of a length": (along("p.r * sp.sin(p.r)"), "sin.* takes a pure number, found m"),
+    "sine of a length": (along("p.r * sp.sin(p.r)"), "sin.* expects a pure number, found m"),
     "unit": (
         declared("parameters", "(Param('r', 'furlong'),)"),
-        "'furlong' is not known; use m, kg",
+        "unknown unit 'furlong'; use m, kg",
     ),
     "no unit": (declared("parameters", "(Param('r', 3),)"), "unit of r: expected text such as"),
     # speeds

@@ -1,7 +1,7 @@
-"""How hinges beside flexible bodies get their discrete-time matrices: one elimination for all.
+"""Elimination that gives the discrete-time matrices of hinges next to flexible bodies.
 
-Behind a hinge the state is z_O = E z_I + G x, where x holds what the hinge leaves free: its own
-free directions and the modal coordinates of the outboard beam.  They follow from V z_O = 0: the
+Outboard of a hinge the state is z_O = E z_I + G x, where x holds what the hinge leaves free: its
+own free directions and the modal coordinates of the outboard beam.  They follow from V z_O = 0: the
 modal rows W of the outboard body and, for a smooth hinge, the next hinge's condition L on the load
 at the far end of that body, L U z_O = 0.  So
 
@@ -55,7 +55,7 @@ class Pairing:
 
     @property
     def shown(self) -> str:
-        """In words."""
+        """Description of the pairing."""
         kinds = ["a flexible body" if n else "a rigid body" for n in (self.inboard, self.outboard)]
         return f"{kinds[0]} inboard, {kinds[1]} outboard"
 
@@ -72,7 +72,7 @@ def _block(state: State, name: str, end: str) -> sp.MatrixSymbol:
 
 @dataclass(frozen=True)
 class FlexibleHinge:
-    """What one hinge states.
+    """Premises of one hinge.
 
     `relations` give the blocks at O from those at I and the free unknowns, linearly (or `carry`
     gives E and G); `free` are the hinge's own unknowns; `next_rows` L are rows on the state at the

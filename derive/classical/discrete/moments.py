@@ -43,7 +43,7 @@ class Letters:
 
 @dataclass(frozen=True)
 class BodyMoments:
-    """What a kind of body brings: inputs of the kernel, definitions, moments by plain symbols."""
+    """Kernel inputs, definitions and moments (in plain symbols) of one kind of body."""
 
     inputs: tuple[Quantity, ...]
     definitions: tuple[Equation, ...]

@@ -1,7 +1,7 @@
-"""What a rigid or flexible body states before anything is linearised: for pages and for checks.
+"""Nonlinear premises of rigid and flexible bodies, for pages and for checks.
 
 The balances are written in vectors, as Newton and Euler would; the matrices are derived from the
-energy (`flexible_energy`), so that their agreement says something.
+energy (`flexible_energy`), so that their agreement is an independent check.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which body a discrete-time matrix is made for, and what its kernel is given."""
+"""Options of a body with a discrete-time matrix, and the inputs of its kernel."""
 
 from __future__ import annotations
 

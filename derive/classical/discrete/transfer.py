@@ -1,4 +1,4 @@
-"""From the linear form of a body's residual to its transfer matrix and its modal rows."""
+"""Transfer matrix and modal rows of a body from its linearised residual."""
 
 from __future__ import annotations
 
