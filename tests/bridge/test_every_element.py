@@ -83,5 +83,5 @@ def test_what_no_run_calls_has_no_c() -> None:
 
 
 def test_unknown_element_is_refused() -> None:
-    with pytest.raises(ElementError, match="no hinge called 'pinn'"):
+    with pytest.raises(ElementError, match="no hinge named 'pinn'"):
         crosscheck("hinge", "pinn")

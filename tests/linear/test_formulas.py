@@ -138,6 +138,6 @@ def test_doubles_that_stand_for_fractions(double: float, taken: Fraction | float
 def test_long_formulas_end_at_the_limit() -> None:
     x, y, z = symbols(most=1000)
     found = x + y + z
-    with pytest.raises(SceneError, match=r"the limit is 1000; keep fewer names"):
+    with pytest.raises(SceneError, match=r"the limit of 1000; keep fewer names"):
         for _ in range(20):
             found = found * (x + y + z)

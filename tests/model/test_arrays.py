@@ -119,7 +119,7 @@ SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
     "times as text": ({"output_times": "all"}, "output_times = 'all'"),
     "one whole number": (
         {"output_times": 1},
-        "output_times = 1: expected times in s, found a whole",
+        "output_times = 1: expected times in s, found an integer",
     ),
     "one whole number of NumPy": (
         {"output_times": np.int64(301)},

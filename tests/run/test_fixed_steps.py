@@ -88,6 +88,6 @@ def test_what_rests_is_not_said_to_be_missed() -> None:
 
 
 def test_a_longest_step_beside_a_fixed_one_is_refused() -> None:
-    with pytest.raises(mstmm.SceneError, match=r"max_step = 0\.1: .* step = 0\.01 fixes them all"):
+    with pytest.raises(mstmm.SceneError, match=r"max_step = 0\.1: .* step = 0\.01 fixes all steps"):
         swung(0.01, "genalpha", max_step=0.1)
     assert swung(0.01, "genalpha", max_step=np.inf).success

@@ -87,7 +87,7 @@ def test_shapes_that_cannot_carry_the_load_at_the_tip_are_warned_about() -> None
 
 def test_a_tangent_frame_at_a_pinned_end_is_warned_about() -> None:
     tied = run_of(scene(beam(frame="tangent")), 0.1)
-    assert matching(tied, "tangent frame.*free to turn")
+    assert matching(tied, "tangent frame.*free to rotate")
     assert run_of(scene(beam(frame="chord")), 0.1).warnings == ()
 
 

@@ -51,7 +51,7 @@ def test_a_bead_against_its_own_equation(when: str, entry: int) -> None:
 
 @pytest.mark.parametrize("when", ["wire.q > 1", "wire.s[0] > 1", "wire.x > 1"])
 def test_what_a_curve_does_not_have(when: str) -> None:
-    with pytest.raises(mstmm.SceneError, match=r"unknown; .* there is wire.s and wire.s_rate"):
+    with pytest.raises(mstmm.SceneError, match=r"unknown; .* has wire.s and wire.s_rate"):
         mstmm.Scene(**bead(when))
 
 
