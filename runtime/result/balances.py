@@ -1,6 +1,7 @@
-"""What a run should have kept: energy less work, and the momentum that nothing outside changes.
+"""Energy and momentum balances of a run.
 
-Neither is the error of the motion, but both find wrong steps and wrong laws.
+Energy less work, and momentum without external loads, should stay constant.  Their drift is
+not the error of the motion, but it reveals wrong steps and wrong laws.
 """
 
 from __future__ import annotations
@@ -21,13 +22,13 @@ from .record import Record
 #: A hinge load counts as zero below this part of the largest one.
 _ZERO = 1e-9
 
-#: Part of the stored energy against which rounding is judged where hardly anything moves.
+#: Fraction of the stored energy that serves as scale where hardly anything moves.
 _AT_REST = 1e-8
 
-#: Place (m) below which a body lies at one and the same height.
+#: Height differences (m) below this are rounding.
 _HEIGHT = 1e-15
 
-#: Bodies that are looked at to learn how far a scene reaches.
+#: Maximum number of bodies sampled to estimate the extent of a scene.
 _SOME = 30
 
 
@@ -48,13 +49,13 @@ def _change(values: Array) -> float:
 
 
 def energy(result: Record) -> Drift:
-    """T + V - W against the largest sum of what was exchanged: T, changes of V, W.
+    """Drift of T + V - W relative to the largest energy exchanged: T, changes of V, W.
 
     At rest under load nothing is exchanged: then against a part of what is stored, or against what
     rounding of places is worth to gravity.
     """
     parts, work = result.energies(), result.work
-    with np.errstate(all="ignore"):  # what overflows is told by what it leaves
+    with np.errstate(all="ignore"):  # the residual shows an overflow
         residual = sum(parts.values(), -work)
         overflows = any(np.isinf(part).any() for part in (*parts.values(), work))
         exchanged = parts["kinetic"] + np.abs(work)
@@ -67,7 +68,7 @@ def energy(result: Record) -> Drift:
 
 
 def _mass(result: Record) -> float:
-    """All that moves, kg."""
+    """Total moving mass, kg."""
     scene = result.model.scene
     mass = sum(body.mass for body in scene.body)
     mass += sum(chain.body_of(k).mass for chain in scene.chain for k in range(chain.count))
@@ -75,7 +76,7 @@ def _mass(result: Record) -> float:
 
 
 def _stored(parts: Mapping[str, Array]) -> float:
-    """The largest energy of gravity and springs."""
+    """Largest stored energy of gravity and springs, J."""
     with np.errstate(all="ignore"):
         return _largest(np.abs(parts["gravity"]) + np.abs(parts["springs"]))
 
@@ -84,7 +85,7 @@ def _stored(parts: Mapping[str, Array]) -> float:
 
 
 def momentum(result: Record) -> list[Drift]:
-    """Drift of the components of momentum that nothing outside the scene changes.
+    """Drifts of the momentum components that no external load changes.
 
     Components that are zero throughout, and those that a blow may have changed, are left out.
     Angular momentum is taken about the origin, or about the one point of the ground through which a
@@ -123,13 +124,13 @@ def momentum(result: Record) -> list[Drift]:
 
 
 def _unweighted(scene: Scene) -> NDArray[np.bool_]:
-    """(2, 3): along which axes weights do not push, and about which they do not turn."""
+    """Axes (2, 3) along which gravity has no force, and about which it has no moment."""
     still = np.array(scene.gravity) == 0
     return np.array([still, [still[[1, 2]].all(), still[[0, 2]].all(), still[[0, 1]].all()]])
 
 
 def _isolated(scene: Scene) -> bool:
-    """Nothing but uncoupled hinges and gravity acts between the scene and the ground."""
+    """Whether only uncoupled hinges and gravity act between the scene and the ground."""
     loads = any(
         not e.is_zero
         for load in scene.load
@@ -179,7 +180,7 @@ def _pivot(result: Record, reach: float) -> tuple[Array, str]:
 
 
 def _carries_nothing(hinge: Hinge) -> bool:
-    """Whether nothing passes a hinge where its law does not act."""
+    """Whether a hinge transmits no load other than that of its law."""
     return hinge.facts is not None and hinge.facts.free_body
 
 

@@ -1,4 +1,4 @@
-"""Results of many runs: the quantities of single runs, with the run as their first axis."""
+"""Results of a batch: quantities of single runs with the run as first axis."""
 
 from __future__ import annotations
 
@@ -30,29 +30,29 @@ from .record import Record
 if TYPE_CHECKING:
     from .certificate import Certificate
 
-#: What their files say that they hold.
+#: Format name in saved files.
 BATCH = "mstmm batch"
-#: What batches do not integrate.
+#: Quantities that batches do not integrate.
 _NOT_THERE = ("work",)
 #: Runs up to which each is a line; and the edges of the band that stands for more.
 _LINES, _BAND = 12, (5.0, 95.0)
 
 
 class BatchRun(Record):
-    """One run of a batch, over the output times that it reached."""
+    """Single run of a batch at the output times that it reached."""
 
     @property
     def certificate(self) -> Certificate:
-        """There is none: SceneError."""
+        """Raise SceneError: runs of a batch have no certificate."""
         raise SceneError("runs of a batch have no certificate; simulate this one alone")
 
     def candidates(self) -> list[Candidate]:
-        """What may be drawn if nobody chooses."""
+        """Default quantities of a plot."""
         return candidates(self)
 
 
 class Batch(Assessed, BatchResult):
-    """What n runs gave, with all quantities of single runs but the work, which batches leave out.
+    """Results of n runs, with all quantities of single runs except the work.
 
     Values are nan at times that a run did not reach.  Its runs are not examined, so that a batch is
     never trusted: simulate single runs for a verdict.
@@ -60,7 +60,7 @@ class Batch(Assessed, BatchResult):
 
     @property
     def findings(self) -> Iterator[Risk]:  # type: ignore[override]
-        """Runs that failed, and that no run is examined."""
+        """Findings: failed runs, and that runs of a batch are not checked."""
         for k in np.flatnonzero(~np.asarray(self.success)).tolist():
             yield Risk(
                 "run-failed", f"run {k}", f"run {k} failed: {self.messages[k]}",
@@ -88,7 +88,7 @@ class Batch(Assessed, BatchResult):
         if rigid is not None and rigid.one_way:
             raise SceneError(
                 'bodies of flexibility "one-way" respond to single runs: simulate this one alone, '
-                'or take flexibility = "coupled"'
+                'or use flexibility = "coupled"'
             )
         count, nothing = int(there.sum()), np.full(int(there.sum()), np.nan)
         known: dict[str, Any] = dict.fromkeys(Statistics.__dataclass_fields__, 0)
@@ -102,7 +102,7 @@ class Batch(Assessed, BatchResult):
         return BatchRun(model, found)
 
     def names(self) -> tuple[str, ...]:
-        """Every name that `quantity` and `plot` take."""
+        """Names accepted by `quantity` and `plot`."""
         return tuple(name for name in self.run(0).names() if name not in _NOT_THERE)
 
     def quantity(self, name: str) -> Quantity:
@@ -188,7 +188,7 @@ class Batch(Assessed, BatchResult):
         ]  # fmt: skip
 
     def _reached(self, k: int) -> Any:
-        """(m,): the output times at which run k has a state."""
+        """Mask (m,) of the output times at which run k has a finite state."""
         return np.isfinite(self.q[k]).all(axis=1) & np.isfinite(self.u[k]).all(axis=1)
 
     def _quantities(self, names: Sequence[str]) -> list[Quantity]:
@@ -220,7 +220,7 @@ def _refuse_absent(names: Sequence[str]) -> None:
 
 
 def _bands(t: Array, quantities: Sequence[Quantity]) -> Iterator[Trace]:
-    """The median of every column between its quantiles over the runs."""
+    """Median of every column with a band of its quantiles over the runs."""
     colour = 0
     for quantity in quantities:
         values = quantity.values.reshape(*quantity.values.shape[:2], -1)

@@ -1,4 +1,4 @@
-"""Which momentum the blows of a run leave as it is.
+"""Momentum components that the impacts of a run conserve.
 
 A blow between bodies of a scene changes nothing of the momentum of all; one against the world, such
 as a ball's on its floor, does.  Linear momentum along an axis is kept where the scene can be moved
@@ -45,13 +45,13 @@ def kept_by_blows(
 
 
 def is_struck(result: Record) -> bool:
-    """Whether something was thrown back in a run; True also where output times hide its events."""
+    """Whether a run has impacts; True also where output times may hide them."""
     blows = _blows(result)
     return blows is None or bool(blows)
 
 
 def _blows(result: Record) -> list[tuple[int, int]] | None:
-    """(sample, event) of each of them; None where there may be some that no sample shows."""
+    """(sample, event) of every impact; None where samples may not show all of them."""
     thrown = {bounce.event for bounce in result.model.packed.watched.bounces}
     rows = np.flatnonzero(result.event > 0).tolist()
     count = result.statistics
@@ -61,7 +61,7 @@ def _blows(result: Record) -> list[tuple[int, int]] | None:
 
 
 class _Whole:
-    """A scene that is moved as one rigid body, at samples of a run."""
+    """Scene moved as one rigid body at samples of a run."""
 
     def __init__(self, result: Record, roots: Sequence[Hinge], pivot: Array) -> None:
         self._result, self._system = result, SceneSystem(result.model.looped)

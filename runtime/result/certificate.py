@@ -1,4 +1,4 @@
-"""Certificate of a run: what its numbers themselves say about how far they can be trusted."""
+"""Certificate of a run: balances, conditioning, estimated error and verdict."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .verdict import ACCURACY, Verdict
 
 @dataclass(frozen=True)
 class Certificate(Displayed):
-    """What vouches for a run.
+    """Quality report of a run.
 
     Attributes:
         energy: residual of kinetic + potential energy - work (J), against the energy exchanged.
@@ -86,12 +86,12 @@ class Certificate(Displayed):
 
     @property
     def trusted(self) -> bool:
-        """True where balances, error and models were looked at and all stay within bounds."""
+        """Whether balances, error and models were checked and stay within bounds."""
         return self.verdict().trusted
 
     @cached_property
     def risks(self) -> tuple[Risk, ...]:
-        """What asks for attention, doubts first; empty for a clean run."""
+        """Findings about the run, objections first; empty for a clean run."""
         pivot, locked = self.pivot, self.singular
         if pivot and locked and locked.risk and pivot.hinge == locked.hinge:
             pivot = None  # it vanishes where the coordinates fail
@@ -107,17 +107,17 @@ class Certificate(Displayed):
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What speaks against the numbers, one sentence each."""
+        """Objections to the result, one sentence each."""
         return sentences(risk for risk in self.risks if risk.doubt)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The risks, one sentence each."""
+        """All findings, one sentence each."""
         return sentences(self.risks)
 
     @property
     def predictable_until(self) -> float | None:
-        """Time (s) after which two accurate runs part; None if they do not, or were not made."""
+        """Time (s) after which two accurate runs diverge; None without divergence or second run."""
         return None if self.error is None else self.error.horizon
 
     @property
@@ -129,7 +129,7 @@ class Certificate(Displayed):
         return self.text()
 
     def text(self, verdict: bool = True, warnings: bool = True) -> str:
-        """All of it as lines, a name and what is to be said of it; the verdict first."""
+        """Certificate as text, one line per name; the verdict first."""
         rows = self.rows(verdict, warnings)
         width = max(len(name) for name, _ in rows)
         return "\n".join(f"{name.ljust(width)}  {text}" for name, text in rows)
@@ -141,7 +141,7 @@ class Certificate(Displayed):
         return table(self.rows())
 
     def rows(self, verdict: bool = True, warnings: bool = True) -> list[tuple[str, str]]:
-        """The same as pairs of a name and what is to be said of it."""
+        """Certificate as pairs (name, text)."""
         few = "not determined: one sample tells of no change; ask for more output times"
         rows = [("verdict", str(self.verdict()))] if verdict else []
         rows.append(("run", self.end))
@@ -199,7 +199,7 @@ def _verdict(c: Certificate, accuracy: float, balance: float | None) -> Verdict:
 
 
 def _uncovered(error: ErrorEstimate) -> list[str]:
-    """That a second run which failed tells nothing of the error behind where it ended."""
+    """Objection that a failed second run leaves the error unknown after its end."""
     if error.covered is None:
         return []
     return [
@@ -209,7 +209,7 @@ def _uncovered(error: ErrorEstimate) -> list[str]:
 
 
 def _inaccurate(c: Certificate, accuracy: float) -> list[str]:
-    """Units of coordinates whose estimated error, over the whole run, exceeds what was asked."""
+    """Objections to units of q whose estimated error over the run exceeds `accuracy`."""
     assert c.error is not None
     found = []
     for unit, values in c.error.q.items():

@@ -1,4 +1,4 @@
-"""The certificate of a run, made from its record."""
+"""Builder of the certificate of a run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .risks import of_outputs
 
 
 def certificate(result: Record, error: ErrorEstimate | None) -> Certificate:
-    """The certificate of a result; `error` is what only a second run could tell."""
+    """Build the certificate of a result; `error` is the estimate of a second run."""
     run, statistics = result.trajectory, result.statistics
     return Certificate(
         energy=energy(result),
@@ -57,6 +57,6 @@ def certificate(result: Record, error: ErrorEstimate | None) -> Certificate:
 
 
 def _local_errors(statistics: Statistics | None) -> float | None:
-    """Their sum; None where there is none, as of a run whose last step has no finite error."""
+    """Sum of local errors; None where it is not finite or there are no statistics."""
     total = None if statistics is None else statistics.sum_local_error
     return total if total is not None and np.isfinite(total) else None

@@ -1,4 +1,4 @@
-"""How well the loops of a run stayed closed, by its samples."""
+"""Loop closure error of a run: gap and slip at its samples."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..engine.compiled import Compiled
     from ..run.trajectory import Trajectory
 
-#: Samples that are looked at, and rows that are named, at most.
+#: Maximum numbers of checked samples and of named rows.
 _SAMPLES, _NAMED = 12, 8
 
 
@@ -45,7 +45,10 @@ class Closure:
 
 
 def closure(model: Compiled, run: Trajectory) -> Closure | None:
-    """None for a tree and without samples; loops that a release has opened have no gaps."""
+    """Loop closure of a run; None for trees and runs without samples.
+
+    Loops that a release has opened have no gap.
+    """
     if model.closed is None or not len(run.t):
         return None
     calls, gap, slip = LoopCalls(model.looped, np.array(run.q[0])), 0.0, 0.0
@@ -61,7 +64,7 @@ def closure(model: Compiled, run: Trajectory) -> Closure | None:
 
 
 def _largest(calls: LoopCalls, level: int, q: Array, u: Array, t: float) -> float:
-    """Of what the rows lack at one state; nan where it cannot be evaluated."""
+    """Largest constraint residual at one state; nan where it cannot be evaluated."""
     try:
         missing = calls.correction(level, q, u, t=t)[1]
         missing[calls.let_go()] = 0.0

@@ -1,4 +1,4 @@
-"""Numbers that say how well a computation was conditioned: pivots of the sweep, singular angles.
+"""Conditioning of a run: pivots of the sweep and singular angles.
 
 The sweep hands S - S H D^-1 H^T S inwards: the inertia S of what a hinge carries without what the
 hinge gives way to, D = H^T S H + J_rotor.  Where the next pivot D is small beside what was taken
@@ -34,13 +34,13 @@ REFINED = 1e13
 #: Change of angles within a fixed step (rad) that is one where the measure is below the first.
 NEAR, TURNED = 0.1, 0.3
 
-#: Samples of a run at which the pivots are looked at.
+#: Maximum number of samples at which the pivots are checked.
 SAMPLES = 12
 
-#: Bodies times samples of that look, at most, but for one sample.
+#: Limit of bodies times samples of this check; one sample is always checked.
 _WORK = 20_000
 
-#: Scenes with more bodies than this are not looked at: it would take longer than the run.
+#: Scenes with more bodies are not checked: that would take longer than the run.
 LARGEST = 200_000
 
 _UPPER = np.triu_indices(6)
@@ -64,12 +64,12 @@ class PivotLoss:
 
     @property
     def sweep(self) -> str:
-        """The sweep that keeps the digits which this one loses."""
+        """Name of the sweep that avoids this loss of digits."""
         return "qr" if self.refines or self.ratio > REFINED else "refined"
 
     @property
     def risk(self) -> Risk | None:
-        """That digits are lost; None up to LOSS."""
+        """Finding that digits are lost; None for a loss up to LOSS."""
         if not self.error > 1e-16 * LOSS:
             return None
         refined = f", refined {self.refines} times" if self.refines else ""
@@ -198,7 +198,7 @@ class _Pivots:
 
 
 def _six(numbers: Sequence[float]) -> list[float]:
-    """Numbers per speed, filled up with zeros."""
+    """Numbers per speed, padded with zeros to six."""
     return [*numbers, *[0.0] * (6 - len(numbers))]
 
 
@@ -215,7 +215,7 @@ def _carried_motion(turn: Array, shift: Array) -> Array:
 
 
 def may_be_singular(model: Compiled) -> bool:
-    """Whether coordinates of a hinge fail anywhere."""
+    """Whether any hinge has singular coordinates somewhere."""
     return any(
         _measure(model, group.first + k) is not None
         for group in model.layout.groups
@@ -268,7 +268,7 @@ def _measure(model: Compiled, number: int) -> Any:
 
 
 def _measures(model: Compiled, run: Trajectory, number: int, call: Any) -> Array:
-    """The measure of one hinge at every sample."""
+    """Singularity measure of one hinge at every sample."""
     packed = model.packed
     ffi, slots = packed.ffi, packed.layout.slots(number)
     p = packed.system.body(packed.topology.place_of_hinge(number)).hinge_p or (0.0,)

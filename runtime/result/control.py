@@ -55,13 +55,13 @@ class Control:
 
     @property
     def bound(self) -> float:
-        """Relative drift beyond which energy and momentum are not kept."""
+        """Largest relative drift of energy and momentum that counts as conserved."""
         if self.asked is not None:
             return max(DRIFT, self.asked)
         return MOST if self.step is not None else _bound(max(self.rtol, self.atol))
 
     def finer(self, drift: float) -> str:
-        """What would keep what has drifted by so much, relative, in words."""
+        """Advice on step or tolerances for a relative drift that is too large."""
         if self.step is not None:
             order = min(_SETTLING * self.order, _HIGHEST)
             shorter = self.step * (_SURE * self.bound / drift) ** (1 / order)
@@ -81,7 +81,7 @@ def _bound(tolerance: float) -> float:
 
 
 def control(settings: Settings, reached: ReachedError | None) -> Control:
-    """Of a run."""
+    """Step control of a run."""
     known = settings.method in names()
     order = get(settings.method).order if known else _ORDER
     asked = None

@@ -1,4 +1,4 @@
-"""What a certificate rests on: drifts of what should be kept, and how far springs gave way."""
+"""Data of a certificate: drifts of conserved quantities, deflections of springs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Drift:
-    """Largest change of a quantity that should not change, beside the scale it is judged by."""
+    """Largest change of a conserved quantity, with the scale that it is compared with."""
 
     name: str
     unit: str
@@ -28,7 +28,7 @@ class Drift:
 
     @property
     def known(self) -> bool:
-        """False where the quantity is beyond what numbers hold, or no sample gives it."""
+        """False where the quantity overflows or no sample has a value."""
         return bool(np.isfinite(self.largest) and np.isfinite(self.scale))
 
     def __str__(self) -> str:
@@ -40,7 +40,7 @@ class Drift:
 
 @dataclass(frozen=True)
 class Give:
-    """The stiffest spring of a scene: how far its ends were from its rest length, at most.
+    """Largest deflection of the stiffest spring of a scene.
 
     Attributes:
         spring: in words, 'spring "loop"' or 'hinge "mount"'.

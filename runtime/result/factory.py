@@ -1,4 +1,4 @@
-"""The result that fits a run: with elastic responses where the model has one-way bodies."""
+"""Choice of the result class for a run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def result_of(model: Compiled, run: Trajectory, error: ErrorEstimate | None = None) -> Result:
-    """The result of a run: with elastic responses where the model has one-way bodies."""
+    """Build the result of a run, with elastic responses where bodies are one-way."""
     expanded = model.packed.expanded
     rigid = None if expanded is None else expanded.rigidified
     if rigid is None or not rigid.one_way:

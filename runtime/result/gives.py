@@ -1,4 +1,4 @@
-"""How far springs give way: what an estimate of the error of a run does not count as one.
+"""Deflection of stiff springs, which the error estimate of a run does not count.
 
 A stiff spring often stands for a constraint.  To the equations it is a spring like any other, so
 that what it gives by is part of their solution, however accurate the run.
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mstmm.scene import Spring
 
 
-#: Springs of a scene up to which they are looked at.
+#: Scenes with more springs are not checked.
 _MOST = 200
 
 

@@ -1,4 +1,4 @@
-"""What errors are errors of: all coordinates of a scene, or quantities by name.
+"""Error measures: distance of two runs over all coordinates, or over named quantities.
 
 A measure reads numbers (n, k) from a result and tells how far two of them are apart, (n,).
 """
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Measure(ABC):
-    """What is compared.
+    """Error measure: what two runs are compared by.
 
     Attributes:
         name, unit, scaling: for readers; the unit is "1" where numbers are divided by something.
@@ -35,18 +35,18 @@ class Measure(ABC):
 
     @abstractmethod
     def read(self, result: Record) -> Array:
-        """(n, k) numbers of a run at its samples."""
+        """Read the compared numbers (n, k) of a run at its samples."""
 
     @abstractmethod
     def apart(self, a: Array, b: Array) -> Array:
-        """(n,) distances of two of them."""
+        """Distances (n,) of two runs from their numbers (n, k)."""
 
     def scale_by(self, numbers: Array) -> None:  # noqa: B027 - most measures need no reference
-        """Take the sizes of what is compared from the reference, where they depend on the run."""
+        """Set the scales from the reference, where they depend on the run."""
 
 
 class Coordinates(Measure):
-    """All coordinates of the scene."""
+    """Error measure over all coordinates of the scene."""
 
     name = "all coordinates"
     scaling = (
@@ -63,7 +63,7 @@ class Coordinates(Measure):
 
     @property
     def least(self) -> float:
-        """The smallest of the sizes of units other than angles, and of 1."""
+        """Smallest scale of units other than rad, at most 1."""
         return min([1.0, *self._sizes.values()])
 
     def scale_by(self, numbers: Array) -> None:
@@ -78,7 +78,7 @@ class Coordinates(Measure):
 
 
 class Quantities(Measure):
-    """Quantities by name: one in its own unit, several in parts of how far each goes."""
+    """Error measure over named quantities: one in its unit, several over their excursions."""
 
     def __init__(self, start: Record, names: Sequence[str]) -> None:
         self._names = tuple(dict.fromkeys(names))
@@ -107,7 +107,7 @@ class Quantities(Measure):
         return np.max([way / size for way, size in zip(ways, self._sizes, strict=True)], axis=0)
 
     def _ways(self, a: Array, b: Array) -> list[Array]:
-        """(n,) distances, one array for each quantity."""
+        """Distances (n,), one array for each quantity."""
         cuts = np.cumsum(self._widths)[:-1]
         pairs = zip(np.split(a, cuts, axis=1), np.split(b, cuts, axis=1), strict=True)
         return [

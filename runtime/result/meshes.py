@@ -1,4 +1,4 @@
-"""The files of meshes that shapes are drawn by, kept with a result that goes elsewhere."""
+"""Mesh files of shapes, stored with a result."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from mstmm.scene import Scene
 
-#: Bytes of all files of a scene up to which they are kept.
+#: Size limit of all stored files of a scene, bytes.
 _MOST = 50_000_000
 
 Variable = tuple[tuple[str, ...], Any, dict[str, str], dict[str, Any]]
@@ -34,7 +34,7 @@ def contents(scene: Scene, came: Mapping[str, bytes]) -> dict[str, bytes]:
 
 
 def variables(scene: Scene, came: Mapping[str, bytes]) -> dict[str, Variable]:
-    """Each file as its bytes, with its path beside them."""
+    """Dataset variables of mesh files: bytes, and the path as an attribute."""
     found: dict[str, Variable] = {}
     for k, (path, content) in enumerate(sorted(contents(scene, came).items())):
         about = {"long_name": "file of a mesh that shapes are drawn by", "path": path}
@@ -44,6 +44,6 @@ def variables(scene: Scene, came: Mapping[str, bytes]) -> dict[str, Variable]:
 
 
 def kept(data: Any) -> Mapping[str, bytes]:
-    """The files that came with a saved result, by their paths in its scene."""
+    """Contents of the mesh files of a saved result by their paths in its scene."""
     names = [name for name in data if str(name).startswith("mesh_") and "path" in data[name].attrs]
     return {str(data[n].attrs["path"]): data[n].values.astype(np.uint8).tobytes() for n in names}

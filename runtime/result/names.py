@@ -1,4 +1,4 @@
-"""A quantity of a run, and the names under which the quantities of one owner are found."""
+"""Quantity of a run, and the name table of the quantities of one owner."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Quantity:
 
 
 def columns(quantity: Quantity) -> list[str]:
-    """One label for each column."""
+    """Labels of the columns of a quantity."""
     return [f"{quantity.name}.{label}" for label in quantity.labels] or [quantity.name]
 
 
@@ -50,7 +50,7 @@ class Table:
         self, name: str, unit: str, what: str, get: Values, k: int | None = None,
         rates: Values | None = None, listed: bool = True, owner: str = "",
     ) -> None:  # fmt: skip
-        """One number, column k of what `get` gives."""
+        """Add a scalar quantity: column k of the values that `get` returns."""
         long_name = f"{what} of {owner}" if owner else what
         if name not in self.entries and listed:
             self.whole.append(name)

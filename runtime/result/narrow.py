@@ -1,4 +1,4 @@
-"""Whether the steps of a run have passed over what an expression of the motion does.
+"""Detection of narrow features that the steps of a run missed.
 
 A force that is narrow in a coordinate is seen at the stages of steps alone: where these are long
 it is passed over, and every estimated error is zero.  Behind a run its path is known, and so is
@@ -75,7 +75,7 @@ class _Path:
 
 
 def passed_over(model: Compiled, run: Trajectory) -> tuple[Risk, ...]:
-    """One row for each expression of which steps have passed over something."""
+    """Findings about expressions with narrow features that steps missed."""
     found = _seen(model, run)
     if run.settings.output_times is None or run.settings.step is not None:
         return found

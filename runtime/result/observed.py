@@ -1,4 +1,4 @@
-"""What the states of a run show, computed in batches when first asked for, and kept.
+"""Observations of the states of a run, computed in batches on first use and cached.
 
 One batch of the engine gives everything at once for a run of usual size; where that would not fit
 into memory, each body and each kind of quantity is a batch of its own.
@@ -61,7 +61,7 @@ class Observed:
         return self._points[name]
 
     def fetch(self, references: Sequence[str]) -> None:
-        """Observe these bodies and ends in one go, where they are asked for one after another."""
+        """Observe these bodies and ends in one batch, before they are read one by one."""
         if len(self.references) > _TOGETHER:
             missing = [name for name in references if name not in self._points]
             if missing and len(self.run.t) * 24 * len(missing) <= _BATCH:
@@ -93,7 +93,7 @@ class Observed:
         return found
 
     def largest_loads(self) -> tuple[float, float]:
-        """The largest component of force (N) and of moment (N*m) of any hinge."""
+        """Largest component of force (N) and of moment (N*m) over all hinges."""
         found = [0.0, 0.0]
         for part in self._pieces("loads"):
             for k in (0, 1):
@@ -144,7 +144,7 @@ class Observed:
 
 
 def _no_efforts_on_modes(efforts: Array, layout: Layout) -> None:
-    """Laws and drives act on hinges: on modes they put nothing."""
+    """Set efforts on modes to zero: laws and drives act on hinges only."""
     for slots in layout.modal.values():
         efforts[:, slots.u_slice] = 0.0
 

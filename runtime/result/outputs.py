@@ -1,4 +1,4 @@
-"""Outputs of a scene: quantities of a run, and expressions of them, by names of their own."""
+"""Outputs of a scene: named quantities of a run and expressions of them."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from mstmm.scene import Output
 from ..kernels import vectorized
 from .names import Quantity
 
-#: Gives the quantity of a name, and raises SceneError where there is none.
+#: Lookup of a quantity by name; raises SceneError for an unknown name.
 Known = Callable[[str], Quantity]
 
 
 def quantity_of(output: Output, t: Array, known: Known) -> Quantity:
-    """The output at the times t (n,); SceneError for what it names in vain."""
+    """Evaluate an output at the times t (n,); SceneError for unknown names in it."""
     source = one_quantity(output)
     try:
         if source:
@@ -44,7 +44,7 @@ def one_quantity(output: Output) -> str:
 
 
 def component_of(quantity: Quantity, label: str) -> Quantity:
-    """One column of a vector."""
+    """Component of a vector quantity by its label."""
     values = quantity.values[:, quantity.labels.index(label)]
     long_name = f"{quantity.long_name}, {label}"
     return replace(

@@ -1,4 +1,4 @@
-"""Quantities of a run by name: "shoulder.angle", "rod1.tip.vx", "shoulder.force", "energy".
+"""Quantities of a run by name, such as "shoulder.angle", "rod1.tip.vx", "energy".
 
 Every name gives values over time with their unit and one label per column.  Axes are inertial.
 """
@@ -51,7 +51,7 @@ RATES = {
 
 
 class Quantities:
-    """Every quantity of a run by its name, from the states and what they show.
+    """Quantities of a run by name, from its states and observations.
 
     Names are made per owner, a hinge, a body, an end, a spring, a load, a bushing, a constraint, a
     coupling or the scene (""), when they are asked for.
@@ -114,7 +114,7 @@ class Quantities:
         return self.observed.loads(own, 0 if kind == "force" else 3)
 
     def effort(self, hinge: str) -> Array:
-        """(n, nu): what laws and drives put in along the speeds."""
+        """Efforts (n, nu) of laws and drives along the speeds of a hinge."""
         return self.observed.columns("efforts", (self.slots(hinge).u_slice,))
 
     def sum(self, name: str) -> Array:
@@ -140,7 +140,7 @@ class Quantities:
         raise SceneError(f'"{name}": there is no such quantity{hint}')
 
     def _entry(self, name: str) -> Callable[[], Quantity] | None:
-        """How to get what has this name in the scene; None if nothing has."""
+        """Getter of the quantity of this name; None if there is none."""
         tables = map(self.of, ["", *self._owners_in(name)])
         return next((table.entries[name] for table in tables if name in table.entries), None)
 
@@ -160,7 +160,7 @@ class Quantities:
             yield from (table.entries[name]() for name in table.whole)
 
     def names(self) -> list[str]:
-        """Every name there is."""
+        """Names of all quantities."""
         return list(self._every())
 
     def _every(self) -> Iterator[str]:
@@ -184,7 +184,7 @@ class Quantities:
         yield ""
 
     def of(self, owner: str) -> Table:
-        """Names of one owner."""
+        """Name table of one owner."""
         if owner not in self._tables:
             table = Table({}, [])
             hinges, own = self.layout.hinges, self._named.hinge.get(owner, owner) == owner

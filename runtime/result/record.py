@@ -1,4 +1,4 @@
-"""What a run gave: named, labelled quantities over time, with units."""
+"""Record of a run: named, labelled quantities over time, with units."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Record(FlexibleResults, ABC):
 
     @cached_property
     def _unusable(self) -> str:
-        """What cannot be computed of finite states; "" if everything can."""
+        """Reason why samples with finite states cannot be used, or ""."""
         run = self.trajectory
         if not self.model.flexible and max(_size(run.q), _size(run.u), _size(run.work)) < _MODEST:
             return ""
@@ -135,7 +135,7 @@ class Record(FlexibleResults, ABC):
     @property
     @abstractmethod
     def certificate(self) -> Certificate:
-        """What vouches for the numbers."""
+        """Quality report of the run."""
 
     @property
     def risks(self) -> tuple[Risk, ...]:
@@ -154,7 +154,7 @@ class Record(FlexibleResults, ABC):
         return tuple(dict.fromkeys((*map(str, risks), *notes, *failures)))
 
     def _outside(self) -> tuple[Risk, ...]:
-        """Models of the scene that are outside their range whatever the run."""
+        """Findings about models of the scene that are outside their range in any run."""
         return tuple(short_beams(self.model.scene))
 
     # --- bodies and ends ------------------------------------------------------------------------

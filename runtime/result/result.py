@@ -1,4 +1,4 @@
-"""Result of a run: its quantities, what vouches for them, and the ways out of it."""
+"""Result of a run: quantities, certificate, export, plots and views."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Result(Record, Displayed):
-    """What a run gave: states, and everything that follows from them, over the sample times.
+    """Result of a run: states and derived quantities at the sample times.
 
     Arrays have the time as their first axis, SI units, radians; vectors are in inertial axes.
     Quantities beyond q and u are computed in one batch when the first of them is asked for, and
@@ -51,7 +51,7 @@ class Result(Record, Displayed):
 
     @cached_property
     def certificate(self) -> Certificate:
-        """What vouches for the numbers: balances, conditioning, estimated error.  Printable."""
+        """Quality report of a run: balances, conditioning, estimated error.  Printable."""
         from .certify import certificate
 
         return certificate(self, self._error)
@@ -64,7 +64,7 @@ class Result(Record, Displayed):
         return tuple(names(self))
 
     def candidates(self) -> list[Candidate]:
-        """What `plot` and `table` choose from if nobody chooses."""
+        """Default quantities of `plot` and `table`."""
         from .plotting.choice import candidates
 
         return candidates(self)
@@ -166,7 +166,7 @@ class Result(Record, Displayed):
         quantities: Sequence[str] = (),
         trails: Sequence[str] = (),
     ) -> Path:
-        """One page for somebody who was not there; see `mstmm.report`, which this calls."""
+        """Write a self-contained report; see `mstmm.report`, which this calls."""
         # by name: the equations come from derive, which this room does not know
         report = import_module("mstmm").report
         made: Path = report(self, path, title=title, quantities=quantities, trails=trails)

@@ -1,4 +1,4 @@
-"""Risks that the numbers of a run show by themselves."""
+"""Findings from the numbers of a run: overflow, drift, quaternion length."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ LENGTH = 1e-3
 
 
 def of_numbers(finite: bool, reached: ReachedError | None) -> Iterator[Risk]:
-    """Numbers that are none, and a wanted error that was not reached."""
+    """Findings: states that are not finite, and a target error that was not achieved."""
     if not finite:
         yield Risk(
             "not-finite", RUN, "the states hold numbers that are not finite",
-            "take smaller steps or tolerances, or look for what goes to infinity",
+            "use smaller steps or tolerances, or find what goes to infinity",
         )  # fmt: skip
     if reached is not None and reached.risk is not None:
         yield reached.risk
 
 
 def of_outputs(run: Trajectory, outputs: Mapping[str, Array]) -> Iterator[Risk]:
-    """Outputs of the scene that are no numbers where the states are."""
+    """Findings: outputs that are not finite at finite states."""
     if not len(run.t):
         return
     known = np.asarray(np.isfinite(np.hstack([run.q, run.u])).all(axis=1))
@@ -47,13 +47,13 @@ def of_outputs(run: Trajectory, outputs: Mapping[str, Array]) -> Iterator[Risk]:
 
 
 def of_balances(drifts: Sequence[Drift], control: Control) -> Iterator[Risk]:
-    """What is not known of energy and momentum, and what is not kept as the steps let expect."""
+    """Findings: energy and momentum that are unknown, or drift more than steps explain."""
     for drift in drifts:
         if not drift.known:
             yield Risk(
                 _kind(drift), drift.name,
                 f"{drift.name} cannot be balanced: it is beyond what numbers hold, or no sample "
-                "gives it", "take smaller steps or tolerances, or look for what goes to infinity",
+                "gives it", "use smaller steps or tolerances, or find what goes to infinity",
             )  # fmt: skip
     for drift in drifts:
         if drift.relative > control.bound:
@@ -64,7 +64,7 @@ def of_balances(drifts: Sequence[Drift], control: Control) -> Iterator[Risk]:
 
 
 def of_quaternions(residual: float) -> Iterator[Risk]:
-    """Quaternions that were far from length 1 before they were settled."""
+    """Finding: quaternions far from unit length before normalisation."""
     if residual > LENGTH:
         yield Risk(
             "quaternion-length", RUN,

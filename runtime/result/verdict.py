@@ -1,4 +1,4 @@
-"""The verdict on a run: may its numbers be used?  What a certificate holds, in one sentence."""
+"""Verdict on a run: its certificate in one sentence."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ACCURACY = ANGLE
 
 @dataclass(frozen=True)
 class Verdict:
-    """May the numbers of a run be used, within the bounds that were asked for?
+    """Verdict on a result within given bounds.
 
     Attributes:
         against: what speaks against them, one sentence each.
@@ -30,7 +30,7 @@ class Verdict:
 
     @property
     def trusted(self) -> bool:
-        """True only where everything was looked at and nothing speaks against the run."""
+        """Whether everything was checked and there is no objection."""
         return not self.against and not self.missing
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""Flexible bodies of a run: their motion, and what acts on their sections, from the engine."""
+"""Flexible bodies of a run: their motion, and the loads on their sections."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class FlexibleBodies:
-    """Motions of the flexible bodies over the samples of a run, made when they are asked for."""
+    """Motions of the flexible bodies at the samples of a run, computed on first use."""
 
     def __init__(self, model: Compiled, observed: Observed) -> None:
         self.model, self.observed, self.run = model, observed, observed.run
@@ -72,7 +72,7 @@ class FlexibleBodies:
     # --- what acts on a body --------------------------------------------------------------------
 
     def held_end(self, name: str) -> str:
-        """The end through which a body hangs on the tree."""
+        """Name of the inboard end of a body."""
         hinge = self._holders.get(name)
         if hinge is None:
             raise SceneError(f'"{name}": no hinge holds this body')
@@ -113,7 +113,7 @@ class FlexibleBodies:
         return load[:, :3], load[:, 3:]
 
     def point_loads(self, name: str) -> list[PointLoad]:
-        """What acts at sections of a beam, but for the end that is held."""
+        """Concentrated loads on a beam, except at its inboard end."""
         body, lines = self.known[name], {load.name for load in self._spread(name)}
         found = []
         for port, load in self.end_loads(name).items():

@@ -1,4 +1,4 @@
-"""What a run says about the model of its flexible bodies: how far it stayed within its range."""
+"""Validity range of flexible bodies: how far a run stayed within it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a flexible body went from where its model holds, from what it did.
+"""Estimators of how far a flexible body left the validity range of its model.
 
 Per body: slope kappa, spin ratio, stiffening gamma, share of the last shape, bending that the
 shapes could not follow, coupling chi, shear.  Thresholds and reasons stand beside the numbers.

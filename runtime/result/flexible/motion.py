@@ -228,7 +228,7 @@ def elastic_force(motion: Motion, places: Array) -> Array:
     if not at.stretch.any():
         raise SceneError(
             f'axial_force of "{motion.body.name}" from its shapes: it has no axial modes; '
-            'take source = "equilibrium"'
+            'use source = "equilibrium"'
         )
     stretch = np.einsum("mk,tk->tm", at.stretch, motion.eta)
     return np.asarray(stretch * motion.shapes.sections(places).EA)

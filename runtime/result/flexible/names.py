@@ -1,6 +1,6 @@
 """Names of quantities of flexible bodies: "blade.strain_energy", "blade.tip.deflection.y".
 
-They stand beside those that every body and end has.
+They complement the names that every body and end has.
 """
 
 from __future__ import annotations

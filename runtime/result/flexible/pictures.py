@@ -1,4 +1,4 @@
-"""Panels of a plot that are no curves over time: "shape", "blade.shape", "blade.deflection"."""
+"""Shape panels of a plot: "shape", "blade.shape", "blade.deflection"."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Risks of flexible bodies: where a run took them to the end of what their model holds for."""
+"""Findings about flexible bodies outside the validity range of their model."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SLOPE, GAMMA, SPIN, TAIL, SHEAR, TURN, BUCKLING, STRAIN = 0.3, 0.1, 1.0, 0.1, 0.
 
 
 def risks(found: Sequence[Flexibility]) -> list[Risk]:
-    """What speaks against the model, one row per kind, of the worst body of each."""
+    """Objections to flexible models, one finding per kind, for its worst body."""
     rows = []
     for one in found:
         for text in one.said:
@@ -37,7 +37,7 @@ def risks(found: Sequence[Flexibility]) -> list[Risk]:
 def _linear(one: Flexibility) -> Risk | None:
     if one.stiffening:
         return None
-    stiffens = 'take flexibility = "coupled"' if one.one_way else "leave stiffening on"
+    stiffens = 'use flexibility = "coupled"' if one.one_way else "leave stiffening on"
     lacks = "responds one way, without stiffening" if one.one_way else "has no geometric stiffening"
     if one.spin_ratio > SPIN:
         way_out = stiffens if one.gamma or one.one_way else "model it by beams, or from a mesh"

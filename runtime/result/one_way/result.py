@@ -41,7 +41,7 @@ def _too_coupled(share: tuple[str, float]) -> Risk:
         "one-way-coupling", f'"{name}"',
         f'the vibration of "{name}" moves the hinge that carries it: a shape holds {chi:.2g} of '
         "the inertia there (chi), so that the one-way response may err by "
-        f"{3 * chi / (1 - chi):.1f} of its deflection", 'take flexibility = "coupled"', chi,
+        f"{3 * chi / (1 - chi):.1f} of its deflection", 'use flexibility = "coupled"', chi,
         COUPLED,
     )  # fmt: skip
 
@@ -54,7 +54,7 @@ def _let_go(model: Compiled) -> tuple[Risk, ...]:
         Risk(
             "one-way-release", f'"{name}"',
             f'hinge "{holders[name]}" lets go of "{name}", whose response stays that of a held '
-            "body", 'take flexibility = "coupled"',
+            "body", 'use flexibility = "coupled"',
         )
         for name in rigid.one_way
         if name in holders
@@ -65,7 +65,7 @@ def _not_struck(name: str) -> Risk:
     return Risk(
         "one-way-blow", f'"{name}"',
         f'the run has blows, of which the response of "{name}" knows nothing: it follows the loads '
-        "between them alone", 'take flexibility = "coupled"',
+        "between them alone", 'use flexibility = "coupled"',
     )  # fmt: skip
 
 

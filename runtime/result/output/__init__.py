@@ -1,1 +1,1 @@
-"""Ways out of a result: Datasets, files, tables and pictures."""
+"""Export of a result: datasets, files and tables."""

@@ -37,7 +37,7 @@ _VECTORS = {**BODY, **HINGE, "euler": EULER}
 
 
 class _NotInColumnsError(SceneError, AttributeError):
-    """What only a scene tells."""
+    """Access to a quantity that needs the scene of the run."""
 
 
 class Columns:

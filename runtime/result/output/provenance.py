@@ -41,7 +41,7 @@ def scene_hash(result: Record) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Programs that took part."""
+    """Versions of the programs used."""
     import scipy
 
     return {

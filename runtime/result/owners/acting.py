@@ -1,4 +1,4 @@
-"""What the expressions of a scene give over a run: efforts of laws, components of loads."""
+"""Expressions of a scene over a run: efforts of laws, components of loads."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MOST = 2**24
 
 
 class Acting:
-    """Evaluated over all samples when the first number is asked for, and kept."""
+    """Expression values at all samples, computed on first use and cached."""
 
     def __init__(self, observed: Observed) -> None:
         self.observed = observed

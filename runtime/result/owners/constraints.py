@@ -1,4 +1,4 @@
-"""Constraints and couplings over a run: what they put on the bodies and speeds that they hold."""
+"""Constraints and couplings over a run: loads on the constrained bodies and speeds."""
 
 from __future__ import annotations
 

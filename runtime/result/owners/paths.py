@@ -1,4 +1,4 @@
-"""What expressions read along a run: coordinates, speeds, lengths of springs, over its time."""
+"""Variables of expressions along a run: coordinates, speeds, lengths of springs."""
 
 from __future__ import annotations
 

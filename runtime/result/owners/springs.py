@@ -1,4 +1,4 @@
-"""Springs between ends over a run: how long they are, how fast that changes, and their efforts."""
+"""Springs over a run: length, rate of length, effort and power."""
 
 from __future__ import annotations
 

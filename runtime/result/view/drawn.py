@@ -1,4 +1,4 @@
-"""One moment of a stage as a flat picture: triangles in the order of their depth, lines over them
+"""Projection of a stage at one time: triangles sorted by depth, with lines over them
 (extra: plot)."""
 
 from __future__ import annotations

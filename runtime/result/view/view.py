@@ -1,4 +1,4 @@
-"""A run to look at: a page, a strip, a film or frames, by the ending of a file."""
+"""Views of a run: page, strip, film or frames, chosen by the file ending."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _INLINE = "480px"
 
 
 class View(Displayed):
-    """What a run looks like.  In a notebook it shows itself; `save` writes it.
+    """View of a run.  Notebooks display it; `save` writes it.
 
     Attributes:
         stage: everything that is seen, as triangles and poses over time.
