@@ -130,7 +130,9 @@ def test_the_risk_of_lost_digits_is_none_there(tmp_path: Path) -> None:
 
 
 def test_masses_that_leave_no_digits() -> None:
-    with pytest.raises(SceneError, match=r'does not reduce: heavy body "rod7" .* or use sweep = "qr"'):
+    with pytest.raises(
+        SceneError, match=r'does not reduce: heavy body "rod7" .* or use sweep = "qr"'
+    ):
         compiled(with_tip(HEAVY["planar pins"], 1e18))
 
 
