@@ -63,7 +63,7 @@ REFUSED = {
                               r"(violated by|leaves) 0\.00.*[:;] " + SHARED),
     "drives of cut hinges": (driven(foot="0.9 + t", tip="0.3 + t"),
                              r'rad with "foot", "tip" held; '
-                             r'the drives of hinges "foot" and "tip" move the same degree of freedom'),
+                             r'the drives of hinges "foot" and "tip" move the same degree of'),
     "a drive and a wish": (driven(foot="0.9 + t") | {"coupling": [LEAD]},
                            r'with "foot" held.*drive less'),
     "more held than is free": (held("foot", "end", off=0.2),
